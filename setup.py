@@ -60,7 +60,8 @@ setup(
         'ros': ['ros-rclpy[fastrtps]==9.1.2', 'ros-std-msgs==5.5.1',
                 'ros-sensor-msgs==5.5.1', 'ros-trajectory-msgs==5.5.1',
                 'ros-diagnostic-msgs==5.5.1'],
-        'report': ['rich>=13', 'matplotlib>=3.8', 'plotly>=5.20'],
+        # The terminal, its completion, pictures, pages.
+        'report': ['rich>=13', 'argcomplete>=3', 'matplotlib>=3.8', 'plotly>=5.20'],
         'sim': ['mujoco>=4.0'],
         'fast': ['numba>=0.60'],
         'bags': ['rosbags>=0.11'],

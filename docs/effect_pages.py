@@ -53,6 +53,7 @@ TYPICAL = {'asymmetric_friction': {'force_forward': 0.8, 'force_backward': 0.4},
            'link_mass': {'beam.mass': 0.5},
            'load_friction': {'coefficient': 0.05},
            'stribeck_friction': {'force': 0.5, 'velocity': 0.01},
+           'effort_filter': {'time_constant': 0.02},
            'time_delay': {'delay': 0.02}}
 UNITS = {'time': 's', 'position': 'm', 'velocity': 'm/s', 'acceleration': 'm/s²', 'effort': 'N'}
 

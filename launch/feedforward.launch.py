@@ -25,6 +25,8 @@ def generate_launch_description() -> LaunchDescription:
         'prefix': ('', 'of the joints: joint_states and controllers say PREFIXslide_1; empty: '
                    'joint_prefix of the model file'),
         'controller': ('forward_command_controller', 'that gets ~/commands and ~/joint_trajectory'),
+        'stop_time': ('0.1', 'seconds in which a controller of trajectories comes to rest if '
+                      'nothing follows; 0.0: it goes on at the last speed'),
         'monitor': ('true', 'compare joint_states with the model, too'),
         'joint_states': ('joint_states', 'topic of the measurements'),
         'use_sim_time': ('false', 'the clock is that of /clock'),
@@ -40,7 +42,9 @@ def generate_launch_description() -> LaunchDescription:
         parameters = [given['model'], own]
         return [
             Node(package='pprs_dynamics', executable='feedforward', namespace=given['namespace'],
-                 parameters=parameters, output='screen', remappings=[
+                 parameters=[*parameters, {
+                     'stop_time': ParameterValue(given['stop_time'], value_type=float)}],
+                 output='screen', remappings=[
                      ('~/commands', [given['controller'], '/commands']),
                      ('~/joint_trajectory', [given['controller'], '/joint_trajectory'])]),
             Node(package='pprs_dynamics', executable='monitor', namespace=given['namespace'],

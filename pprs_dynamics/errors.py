@@ -6,11 +6,19 @@
 from __future__ import annotations
 
 import difflib
+import errno
+import os
+import re
 from collections.abc import Iterable
+from itertools import islice
 from typing import Any
 
 from pprs_dynamics.system.plain_text import displayed
 
+# Likeness, by difflib, from which a whole name, or a part of one, is what was meant; a part counts
+# for less.
+LIKE, LIKE_PART, PART = 0.6, 0.8, 0.75
+MOST_FILES = 2000  # of a folder that are looked at
 # Names that are all listed where one is unknown: the drives' are. Of more, one like it is.
 FEW = 6
 # Names that are all listed where none is like the unknown one: the effects' are, not all keys'.
@@ -18,9 +26,36 @@ MANY = 40
 
 
 def meant(name: str, known: Iterable[str]) -> str:
-    """Return the known name that is most like a misspelt one, '' where none is like it."""
-    close = difflib.get_close_matches(name, list(known), 1)
-    return close[0] if close else ''
+    """Return the known name that is most like a misspelt one, '' where none is like it.
+
+    A beginning or one word of a name will do, as `stribek` for `stribeck_friction`.
+    """
+    def likeness(other: str) -> float:
+        whole, *parts = (
+            difflib.SequenceMatcher(None, name.lower(), part.lower()).ratio()
+            for part in (other, other[:len(name)], *re.findall(r'[^_./\-]{3,}', other)))
+        return whole if whole >= LIKE else PART * max(parts) if max(parts) >= LIKE_PART else 0.0
+
+    likely = max(known, key=likeness, default='')
+    return likely if name and likely and likeness(likely) > 0 else ''
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Return ' (did you mean …?)' for a misspelt name, '' where none is like it."""
+    close = meant(name, known)
+    return f' (did you mean {close}?)' if close else ''
+
+
+def beside(path: object) -> str:
+    """Return the name of a file in the same folder that is like one that does not exist."""
+    folder, name = os.path.split(os.fspath(path) if isinstance(path, os.PathLike) else str(path))
+    try:
+        with os.scandir(folder or '.') as entries:
+            names = [one.name for one in islice(entries, MOST_FILES)]
+    except (OSError, ValueError):
+        return ''
+    close = meant(name, names)
+    return os.path.join(folder, close) if close and close != name else ''
 
 
 class Missing:
@@ -112,6 +147,9 @@ class UnreadableFileError(PprsError, OSError):
     """A file that does not exist, cannot be read, or is not what it should be."""
 
     def __init__(self, path: object, reason: str) -> None:
+        if reason == os.strerror(errno.ENOENT):
+            reason += ''.join(f' (did you mean {displayed(close)}?)'
+                              for close in filter(None, [beside(path)]))
         self.path, self.reason = displayed(path), reason
         super().__init__(f'{self.path}: {reason}')
 

@@ -42,7 +42,7 @@ from pprs_dynamics.simulation.hidden_effect import (
 )
 from pprs_dynamics.simulation.plant import LOAD_ROUNDS, LOAD_TOLERANCE, PlantSettings
 from pprs_dynamics.simulation.resistance import JOINT_OF_RATE, Resistance
-from pprs_dynamics.simulation.sensors import SensorFaults
+from pprs_dynamics.simulation.sensors import ButterworthFilter, SensorFaults
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,9 @@ class PrescribedPlant:
     def readings(self, effects: Sequence[HiddenEffect] = ()) -> Readings:
         """Return the readings, without noise and quantisation."""
         motion, faults = self.motion, SensorFaults.of(effects)
-        effort = (1 + faults.gain) * self.efforts(effects, faults.effort_delay).total
+        smooth = ButterworthFilter(faults.time_constant, float(np.median(np.diff(motion.time))))
+        effort = (1 + faults.gain) * smooth.samples(
+            self.efforts(effects, faults.effort_delay).total)
         position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
         if np.any(faults.position_delay):
             time = _earlier_times(motion, faults.position_delay)

@@ -10,6 +10,7 @@ import time
 from functools import partial
 from typing import Any
 
+import numpy as np
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from sensor_msgs.msg import JointState
@@ -36,6 +37,7 @@ from pprs_dynamics.ros.messages.trajectory_request import (
     readers_for,
 )
 from pprs_dynamics.ros.node.clocks import CommandWatchdog
+from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
 from pprs_dynamics.ros.node.managed_node import ManagedNode
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import drive_count
@@ -44,6 +46,11 @@ from pprs_dynamics.ros.node.provenance import files_given, hardware_of
 from pprs_dynamics.ros.node.qos import SETPOINTS, publisher, subscription
 from pprs_dynamics.ros.node.senders import PASSED_OVER, Senders, publishers_of
 from pprs_dynamics.ros.node.status import Durations, StatusReporter
+
+try:
+    from control_msgs.msg import JointTrajectoryControllerState
+except ImportError:  # then nothing is known of a controller
+    JointTrajectoryControllerState = None
 
 # Poses of a stream hardly differ within that time [s], and margins cost as much as the model.
 MARGINS_PERIOD = 0.01
@@ -75,6 +82,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         names = RobotNames.of(self._settings.model, own['frame_id'])
         self._readers = readers_for(self._settings.model, names)
         self._written = command_writer(names)
+        self._controller = ControllerWatch(names.joints)
         self._feedforward = Feedforward(self._settings.model, own)
         self._timing = Timing(own['max_age'], own['max_ahead'], own['max_duration'])
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0, PASSED_OVER: 0,
@@ -161,6 +169,9 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             subscription(self, reader.message, topic, partial(self._on_trajectory, reader),
                          raw=True, profile=SETPOINTS)
             for topic, reader in self._readers.items()]
+        if JointTrajectoryControllerState is not None:
+            self._inputs.append(subscription(
+                self, JointTrajectoryControllerState, self._controller_topic, self._on_controller))
 
     def _publisher(self, kind: type, topic: str) -> Any:
         self._publishers_made.append(publisher(self, kind, topic))
@@ -243,8 +254,12 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             self._joint_command.publish(self._written.joint_state(
                 request.first_stamp, answer.effort[0], position[0], velocity[0]))
         if self._joint_trajectory.get_subscription_count():
+            drives = self._feedforward.ending_at_rest(answer, self._settings.own['stop_time'])
             self._joint_trajectory.publish(self._written.joint_trajectory(
-                request.start, request.offsets, forces, answer.effort))
+                request.start, drives.offsets, drives, drives.effort))
+            left = request.start + int(drives.offsets[-1]) - self.get_clock().now().nanoseconds
+            self._controller.sent(drives.drive_motion[0], left / NANOSECONDS,
+                                  bool(drives.drive_motion[1][-1].any()))
         for name, each in self._parts.items():
             if each.get_subscription_count():
                 each.publish(self._written.joint_state(
@@ -264,7 +279,10 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
                 if isinstance(effect, MeasuredCurve)
                 and (said := effect.left(answer.forces.mechanism))), '')
         left = self._margins
-        if self._senders.take_turns:
+        complaint = self._complaint
+        if complaint:
+            report('ERROR', 'CONTROLLER', complaint)
+        elif self._senders.take_turns:
             report('WARN', 'CONFLICT', 'the drives follow several publishers in turn, all on '
                    f'{self.resolve_topic_name(TRAJECTORY)}: {publishers_of(self, TRAJECTORY)}')
         elif answer.clamped:
@@ -284,21 +302,61 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         else:
             report('OK', 'OK', 'commands follow the trajectory')
 
+    @property
+    def _controller_topic(self) -> str:
+        """Topic of the state of the controller that gets `~/joint_trajectory`."""
+        return f'{self._joint_trajectory.topic_name.rpartition("/")[0]}/{STATE_TOPIC}'
+
+    @property
+    def _complaint(self) -> str:
+        """That the controller of `~/joint_trajectory` does not follow; '' where none is known."""
+        if not self._joint_trajectory.get_subscription_count() or not (
+                self._controller.was_heard
+                or self.count_publishers(self._controller_topic)):
+            return ''
+        said = self._controller.complaint()
+        return f'{self._joint_trajectory.topic_name}: {said}' if said else ''
+
+    def _on_controller(self, state: Any) -> None:
+        """Hold a controller that becomes active: by itself it holds a pose without any effort."""
+        reference = self._controller.heard(state)
+        if (reference is None or self._watchdog is None or self.state != 'active'
+                or self._watchdog.fresh or self._settings.own['timeout_action'] != HOLD_GRAVITY):
+            return
+        try:
+            self._hold_trajectory(self._feedforward.hold_at(reference), 0)
+        except PprsError as error:
+            self.get_logger().warning(f'the controller holds without gravity: {error}')
+        else:
+            self.get_logger().info('the controller has become active: it holds with gravity')
+
+    def _hold_trajectory(self, held: ForceCommand, left: int) -> None:
+        """Let a trajectory controller come to rest at a pose within a time [ns], and hold it."""
+        if self._joint_trajectory.get_subscription_count():
+            self._joint_trajectory.publish(self._written.joint_trajectory(
+                0, np.array([left]), held.forces, held.effort))
+
     def _reject(self, rejection: Rejection) -> None:
         self._counters[rejection.code] += 1
         text, watchdog = rejection.text, self._watchdog
         if rejection.code == 'EFFECT' and watchdog is not None and watchdog.fresh:
             # Not the message is wrong but the model: waiting for a better one would help nothing.
+            left = watchdog.left
             watchdog.stop()
             self._counters['stale'] += 1
-            text = f'{text}; {self._do_timeout_action()}'
+            text = f'{text}; {self._do_timeout_action(left)}'
         self._status.report('ERROR', rejection.code, text)
         self.get_logger().warning(f'rejected, {rejection.code}: {text}', throttle_duration_sec=1.0)
 
     # --- stale commands -------------------------------------------------------------------------
 
     def _on_stale(self) -> None:
-        own, done = self._settings.own, self._do_timeout_action()
+        own, complaint = self._settings.own, self._complaint
+        done = self._do_timeout_action()
+        if complaint:
+            self._status.report('ERROR', 'CONTROLLER', f'{complaint}; sent: {done}')
+            self._counters['stale'] += not self._feedforward.has_come_to_rest
+            return
         if self._feedforward.has_come_to_rest:
             self._status.report('OK', 'DONE', f'the trajectory has ended at rest: {done}')
             return
@@ -311,14 +369,21 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         """Do the timeout's action now where a command is in force, and see it off."""
         if self._watchdog is None or not self._watchdog.fresh:
             return
+        left = self._watchdog.left
         self._watchdog.stop()
-        self.get_logger().info(f'ends: {self._do_timeout_action()}')
-        for each in (self._commands, self._joint_command, self._current):
+        self.get_logger().info(f'ends: {self._do_timeout_action(left)}')
+        for each in (self._commands, self._joint_command, self._joint_trajectory, self._current):
             if each is not None:
                 each.wait_for_all_acked(LAST_WORD)
 
-    def _do_timeout_action(self) -> str:
-        """Send what the action says, once, and return it in words."""
+    def _do_timeout_action(self, left: int = 0) -> str:
+        """Send what the action says on every topic, once, and return it in words.
+
+        Parameters
+        ----------
+        left : int
+            Until the end of the last trajectory, whose last pose is held [ns].
+        """
         action = self._settings.own['timeout_action']
         if action == SILENT:
             return 'nothing goes out, the last command stays in force'
@@ -331,6 +396,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             self._joint_command.publish(self._written.joint_state(
                 self.get_clock().now().nanoseconds, held.effort[0],
                 held.forces.mechanism.position[0], held.forces.mechanism.velocity[0]))
+        self._hold_trajectory(held, left)
         if action != HOLD_GRAVITY:
             return 'efforts are zero'
         failed = [name for name in self._feedforward.parts if name not in held.forces.parts]
@@ -354,7 +420,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         threshold = self._settings.own['lag_warning']
         waits = self._lag.median > threshold or passed - passed_before > accepted - before
         self._status.facts.update(
-            state=self.state,
+            state=self.state, assumed=self._settings.model.assumed_at_start,
             preparing=self._preparation is not None and self._preparation.is_alive(),
             rate=round((accepted - before) / max(now - then, 1e-3), 1),
             compute_time=self._compute_time.summary(), lag=self._lag.summary(),

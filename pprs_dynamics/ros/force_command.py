@@ -5,17 +5,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import LimitError
+from pprs_dynamics.errors import LimitError, PprsError
+from pprs_dynamics.measurement.files.samples import Indices
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.pose_spline import load_splines
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import RIGID_BODY, Forces, ModelState
 from pprs_dynamics.physics.model.limits import DriveLimits
+from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import REJECT, SPLINE, Motion, TrajectoryRequest
@@ -44,6 +49,10 @@ _PARAMETERS = (
                   choices=(REJECT, SPLINE)),
     own_parameter('feedforward_scale', 1.0, 'multiplies every effort that goes out [1]: less '
                   'than 1 while a robot is commissioned', lower=0, upper=1),
+    own_parameter('ramp_time', 0.0, 'in which efforts go over to those of a changed model or '
+                  'feedforward_scale while commands flow [s]; 0: at once', lower=0, upper=60),
+    own_parameter('stop_time', 0.0, 'in which a last point of ~/joint_trajectory that moves is '
+                  'followed by one at rest [s]; 0: none is', lower=0, upper=10),
     own_parameter('effort_limits', (), 'largest absolute effort that goes out, per drive [N, '
                   'N m]; the smaller one of this and the model\'s counts', size=6, positive=True),
     own_parameter('limit_policy', REJECT, 'an effort over its limit: reject the message, or clamp '
@@ -90,6 +99,62 @@ class ForceCommand(NamedTuple):
         return bool(self.clamp_reason)
 
 
+class DriveTrajectory(NamedTuple):
+    """Motion and efforts of the drives, for a trajectory controller.
+
+    Parameters
+    ----------
+    offsets : (N,) array of int
+        time_from_start [ns].
+    drive_motion : three (N, D) arrays
+        Position, velocity and acceleration.
+    effort : (N, D) array
+        [N, N m].
+    """
+
+    offsets: Indices
+    drive_motion: tuple[Array, ...]
+    effort: Array
+
+
+class _Leaving(NamedTuple):
+    """What was in force before a change, while efforts go over to what is now.
+
+    Parameters
+    ----------
+    model : DriveModel or ArmModel
+    memory : ModelState
+        As it was at the change: what an effect did since then fades with the model.
+    scale : float
+    since, duration : float
+        [s]
+    """
+
+    model: Any
+    memory: ModelState
+    scale: float
+    since: float
+    duration: float
+
+    def blended(self, motion: Motion, offsets: Indices, effort: Array, now: float) -> Array:
+        """Return efforts (N, D) on the way from those of before to those of now.
+
+        Parameters
+        ----------
+        motion : PlatformMotion or JointMotion
+        offsets : (N,) array of int
+            time_from_start [ns], the first of which is now.
+        effort : (N, D) array
+            Of now.
+        now : float
+            [s]
+        """
+        moments = now - self.since + (offsets - offsets[0]) / NANOSECONDS
+        share = np.minimum(moments / self.duration, 1.0)[:, None]
+        before = self.scale * self.model.drive_forces(motion, self.memory.copy()).total
+        return np.asarray(before + share * (effort - before))
+
+
 class Feedforward:
     """The model in force, what its effects remember, and what may go out.
 
@@ -98,9 +163,15 @@ class Feedforward:
     model : DriveModel or ArmModel
     own : mapping
         The node's parameters, see `parameters_for`.
+    clock : callable, optional
+        Returns a time that only goes on [s].
     """
 
-    def __init__(self, model: NodeModel, own: Mapping[str, Any]) -> None:
+    def __init__(self, model: NodeModel, own: Mapping[str, Any],
+                 clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._leaving: _Leaving | None = None
+        self._scale: float = own['feedforward_scale']
         self._model: Any = model
         self._memory: ModelState | None = None
         self._remembers = False
@@ -111,7 +182,14 @@ class Feedforward:
         self.use(model, own)
 
     def use(self, model: NodeModel, own: Mapping[str, Any]) -> None:
-        """Go on with another model; effects that both have keep their memory."""
+        """Go on with another model; effects that both have keep their memory.
+
+        Efforts go over to those of the other one in `ramp_time`.
+        """
+        self._leaving, ramp_time = None, own.get('ramp_time', 0.0)
+        if ramp_time and self._last is not None and self._memory is not None:
+            self._leaving = _Leaving(self._model, self._memory, self._scale, self._clock(),
+                                     ramp_time)
         if self._memory is not None:
             self._before = self._model, self._memory
         # Made with the next answer, which is refused where an effect fails at it.
@@ -142,6 +220,8 @@ class Feedforward:
         Rejection, WorkspaceError, SingularityError, LimitError, EffectError
             Where nothing may; the memory is then what it was.
         """
+        if self._epoch is None:
+            self._epoch = request.start
         memory = self._memory or self._made_memory()
         if not self._remembers:
             forces = self._model.drive_forces(request.motion, memory)
@@ -159,7 +239,7 @@ class Feedforward:
 
     def _made_memory(self) -> ModelState:
         self._memory = memory = (self._model.continued_state(*self._before) if self._before
-                                 else self._model.initial_state())
+                                 else self._model.initial_state(0.0))
         self._remembers = memory.has_memory
         return memory
 
@@ -175,6 +255,51 @@ class Feedforward:
         _, velocity, _ = self._last.forces.drive_motion
         return bool((abs(velocity[-1]) <= self._model.values[REVERSAL_VELOCITY]).all())
 
+    def ending_at_rest(self, answer: ForceCommand, duration: float) -> DriveTrajectory:
+        """Return what goes to a trajectory controller: it comes to rest if nothing follows.
+
+        A last point in motion, where the drives would be for good without another message, is
+        followed by one at rest with its gravity, a constant deceleration later.
+
+        Parameters
+        ----------
+        answer : ForceCommand
+            The last one.
+        duration : float
+            [s]; 0: nothing is added.
+        """
+        found = DriveTrajectory(answer.request.offsets, answer.forces.drive_motion, answer.effort)
+        position, velocity, acceleration = found.drive_motion
+        if not duration or not velocity[-1].any():
+            return found
+        rest = np.zeros_like(velocity[-1:])
+        stop = np.clip(position[-1:] + velocity[-1:] * duration / 2, *self._limits.strokes)
+        try:
+            # Over so short a way gravity's efforts hardly change.
+            effort = self.hold(gravity=True).effort
+        except PprsError:
+            return found
+        return DriveTrajectory(
+            np.append(found.offsets, found.offsets[-1] + round(duration * NANOSECONDS)),
+            (np.concatenate((position, stop)), np.concatenate((velocity, rest)),
+             np.concatenate((acceleration, rest))), np.concatenate((found.effort, effort)))
+
+    def hold_at(self, position: Array) -> ForceCommand:
+        """Return what holds the drives at rest at a position, (D,).
+
+        Raises
+        ------
+        Rejection, PprsError
+            Where the robot cannot be there, or there is no such force.
+        """
+        rest = np.zeros((1, len(position)))
+        motion: Motion = JointMotion(position[None], rest, rest, np.zeros(1))
+        if isinstance(self._model, DriveModel):
+            motion = solve_forward_motion(
+                self._model.robot.geometry, position[None], rest, rest).motion.held()
+        request = TrajectoryRequest(motion, 0, np.zeros(1, dtype=np.int64))
+        return self._at_rest(request, gravity=True)
+
     def hold(self, gravity: bool) -> ForceCommand:
         """Return what goes out to hold the last accepted pose at rest, or zeros.
 
@@ -187,20 +312,38 @@ class Feedforward:
         """
         if self._last is None:
             raise Rejection('EMPTY', 'no trajectory has been accepted')
+        return self._at_rest(self._last.request, gravity)
+
+    def _at_rest(self, request: TrajectoryRequest, gravity: bool) -> ForceCommand:
         # The forces at rest, not those of the way there: no memory of it.
-        motion = self._last.request.motion.held()
+        motion = request.motion.held()
         forces = self._model.sound_at(motion).drive_forces(motion)
         effort = self._limits.clamped(self._scale * forces.total) if gravity else (
             np.zeros_like(forces.total))
         if not np.all(np.isfinite(effort)):
             raise Rejection('OUTPUT', 'the model gave an effort that is not finite')
-        return ForceCommand(self._last.request, forces, effort)
+        return ForceCommand(request, forces, effort)
 
     def _checked(self, request: TrajectoryRequest, forces: Forces) -> ForceCommand:
         effort = self._scale * forces.total if self._scales else forces.total
+        if self._leaving is not None:
+            effort = self._gone_over(request, effort)
         if self._limits.allow(effort, forces.drive_motion):
             return ForceCommand(request, forces, effort)
         return self._looked_at(request, forces, effort)
+
+    def _gone_over(self, request: TrajectoryRequest, effort: Array) -> Array:
+        """Return efforts (N, D) on the way from those before a change."""
+        leaving, now = self._leaving, self._clock()
+        if leaving is None or now >= leaving.since + leaving.duration:
+            self._leaving = None
+            return effort
+        try:
+            motion = self._timed(request) if leaving.memory.has_memory else request.motion
+            return leaving.blended(motion, request.offsets, effort, now)
+        except PprsError:  # the model of before cannot follow: there is nothing to go over from
+            self._leaving = None
+            return effort
 
     def _looked_at(self, request: TrajectoryRequest, forces: Forces, effort: Array) -> ForceCommand:
         """Return what goes out where something is not allowed, or raise what is wrong."""
@@ -220,7 +363,6 @@ class Feedforward:
 
     def _timed(self, request: TrajectoryRequest) -> Motion:
         """Return the motion on one time scale for all messages, which memories go by."""
-        if self._epoch is None:
-            self._epoch = request.start
+        assert self._epoch is not None  # `answer` sets it
         return request.motion.with_time(
             (request.start - self._epoch + request.offsets) / NANOSECONDS)

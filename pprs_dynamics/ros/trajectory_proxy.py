@@ -8,6 +8,9 @@ efforts at every point and sends the goal on to the controller's own action. Fee
 cancelling pass through. A goal that breaks a rule, or asks for what the robot cannot do, is aborted
 with the reason in `error_string`, and nothing reaches the controller. So is one whose controller
 goes, or falls silent, in the middle of it.
+
+A controller holds a pose without any effort by itself, after it has become active, and after a goal
+was cancelled or aborted: the node then sends it that pose at rest, with its gravity.
 """
 
 from __future__ import annotations
@@ -15,10 +18,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from action_msgs.msg import GoalStatus
 from control_msgs.action import FollowJointTrajectory
+from control_msgs.msg import JointTrajectoryControllerState
+from geometry_msgs.msg import Twist
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.serialization import serialize_message
+from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -35,10 +42,12 @@ from pprs_dynamics.ros.messages.trajectory_request import (
     read_joint_trajectory,
     reader_for,
 )
+from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import drive_count, own_parameter
 from pprs_dynamics.ros.node.provenance import hardware_of
+from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.status import StatusReporter
 
 # Of the feedforward node's parameters, those that say what may go out.
@@ -49,6 +58,8 @@ TIMEOUT = own_parameter('controller_timeout', 5.0, 'silence of the controller af
                         'is aborted [s]; 0: only where it has gone', lower=0, upper=3600)
 Goal = FollowJointTrajectory.Goal
 Result = FollowJointTrajectory.Result
+STILL = 1.1920929e-07  # [m/s, rad/s] joint_trajectory_controller's own bound for standing
+ERROR_CODES = {'NAMES': Result.INVALID_JOINTS}  # of rejections; INVALID_GOAL for all others
 
 
 class TrajectoryProxyNode(ExplainsRefusals):
@@ -71,6 +82,12 @@ class TrajectoryProxyNode(ExplainsRefusals):
         self._server = ActionServer(
             self, FollowJointTrajectory, '~/follow_joint_trajectory', self._execute,
             cancel_callback=self._cancel)
+        self._joints = RobotNames.of(self._settings.model).joints
+        self._controller, self._hold_is_due = ControllerWatch(self._joints), False
+        where = own['action'].rpartition('/')[0]
+        self._hold = publisher(self, JointTrajectory, f'{where}/joint_trajectory')
+        subscription(self, JointTrajectoryControllerState, f'{where}/{STATE_TOPIC}',
+                     self._on_controller)
         self._status.report('OK', 'WAITING', f'goals go to {own["action"]}')
 
     async def _execute(self, handle: Any) -> Any:
@@ -79,14 +96,25 @@ class TrajectoryProxyNode(ExplainsRefusals):
             goal = self._filled(handle.request)
         except PprsError as error:
             reason = Rejection.of(error)
-            return self._refused(handle, reason.code, reason.text)
+            return self._refused(handle, reason.code, reason.text,
+                                 ERROR_CODES.get(reason.code, Result.INVALID_GOAL))
+        if said := self._is_late(goal):
+            return self._refused(handle, 'TIME', said, Result.OLD_HEADER_TIMESTAMP)
+        if max(np.abs(goal.trajectory.points[-1].velocities)) > STILL:
+            return self._refused(handle, 'REFUSED', 'the last point is in motion: the controller '
+                                 'would never say that the goal is reached; end at rest',
+                                 Result.INVALID_GOAL)
         try:
             watched = await self._relay.accepted(handle, goal, self._duration(goal))
             self._counters['passed_on'] += 1
             self._status.report('OK', 'OK', 'a goal was passed on with its efforts')
             answer = await self._relay.finished(watched)
         except ControllerError as error:
-            return self._refused(handle, 'CONTROLLER', str(error))
+            self._hold_is_due = self._hold_is_due or error.began
+            # It has not kept to the path, and where it is is not known.
+            return self._refused(handle, 'CONTROLLER', str(error), Result.PATH_TOLERANCE_VIOLATED
+                                 if error.began else Result.INVALID_GOAL)
+        self._hold_is_due = answer.status != GoalStatus.STATUS_SUCCEEDED
         if answer.status == GoalStatus.STATUS_SUCCEEDED:
             handle.succeed()
         elif answer.status == GoalStatus.STATUS_CANCELED and handle.is_cancel_requested:
@@ -99,12 +127,38 @@ class TrajectoryProxyNode(ExplainsRefusals):
         self._relay.cancel(handle)
         return CancelResponse.ACCEPT
 
-    def _refused(self, handle: Any, status: Code, text: str) -> Any:
+    def _on_controller(self, state: Any) -> None:
+        """Let the controller hold with gravity where it would hold without."""
+        active = self._controller.heard(state) is not None
+        if not (active or self._hold_is_due) or not self._relay.is_idle or (
+                not set(self._joints) <= set(state.joint_names)):
+            return
+        values = dict(zip(state.joint_names, state.reference.positions, strict=False))
+        self._hold_is_due = False
+        model = self._settings.model
+        try:
+            held = Feedforward(model, self._settings.own).hold_at(
+                np.array([values[joint] for joint in self._joints]))
+        except (PprsError, KeyError) as error:
+            self.get_logger().warning(f'the controller holds without gravity: {error}')
+            return
+        self._hold.publish(CommandObjects(RobotNames.of(model)).joint_trajectory(
+            0, np.zeros(1, dtype=np.int64), held.forces, held.effort))
+        self.get_logger().info('the controller holds with gravity')
+
+    def _is_late(self, goal: Any) -> str:
+        """Return that a goal's motion would be over by now; '' where it is not."""
+        start = conversions.nanoseconds(goal.trajectory.header.stamp)
+        end = start + conversions.nanoseconds(goal.trajectory.points[-1].time_from_start)
+        late = (self.get_clock().now().nanoseconds - end) / conversions.NANOSECONDS
+        return f'the trajectory ended {late:.3f} s ago' if start and late > 0 else ''
+
+    def _refused(self, handle: Any, status: Code, text: str, code: int) -> Any:
         self._counters['refused'] += 1
         self._status.report('ERROR', status, text)
         self.get_logger().warning(f'refused, {status}: {text}', throttle_duration_sec=1.0)
         handle.abort()
-        return Result(error_code=Result.INVALID_GOAL, error_string=f'{status}: {text}')
+        return Result(error_code=code, error_string=f'{status}: {text}')
 
     def _filled(self, goal: Any) -> Any:
         """Return the goal for the controller: of all drives, with their efforts.
@@ -135,6 +189,8 @@ class TrajectoryProxyNode(ExplainsRefusals):
     def _request(self, model: Any, goal: Any) -> TrajectoryRequest:
         now = self.get_clock().now().nanoseconds
         missing = self._settings.own['missing_derivatives']
+        if missing == SPLINE:
+            _end_at_rest(goal)
         if not isinstance(model, DriveModel):
             return reader_for(model).read(serialize_message(goal.trajectory), now, missing)
         if not goal.trajectory.points:
@@ -147,3 +203,13 @@ class TrajectoryProxyNode(ExplainsRefusals):
         found = solve_forward_motion(
             model.robot.geometry, drives.position, drives.velocity, drives.acceleration)
         return TrajectoryRequest(found.motion, request.start, request.offsets)
+
+
+def _end_at_rest(goal: Any) -> None:
+    """Let a goal whose last point has no velocities end at rest, where a spline would not."""
+    if goal.trajectory.points and not len(goal.trajectory.points[-1].velocities):
+        last = goal.trajectory.points[-1]
+        last.velocities = [0.0] * len(last.positions)
+    elif goal.multi_dof_trajectory.points and not goal.multi_dof_trajectory.points[-1].velocities:
+        last = goal.multi_dof_trajectory.points[-1]
+        last.velocities = [Twist()] * len(last.transforms)

@@ -30,6 +30,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Motion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.urdf import expanded
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
 from pprs_dynamics.simulation.arm_forms import (
@@ -45,6 +46,7 @@ from pprs_dynamics.simulation.arm_forms import (
 from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState, couplings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
+from pprs_dynamics.simulation.sensors import ButterworthFilter, EffortFilter
 
 RATE = 100.0  # [Hz]
 HARMONICS = 8
@@ -248,7 +250,7 @@ class ArmEngine:
 
 def _bare(path: Path) -> str:
     """Return a URDF without meshes, every link with some mass: it is set afterwards."""
-    robot = ElementTree.parse(path).getroot()
+    robot = ElementTree.fromstring(expanded(str(path)))
     for link in robot.findall('link'):
         for part in (*link.findall('visual'), *link.findall('collision'),
                      *link.findall('inertial')):
@@ -371,6 +373,13 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         efforts = np.stack([np.interp(motion.time - delay, motion.time, column)
                             for column in efforts.T], axis=1)
         hidden.append(truth('time_delay', list(model.drives), {'delay': delay}, 'all efforts late'))
+    if 'effort_filter' in chosen:
+        assert motion.time is not None
+        time_constant = scale * float(random.uniform(0.01, 0.04))
+        every = np.full(len(largest), time_constant)
+        efforts = ButterworthFilter(every, float(np.median(np.diff(motion.time)))).samples(efforts)
+        hidden.append(truth('effort_filter', list(model.drives), {'time_constant': time_constant},
+                            EffortFilter.form))
     shift = np.zeros(len(largest))
     if 'homing_error' in chosen:
         joint = int(random.integers(1, len(model.drives)))
@@ -417,8 +426,7 @@ def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Ar
         if isinstance(effect, LinkageFriction):
             state = model.mechanism(motion).loaded(
                 replace(engine.robot, gravity=tuple(engine.gravity.tolist())),
-                StructureLoad(np.tile(engine.wrench, (len(motion), 1)),
-                              np.zeros((len(motion), 3))))
+                StructureLoad(np.tile(engine.wrench, (len(motion), 1))))
             friction = friction + effect.force(state)
     return friction
 

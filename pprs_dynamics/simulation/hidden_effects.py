@@ -5,11 +5,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Sequence
 
 import numpy as np
 
+from pprs_dynamics.errors import suggestion
 from pprs_dynamics.simulation import hidden_bodies, hidden_forces, sensors
 from pprs_dynamics.simulation.hidden_effect import DriveBound, HiddenEffect, HiddenEffectError
 
@@ -20,7 +20,7 @@ IN_CATALOGUE: dict[str, type[HiddenEffect]] = {effect.name: effect for effect in
     hidden_forces.Hysteresis, hidden_forces.FrictionDrift,
     hidden_forces.effort_offset, sensors.EffortGain, sensors.HomingError,
     hidden_forces.drive_spring, hidden_forces.force_ripple, hidden_bodies.DriveInertia,
-    sensors.TimeDelay, hidden_forces.RevoluteFriction,
+    sensors.TimeDelay, sensors.EffortFilter, hidden_forces.RevoluteFriction,
     hidden_forces.SphericalFriction, hidden_forces.revolute_stiffness,
     hidden_bodies.payload_mass, hidden_bodies.payload_offset, hidden_bodies.platform_inertia,
     hidden_forces.external_wrench, hidden_bodies.base_tilt, hidden_forces.platform_drag,
@@ -72,9 +72,8 @@ def draw_effect(name: str, rng: np.random.Generator, scale: float = 1.0) -> Hidd
     """
     name, _, drives = name.partition(':')
     if name not in HIDDEN_EFFECTS:
-        close = difflib.get_close_matches(name, HIDDEN_EFFECTS, 1)
-        hint = f' (did you mean {close[0]}?)' if close else ''
-        raise HiddenEffectError(f'no hidden effect is called {name!r}{hint}; there are '
+        raise HiddenEffectError(f'no hidden effect is called {name!r}'
+                                f'{suggestion(name, HIDDEN_EFFECTS)}; there are '
                                 f'{", ".join(HIDDEN_EFFECTS)}')
     effect = HIDDEN_EFFECTS[name]
     if not drives:

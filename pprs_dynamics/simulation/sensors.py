@@ -80,24 +80,66 @@ class SensorFaults:
         Share by which efforts are.
     effort_delay, position_delay : (D,) arrays
         By which they are late [s], at least 0.
+    time_constant : (D,) array
+        Mean delay of the filters of the efforts [s]; 0 for none.
     """
 
     zero: Array
     gain: Array
     effort_delay: Array
     position_delay: Array
+    time_constant: Array
 
     @classmethod
     def of(cls, effects: Sequence[HiddenEffect], drives: int = COUNT) -> SensorFaults:
         """Return the faults among effects."""
         faults = [effect for effect in effects if isinstance(effect, SensorEffect)]
-        zero, gain, delay = (
+        zero, gain, delay, time_constant = (
             np.sum([effect.values[name] for effect in faults if name in effect.values]
-                   or [np.zeros(drives)], axis=0) for name in ('zero', 'gain', 'delay'))
+                   or [np.zeros(drives)], axis=0)
+            for name in ('zero', 'gain', 'delay', 'time_constant'))
         # No sensor looks ahead: an effort that comes early is one whose encoders, all of them,
         # come late.
         late = max(0.0, -float(delay.min()))
-        return cls(zero, gain, delay + late, np.full(drives, late))
+        return cls(zero, gain, delay + late, np.full(drives, late), time_constant)
+
+
+class ButterworthFilter:
+    """Low-pass filters of second order, one for each of D signals.
+
+    Parameters
+    ----------
+    time_constant : (D,) array
+        Mean delay of each, sqrt(2) / (2 pi f_c) [s]; 0 for none.
+    step : float
+        Between samples [s].
+    """
+
+    def __init__(self, time_constant: Array, step: float) -> None:
+        from scipy.signal import butter
+
+        self._filters = {}
+        for d in np.flatnonzero(time_constant > 0).tolist():
+            highest = 0.9 / (2 * step)  # of what is faster no samples tell
+            cutoff = min(np.sqrt(2) / (2 * np.pi * time_constant[d]), highest)
+            self._filters[d] = butter(2, cutoff, fs=1 / step)
+        self._states: dict[int, Array] = {}
+
+    def forget(self) -> None:
+        """Settle at the next sample."""
+        self._states = {}
+
+    def samples(self, values: Array) -> Array:
+        """Return the next samples filtered, (N, D)."""
+        if not self._filters:
+            return values
+        from scipy.signal import lfilter, lfilter_zi
+
+        filtered = values.copy()
+        for d, (b, a) in self._filters.items():
+            state = self._states.get(d, lfilter_zi(b, a) * values[0, d])
+            filtered[:, d], self._states[d] = lfilter(b, a, values[:, d], zi=state)
+        return filtered
 
 
 class EffortNoise:
@@ -198,6 +240,7 @@ class Sensors:
     def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
         """Have the faults of other effects from now on; a moved zero is no velocity."""
         self._faults = SensorFaults.of(effects, len(self._scale))
+        self._filter = ButterworthFilter(self._faults.time_constant, self._step)
         self.position = self.position + self._faults.zero - self.zero
         self.zero = self._faults.zero
         delays = (self._faults.effort_delay, self._faults.position_delay)
@@ -207,6 +250,7 @@ class Sensors:
     def start(self, position: Array, velocity: Array) -> None:
         """Forget the past: the robot is at (D,) [m] and moves with (D,) [m/s]."""
         self._past.clear()
+        self._filter.forget()
         self.position, self.velocity = self._encoder(position), np.array(velocity)
 
     def read_encoders(self, position: Array, velocity: Array) -> None:
@@ -225,7 +269,8 @@ class Sensors:
         Efforts are constant over a time step: at its border their mean is what belongs to the
         motion there. Either one alone would be half a step late or early.
         """
-        self._past.appendleft((self.position, self.velocity, (before + after) / 2))
+        effort = self._filter.samples((before + after)[None] / 2)[0]
+        self._past.appendleft((self.position, self.velocity, effort))
 
     def measure(self, time: float) -> Measurement:
         """Return the readings to publish now, with faults and noise."""
@@ -256,6 +301,15 @@ class EffortGain(SensorEffect):
     name: ClassVar[str] = 'effort_gain'
     form: ClassVar[str] = 'measured effort = (1 + gain) effort'
     ranges: ClassVar[dict[str, Range]] = {'gain': Range('1', 0.03, 0.12, 'signed', scales=True)}
+
+
+class EffortFilter(SensorEffect):
+    """Effort behind the amplifier's filter: Butterworth's, where the catalogue has two lags."""
+
+    name: ClassVar[str] = 'effort_filter'
+    form: ClassVar[str] = 'low-pass of second order (Butterworth), T = sqrt(2) / (2 pi f_c)'
+    ranges: ClassVar[dict[str, Range]] = {
+        'time_constant': Range('s', 0.005, 0.02, scales=True)}
 
 
 class HomingError(SensorEffect):

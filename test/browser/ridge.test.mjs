@@ -11,7 +11,7 @@ const near = (found, wanted) => assert.ok(
 // By Cramer's rule: [[4, 1, .5], [1, 3, .2], [.5, .2, 2]] c = [1, 2, 3].
 const data = () => ({
   gram: Float64Array.of(4, 1, 0.5, 1, 3, 0.2, 0.5, 0.2, 2), side: Float64Array.of(1, 2, 3),
-  always: [0], limited: [], deviations: 2, steepness: 100, name_price: 5, wrong_sign_price: 11,
+  always: [0], limited: [], deviations: 2, steepness: 100, name_price: 5, wrong_sign_odds: 0.01,
   drive_prices: [3, 4], effects: []});
 const placement = (columns, more = {}) => ({
   columns, fixed: [], signs: [], price: 0, hypotheses: [], drive: null, ...more});
@@ -50,16 +50,34 @@ test('a number beyond its tolerance is drawn back, steeply', () => {
   near(held.c[0], 240 / 104);
 });
 
+test('the cost of a number near its tolerance is the integral over it', () => {
+  const system = (side) => new RidgeSystem({...data(), side: Float64Array.of(side, 2, 3),
+                                            limited: [0]});
+  for (const side of [0, 3, 7.9, 8.1, 9, 12, 40]) {
+    let sum = 0;
+    const step = 1e-4;
+    for (let x = -12; x < 12; x += step) {
+      const cost = 4 * x * x - 2 * side * x + 100 * Math.max(Math.abs(x) - 2, 0) ** 2;
+      sum += step * Math.exp(-cost / 2);
+    }
+    const wanted = -2 * Math.log(sum / Math.sqrt(2 * Math.PI));
+    // But for what lies beyond the other limit.
+    assert.ok(Math.abs(system(side).fit([]).cost - wanted) < 2e-4, `${side}`);
+  }
+});
+
 test('names, drives and unphysical signs are priced', () => {
   const effect = {placements: [
-    placement([1], {price: 0.5, hypotheses: ['h'], drive: 'a', signs: [[1, 10]]}),
+    placement([1], {price: 0.5, hypotheses: ['h'], drive: 'a', signs: [[1, 10], [0, -10]]}),
     placement([2], {price: 0.25, hypotheses: ['h', 'g'], drive: 'b'})]};
   const priced = new RidgeSystem({...data(), effects: [effect]});
   const bare = new RidgeSystem(data());
   const strip = (one) => placement(one.columns);
   const price = (used) => priced.fit(used).cost - bare.fit(used.map(strip)).cost;
-  near(price([effect.placements[0]]), 0.5 + 11 + 5 + 3);
-  near(price(effect.placements), 0.75 + 11 + 2 * 5 + 4);
+  // Of four choices of two signs one has the odds of 99 : 1, the others share the rest.
+  const wrong = 2 * Math.log(99 * 3);
+  near(price([effect.placements[0]]), 0.5 + wrong + 5 + 3);
+  near(price(effect.placements), 0.75 + wrong + 2 * 5 + 4);
 });
 
 test('what is left of a drive is a sum of squares, and a curve', () => {

@@ -9,7 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from model_recordings import TIME, record
+from model_recordings import EXCITATION, TIME, record
+from scipy.signal import butter, lfilter, lfilter_zi
 
 from benchmarks.hidden.recordings import Case, make_case
 from pprs_dynamics import DriveModel, simulate
@@ -25,6 +26,7 @@ from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.library import Library
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths
+from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
@@ -370,3 +372,23 @@ def test_a_drive_that_was_never_measured_takes_no_part_behind_a_delay_either() -
     found = diagnose(MODEL, [recording])
     assert {one.name for one in found.effects} == {'time_delay', 'viscous_friction'}
     assert 'slide_3' not in {drive for one in found.effects for drive in one.drives}
+
+
+@pytest.mark.parametrize('order', [1, 2])
+def test_a_filter_of_another_form_is_a_filter_and_a_delay_is_a_delay(order: int) -> None:
+    """An RC's and Butterworth's at 20 Hz, of which neither is the catalogue's."""
+    forces = MODEL.drive_forces(EXCITATION.motion(TIME))
+    b, a = butter(order, 20.0, fs=500.0)
+    smooth = lfilter(b, a, forces.total, axis=0, zi=lfilter_zi(b, a)[:, None] * forces.total[:1])[0]
+    mean_delay = {1: 1.0, 2: 2 ** 0.5}[order] / (2 * np.pi * 20.0)
+    late = np.stack([np.interp(TIME - mean_delay, TIME, one) for one in forces.total.T], axis=1)
+    noise = 0.05 * np.random.default_rng(0).normal(size=smooth.shape)
+    for effort, name, value in ((smooth, 'effort_filter', 'time_constant'),
+                                (late, 'time_delay', 'delay')):
+        found = diagnose(MODEL, [Recording.from_arrays(
+            'made', TIME, forces.mechanism.position, effort=effort + noise)])
+        assert found.effects[0].name == name
+        assert found.effects[0].drives == DRIVES
+        said = [one.value for key, one in found.effects[0].parameters.items() if value in key]
+        assert np.median(said) == pytest.approx(mean_delay, rel=0.25)
+        assert {one.name for one in found.effects} <= {'effort_filter', 'time_delay'}

@@ -13,7 +13,12 @@ from scipy.linalg import block_diag, cho_factor, cho_solve, toeplitz
 
 from pprs_dynamics.inference.regression.base_columns import BaseColumn
 from pprs_dynamics.inference.regression.joint_fit import CERTAIN, JointFit, Regression
-from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.regression.normal_equations import (
+    BEYOND_TOLERANCE,
+    Block,
+    Prior,
+)
+from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 
 SAMPLES, DRIVES, PERIOD = 240, 2, 0.01
@@ -76,6 +81,40 @@ def test_the_deviance_is_the_likelihood_with_the_coefficients_integrated_out() -
         for block in fit.blocks:
             if block.precision[0, 0] == CERTAIN:
                 assert fit.of(block) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize('information', [0.5, 2.0, 20.0, 200.0])
+def test_the_cost_of_a_number_near_its_tolerance_is_its_integral(information: float) -> None:
+    prior = Prior(np.eye(1), np.zeros(1), 0.0, np.ones(1, dtype=bool))
+    x, step = np.linspace(-20, 20, 40_001, retstep=True)
+    beyond = np.maximum(np.abs(x) - DEVIATIONS, 0.0)
+    found = []
+    for measured in np.linspace(0, 3 * DEVIATIONS * (1 + 1 / information), 60):
+        posterior = prior.posterior(np.array([[information]]), np.array([information * measured]))
+        away = posterior.coefficients[0]
+        found.append(information * (away - measured) ** 2 + posterior.penalty + posterior.log_det)
+        density = np.exp(-0.5 * (information * (x - measured) ** 2 + x ** 2
+                                 + BEYOND_TOLERANCE * beyond ** 2))
+        # But for what lies beyond the other limit.
+        assert found[-1] == pytest.approx(
+            -2 * np.log(step * density.sum() / np.sqrt(2 * np.pi)), abs=5e-3)
+
+
+@pytest.mark.parametrize('seed', [1, 16])
+def test_the_cost_has_no_step_where_numbers_that_lean_on_each_other_pass_tolerances(
+    seed: int,
+) -> None:
+    rng = np.random.default_rng(seed)
+    prior = Prior(np.eye(4), np.zeros(4), 0.0, np.ones(4, dtype=bool))
+    rows = rng.normal(size=(4, 6)) + rng.normal(size=6)
+    gram, way = rows @ rows.T, rows @ rng.normal(size=6)
+    costs = []
+    for size in np.linspace(0, 8, 4001):
+        posterior = prior.posterior(gram, size * way)
+        c = posterior.coefficients
+        costs.append(c @ gram @ c - 2 * size * way @ c + posterior.penalty + posterior.log_det)
+    # With the determinant of one side alone it steps by 2.
+    assert np.abs(np.diff(costs, 2)).max() < 0.25
 
 
 def test_the_gain_of_a_block_is_the_fall_of_the_deviance_at_the_same_noise() -> None:

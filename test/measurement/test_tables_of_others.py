@@ -260,3 +260,17 @@ def test_what_only_ends_like_a_table_is_one_sentence(suffix: str, tmp_path: Path
         with pytest.raises(PprsError) as caught:
             read(tmp_path / f'run{suffix}', NAMED)
         assert '\n' not in str(caught.value)
+
+
+def test_currents_without_a_gain_and_a_gain_without_currents_are_told(tmp_path: Path) -> None:
+    for quantity, gain, kind in (('current', 1.0, 'no_gain'), ('effort', 2.0, 'gain_unused'),
+                                 ('current', 2.0, ''), ('effort', 1.0, '')):
+        header = ','.join(['time', *(f'{joint}/position' for joint in JOINTS),
+                           *(f'{joint}/{quantity}' for joint in JOINTS)])
+        (tmp_path / 'run.csv').write_text(text(WHOLE, header=header + '\n'))
+        recording = read_recording(tmp_path / 'run.csv', RecordedDrives(JOINTS, gain=(gain,) * 3))
+        kinds = {one.kind for one in recording.findings}
+        assert ('no_gain' in kinds) == (kind == 'no_gain')
+        assert ('gain_unused' in kinds) == (kind == 'gain_unused')
+        np.testing.assert_allclose(recording.effort, EFFORT * (
+            gain if quantity == 'current' else 1.0), rtol=1e-12)

@@ -17,11 +17,14 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
+from pprs_dynamics import DriveModel, Excitation
+from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
+from pprs_dynamics.physics.effects.laws.effort_filter import EffortFilter
 from pprs_dynamics.physics.effects.laws.effort_offset import EffortOffset
 from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
 from pprs_dynamics.physics.effects.laws.friction_drift import FrictionDrift
@@ -367,3 +370,89 @@ def test_a_call_without_memory_starts_afresh(effect):
     whole = built.force(axes)
     assert np.abs(whole[5000:] - built.force(axes[5000:])).max() > 0.01
     assert_array_equal(built.force(axes), whole)
+
+
+@pytest.mark.parametrize('time_constant', [0.004, 0.03, 0.2])
+def test_a_filtered_ramp_is_the_solution_of_its_differential_equation(time_constant):
+    """(T/2 d/dt + 1)^2 y = t from rest has y = t - T + (t + T) exp(-2 t / T)."""
+    t = np.arange(0.0, 1.0, 0.0005)
+    effect = EffortFilter({'axis': {'time_constant': time_constant}})
+    y = effect.sensed(t[:, None], t, ('axis',))[:, 0]
+    expected = t - time_constant + (t + time_constant) * np.exp(-2 * t / time_constant)
+    assert_allclose(y, expected, atol=1e-2 * time_constant)
+
+
+def test_a_filter_leaves_what_stands_and_takes_what_is_fast():
+    t = np.arange(0.0, 2.0, 0.001)
+    effect = EffortFilter({'axis': {'time_constant': 0.02}})
+    still = effect.sensed(np.full((len(t), 1), 7.5), t, ('axis',))
+    assert_allclose(still, 7.5, rtol=1e-12)
+    for f in (1.0, 20.0, 100.0):
+        y = effect.sensed(np.sin(2 * np.pi * f * t)[:, None], t, ('axis',))[1000:, 0]
+        assert np.ptp(y) / 2 == pytest.approx(1 / (1 + (np.pi * f * 0.02) ** 2), rel=0.1)
+
+
+@pytest.mark.parametrize('chunk', [1, 7])
+def test_a_filter_in_a_stream_equals_one_call(chunk):
+    t = np.arange(200) * 0.01
+    F = np.random.default_rng(0).normal(size=(200, 1)).cumsum(axis=0)
+    effect = EffortFilter({'axis': {'time_constant': 0.05}})
+    memory = effect.initial_memory()
+    parts = [effect.sensed(F[k:k + chunk], t[k:k + chunk], ('axis',), memory)
+             for k in range(0, len(t), chunk)]
+    assert_allclose(np.concatenate(parts), effect.sensed(F, t, ('axis',)), atol=1e-9)
+
+
+# --- what is remembered while parameters change ---------------------------------------------------
+
+
+def moved(model: DriveModel, start: float, state: Any) -> np.ndarray:
+    """Return the forces of 4 s of a path that began `start` seconds ago."""
+    time = np.arange(0.0, 4.0, 0.01)
+    return model.drive_forces(Excitation(4.0, seed=1).motion(time).with_time(time + start),
+                              state).parts
+
+
+def with_effect(name: str, **values: float) -> DriveModel:
+    return DriveModel.from_parameters({**DriveModel.load().values, 'effects.active': [name], **{
+        f'effects.{name}.lift_1.{key}': value for key, value in values.items()}})
+
+
+def test_a_warm_drive_does_not_get_cold_as_a_parameter_changes() -> None:
+    """After 20 min of a friction that fades in 1 min another force of it makes no step."""
+    before, after = (with_effect('friction_drift', force=force, time=60.0) for force in (5.0, 6.0))
+    state = before.initial_state()
+    moved(before, 0.0, state)
+    moved(before, 1200.0, state)
+    warm = moved(after, 1204.0, after.continued_state(before, state))['friction_drift']
+    assert np.max(np.abs(warm)) < 6.0 * np.exp(-1200.0 / 60.0) * 1.001
+    # One that is new to a machine that has worked for 20 min is as warm as the machine.
+    plain = DriveModel.load()
+    state = plain.initial_state()
+    moved(plain, 0.0, state)
+    moved(plain, 1200.0, state)
+    found = moved(before, 1204.0, before.continued_state(plain, state))['friction_drift']
+    assert np.max(np.abs(found)) < 5.0 * np.exp(-1200.0 / 60.0) * 1.001
+    assert np.max(np.abs(moved(before, 0.0, before.initial_state())['friction_drift'])) > 4.0
+
+
+def test_a_stressed_contact_does_not_relax_as_a_parameter_changes() -> None:
+    """In the middle of a stroke, far from a reversal, presliding has long been overcome."""
+    one, other = (with_effect('hysteresis', force=force, distance=1e-3) for force in (2.0, 3.0))
+    state = one.initial_state()
+    moved(one, 0.0, state)
+    again = other.continued_state(one, state)
+    expected = with_effect('hysteresis', force=3.0, distance=1e-3)
+    whole = expected.initial_state()
+    moved(expected, 0.0, whole)
+    assert moved(other, 4.0, again)['hysteresis'] == pytest.approx(
+        moved(expected, 4.0, whole)['hysteresis'], abs=1e-12)
+
+
+def test_every_effect_with_a_memory_says_what_a_start_takes_for_granted() -> None:
+    assert with_effect('friction_drift', force=5.0, time=60.0).assumed_at_start == {
+        'friction_drift': 'the drive is cold, the time of fading begins'}
+    assert DriveModel.load().assumed_at_start == {}
+    for effect in catalogue().values():
+        if issubclass(effect, DriveEffect):
+            assert bool(effect.assumed_at_start) == (effect.drive_memory() is not None), effect

@@ -15,7 +15,7 @@ import pytest
 from failing_effects import FAULTS, fail, model_file
 from feedforward_bench import random_motion
 
-from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics import ArmModel, DriveModel, JointMotion, PlatformMotion, load_model
 from pprs_dynamics.errors import EffectError
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import Card, Parameter
@@ -52,6 +52,38 @@ def test_a_failing_effect_on_the_bodies_is_one_error_with_its_name(
     fail(package, place, fault)
     with pytest.raises(EffectError, match='effect hose: ') as raised:
         model.drive_forces(ONE)
+    assert told in str(raised.value)
+
+
+def hexapod_with(effect: str, **block: float) -> ArmModel:
+    added = {f'effects.{effect}.{key}': value for key, value in block.items()}
+    return ArmModel.from_parameters({**load_model('config/hexapod.yaml').values,
+                                     'effects.active': [effect], **added}, 'config/hexapod.yaml')
+
+
+def test_an_effect_on_the_bodies_acts_on_a_robot_with_loops_as_well(package: ModuleType) -> None:
+    """Its friction included, as that of the catalogue's wrench of 2 N does."""
+    found = hexapod_with('hose', force=2.0)
+    wrench = hexapod_with('external_wrench', force_x=0.0, force_y=0.0, force_z=2.0)
+    rest = np.zeros((3, 6))
+    motion = JointMotion(rest + 0.48, rest + np.arange(3)[:, None] * 0.01, rest)
+    ours, theirs = found.drive_forces(motion), wrench.drive_forces(motion)
+    assert ours.parts['hose'] == pytest.approx(theirs.parts['external_wrench'], abs=1e-12)
+    assert ours.total == pytest.approx(theirs.total, abs=1e-12)
+    assert np.max(np.abs(ours.parts['hose'])) > 0.1
+
+
+@pytest.mark.parametrize(('place', 'fault', 'told'), [
+    ('load', 'longer', 'must be (1, 6)'), ('load', 'nan', 'a wrench with nan, must be finite'),
+    ('changed', 'none', 'changed returned None, must be a Mechanism')])
+def test_a_failing_effect_on_the_bodies_of_a_robot_with_loops_is_one_error(
+    package: ModuleType, place: str, fault: str, told: str,
+) -> None:
+    model = hexapod_with('hose', force=2.0)
+    fail(package, place, fault)
+    rest = np.zeros((1, 6))
+    with pytest.raises(EffectError, match='effect hose: ') as raised:
+        model.drive_forces(JointMotion(rest + 0.48, rest, rest))
     assert told in str(raised.value)
 
 

@@ -112,7 +112,7 @@ assert catalogue() is catalogue()
 
 def test_the_catalogue_lists_it_after_the_packages_own(installed: Path) -> None:
     done = python(LIST, installed)
-    assert done.stdout.split() == [*CATALOGUE, 'eddy_brake', 'effort_filter'], done.stderr
+    assert done.stdout.split() == [*CATALOGUE, 'eddy_brake', 'sensor_dead_band'], done.stderr
 
 
 def test_no_other_package_is_asked_where_no_effect_of_theirs_is_named(
@@ -188,7 +188,7 @@ def test_a_broken_effect_is_left_out_with_one_clear_warning_and_the_others_stay(
     assert 'Traceback' not in done.stderr
 
 
-FIND_FILTER = """
+FIND_DEAD_BAND = """
 import sys, json
 import numpy as np
 from pprs_dynamics import DriveModel
@@ -200,25 +200,25 @@ from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.model.model_file import build_model
 given = DriveModel.load(sys.argv[1])
-true = build_model({**given.values, 'effects.active': ['effort_filter'],
-                    **{f'effects.effort_filter.{d}.time': 0.03 for d in DRIVES}})
+true = build_model({**given.values, 'effects.active': ['sensor_dead_band'],
+                    **{f'effects.sensor_dead_band.{d}.width': 0.5 for d in DRIVES}})
 time = np.arange(5000) * 0.002
 forces = true.drive_forces(Excitation().motion(time).with_time(time))
 effort = true.measured(forces).total
 effort = effort + 0.05 * np.random.default_rng(0).normal(size=effort.shape)
 recording = Recording.from_arrays('made', time, forces.mechanism.position, effort=effort)
 found = diagnose(given, [recording])
-answer = adopt(given, EffectRequest.of('effort_filter'), [recording], diagnosis=found)
+answer = adopt(given, EffectRequest.of('sensor_dead_band'), [recording], diagnosis=found)
 print(json.dumps({'found': found.to_dict(), 'adopted': answer.to_dict()}))
 """
 
 
 def test_a_sensor_effect_of_another_package_that_bends_columns_is_found_and_adopted(
         installed: Path, tmp_path: Path) -> None:
-    done = python(FIND_FILTER, installed, model_file(tmp_path, {}), limit=200)
+    done = python(FIND_DEAD_BAND, installed, model_file(tmp_path, {}), limit=200)
     assert done.returncode == 0, done.stderr
     said = json.loads(done.stdout)
-    assert [one['name'] for one in said['found']['effects']] == ['effort_filter']
-    times = [one['value'] for one in said['found']['effects'][0]['parameters'].values()]
-    assert times == pytest.approx([0.03] * 6, rel=0.1)
+    assert [one['name'] for one in said['found']['effects']] == ['sensor_dead_band']
+    widths = [one['value'] for one in said['found']['effects'][0]['parameters'].values()]
+    assert widths == pytest.approx([0.5] * 6, rel=0.1)
     assert said['adopted']['adopted'], said['adopted']['reason']

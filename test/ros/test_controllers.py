@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 import yaml
 from controller_rules import WAY, ControllerSettings, objection
+from node_bench import bench
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
@@ -31,6 +33,7 @@ from pprs_dynamics.ros.messages.trajectory_request import reader_for
 CONFIG = Path(__file__).parents[2] / 'config' / 'ros2_control'
 NOW = 1_700_000_000_000_000_000  # [ns]
 RATE = 100.0
+STOP = 0.1  # [s] by default of feedforward.launch.py
 OWN = {'feedforward_scale': 1.0, 'effort_limits': (), 'limit_policy': 'reject',
        'missing_derivatives': 'reject'}
 
@@ -45,7 +48,7 @@ def settings() -> ControllerSettings:
 
 
 def forwarded(
-    points: int, ahead: float, sample: int = 100, rate: float = RATE,
+    points: int, ahead: float, sample: int = 100, rate: float = RATE, stop_time: float = STOP,
 ) -> JointTrajectory:
     """Return what feedforward makes of a message of play_trajectory, in the middle of a path."""
     model = DriveModel.load()
@@ -54,9 +57,10 @@ def forwarded(
         motion, conversions.time(NOW + round(ahead * 1e9)),
         [round(k * 1e9 / rate) for k in range(points)])
     request = reader_for(model).read(serialize_message(message), NOW, 'reject')
-    answer = Feedforward(model, OWN).answer(request)
+    feedforward = Feedforward(model, OWN)
+    drives = feedforward.ending_at_rest(feedforward.answer(request), stop_time)
     found = deserialize_message(CommandBytes(conversions.PAPER).joint_trajectory(
-        request.start, request.offsets, answer.forces, answer.effort), JointTrajectory)
+        request.start, drives.offsets, drives, drives.effort), JointTrajectory)
     assert isinstance(found, JointTrajectory)
     return found
 
@@ -67,19 +71,27 @@ def forwarded(
 def test_a_stream_is_taken_where_it_ends_after_its_arrival(
     points: int, ahead: float, said: str,
 ) -> None:
-    assert objection(forwarded(points, ahead), settings(), NOW + WAY) == said
+    moving = replace(settings(), allow_nonzero_velocity_at_trajectory_end=True)
+    assert objection(forwarded(points, ahead, stop_time=0.0), moving, NOW + WAY) == said
+    # A last point at rest lies later still.
+    assert objection(forwarded(points, ahead), settings(), NOW + WAY) == ''
 
 
 @pytest.mark.parametrize('rate', [50.0, 100.0, 500.0, 1000.0])
 def test_a_stream_is_taken_with_reserve_by_the_defaults(rate: float) -> None:
     given = {one.name: one.default for one in play_trajectory.PARAMETERS}
-    message = forwarded(given['points'], given['ahead'], rate=rate)
-    assert objection(message, settings(), NOW + 2 * WAY) == ''
+    for allows, stop_time in ((False, STOP), (True, 0.0)):
+        message = forwarded(given['points'], given['ahead'], rate=rate, stop_time=stop_time)
+        controller = replace(settings(), allow_nonzero_velocity_at_trajectory_end=allows)
+        assert objection(message, controller, NOW + 2 * WAY) == ''
 
 
-def test_a_piece_in_motion_needs_the_parameter_of_our_file() -> None:
+def test_a_piece_in_motion_needs_an_end_at_rest() -> None:
+    """The file that users copy keeps the safe default of the controller."""
     plain = ControllerSettings(DRIVES)
-    assert 'last point' in objection(forwarded(10, 0.02), plain, NOW + WAY)
+    assert not settings().allow_nonzero_velocity_at_trajectory_end
+    assert 'last point' in objection(forwarded(10, 0.02, stop_time=0.0), plain, NOW + WAY)
+    assert objection(forwarded(10, 0.02), plain, NOW + WAY) == ''
 
 
 def test_efforts_need_the_effort_interface() -> None:
@@ -103,6 +115,9 @@ def test_the_files_name_the_drives_in_the_order_of_commands(name: str) -> None:
         assert set(given['gains']) == set(DRIVES)
 
 
+ALONG = np.linspace(0.0, HelicalPath.duration, 48)  # [s] of a path from rest to rest
+
+
 class TestTrajectoryProxy:
     """Where control_msgs is installed; it has no wheel."""
 
@@ -115,14 +130,14 @@ class TestTrajectoryProxy:
     def test_a_goal_reaches_the_controller_with_its_efforts(self, action: Any) -> None:
         with controller(action) as (bench, client, taken):
             model = DriveModel.load()
-            motion = HelicalPath().motion(np.arange(0, 20) / 20.0)
+            motion = HelicalPath().motion(ALONG)
             expected = model.drive_forces(motion)
             goal = action.Goal()
             goal.trajectory.joint_names = list(DRIVES)
             position, velocity, acceleration = expected.drive_motion
             for k in range(len(motion)):
                 goal.trajectory.points.append(point(
-                    k / 20.0, position[k], velocity[k], acceleration[k]))
+                    ALONG[k], position[k], velocity[k], acceleration[k]))
             result = answered(bench, client, goal)
             assert result.result.error_code == 0
             assert len(taken) == 1
@@ -156,6 +171,135 @@ class TestTrajectoryProxy:
             assert 'WORKSPACE' in result.result.error_string
             assert taken == []
 
+    @pytest.mark.nodes
+    def test_what_is_wrong_with_a_goal_has_the_code_that_fits(self, action: Any) -> None:
+        with controller(action) as (bench, client, taken):
+            found = DriveModel.load().drive_forces(HelicalPath().motion([1.0, 1.1])).drive_motion
+            for joints, stamp, moving, code, said in (
+                    (['a', *DRIVES[1:]], 0, False, action.Result.INVALID_JOINTS, 'NAMES'),
+                    (list(DRIVES), 5, False, action.Result.OLD_HEADER_TIMESTAMP, 'ended'),
+                    (list(DRIVES), 0, True, action.Result.INVALID_GOAL, 'in motion')):
+                goal = action.Goal()
+                goal.trajectory.joint_names = joints
+                goal.trajectory.header.stamp.sec = stamp
+                goal.trajectory.points = [
+                    point(0.1 * (k + 1), found[0][k], found[1][k] * moving, found[2][k])
+                    for k in range(2)]
+                result = answered(bench, client, goal).result
+                assert result.error_code == code, result.error_string
+                assert said in result.error_string
+            assert taken == []
+
+    @pytest.mark.nodes
+    def test_a_controller_that_is_found_a_moment_later_gets_the_goal(self, action: Any) -> None:
+        from rclpy.action import ActionClient, ActionServer
+        from rclpy.parameter import Parameter
+
+        from pprs_dynamics.ros.trajectory_proxy import TrajectoryProxyNode
+
+        with bench() as running:
+            running.add(TrajectoryProxyNode, parameter_overrides=[
+                Parameter('demo', value=True),
+                Parameter('action', value='/arm/follow_joint_trajectory')])
+            client = ActionClient(running.probe, action,
+                                  '/trajectory_proxy/follow_joint_trajectory')
+            assert running.spin_until(client.server_is_ready)
+            sent = client.send_goal_async(resting_goal(action))
+            assert running.spin_until(sent.done)
+            result = sent.result().get_result_async()
+            running.spin_for(0.8)
+            assert not result.done()
+
+            def execute(handle: Any) -> Any:
+                handle.succeed()
+                return action.Result()
+
+            server = ActionServer(running.probe, action, '/arm/follow_joint_trajectory', execute)
+            assert running.spin_until(result.done)
+            assert result.result().result.error_code == 0, result.result().result.error_string
+            server.destroy()
+            client.destroy()
+
+    @pytest.mark.nodes
+    @pytest.mark.parametrize('ending', ['abort', 'succeed'])
+    def test_after_activation_and_an_aborted_goal_the_pose_is_held_with_gravity(
+        self, action: Any, ending: str,
+    ) -> None:
+        pose = HelicalPath().motion([1.0]).held()
+        expected = DriveModel.load().drive_forces(pose)
+        with controller(action, ending) as (bench, client, _):
+            held = bench.listen(JointTrajectory, '/arm/joint_trajectory')
+            states = JointStates(bench, expected.mechanism.position[0])
+            assert bench.connected()
+            assert bench.spin_until(lambda: held)
+            answered(bench, client, resting_goal(action))
+            bench.spin_for(0.5)
+            assert len(held) == (2 if ending == 'abort' else 1)
+            for message in held:
+                given, = message.points
+                np.testing.assert_allclose(given.effort, expected.total[0], atol=1e-6)
+                np.testing.assert_allclose(
+                    given.positions, expected.mechanism.position[0], atol=1e-9)
+                assert not any(given.velocities)
+                assert objection(message, settings(), NOW) == ''
+            states.stop()
+
+
+class TestFeedforwardOfAController:
+    """Where control_msgs is installed."""
+
+    @pytest.mark.nodes
+    def test_a_controller_that_drops_all_is_told_and_one_that_starts_is_held(self) -> None:
+        pytest.importorskip('control_msgs.msg', reason='control_msgs comes with a ROS 2 '
+                            'installation only')
+        from feedforward_bench import feedforward_bench, message_of
+
+        path = HelicalPath()
+        here = DriveModel.load().drive_forces(path.motion([0.0]).held())
+        # Its joint_trajectory is feedforward's own, where the bench listens.
+        with feedforward_bench() as node:
+            states = JointStates(node.bench, here.mechanism.position[0], '/feedforward')
+            assert node.bench.spin_until(lambda: node.joint_trajectory)
+            given, = node.joint_trajectory[-1].points
+            np.testing.assert_allclose(given.effort, here.total[0], atol=1e-6)
+            for k in range(400):
+                node.publisher.publish(message_of(path.motion(
+                    [0.5 + 0.01 * k, 0.51 + 0.01 * k])))
+                node.bench.spin_for(0.01)
+                if node.bench.status[-1]['code'] == 'CONTROLLER':
+                    break
+            said = node.wait_for_status(code='CONTROLLER', level='ERROR')['message']
+            assert 'does not follow' in said
+            assert 'trajectories end 10 ms after' in said or 'trajectories end 9 ms after' in said
+            states.stop()
+
+
+class JointStates:
+    """States of a controller that holds one position."""
+
+    def __init__(self, bench: Any, position: np.ndarray, controller: str = '/arm') -> None:
+        from control_msgs.msg import JointTrajectoryControllerState
+
+        message = JointTrajectoryControllerState(joint_names=list(DRIVES))
+        message.reference.positions = position.tolist()
+        message.output.effort = [0.0] * len(DRIVES)
+        publisher = bench.probe.create_publisher(
+            type(message), f'{controller}/controller_state', 10)
+        assert bench.spin_until(publisher.get_subscription_count)
+        self._timer = bench.probe.create_timer(0.02, lambda: publisher.publish(message))
+
+    def stop(self) -> None:
+        self._timer.cancel()
+
+
+def resting_goal(action: Any) -> Any:
+    """Return a goal that is reached at rest."""
+    found = DriveModel.load().drive_forces(HelicalPath().motion([1.0]).held()).drive_motion
+    goal = action.Goal()
+    goal.trajectory.joint_names = list(DRIVES)
+    goal.trajectory.points.append(point(0.2, *(each[0] for each in found)))
+    return goal
+
 
 def point(offset: float, *values: Any) -> Any:
     """Return a point of a trajectory."""
@@ -176,11 +320,10 @@ def answered(bench: Any, client: Any, goal: Any) -> Any:
     return result.result()
 
 
-def controller(action: Any) -> Any:
+def controller(action: Any, ending: str = 'succeed') -> Any:
     """Return a context with the proxy, a client of it, and what reaches a stand-in controller."""
     from contextlib import contextmanager
 
-    from node_bench import bench
     from rclpy.action import ActionClient, ActionServer
     from rclpy.parameter import Parameter
 
@@ -198,12 +341,13 @@ def controller(action: Any) -> Any:
                     handle.abort()
                     return action.Result(error_code=-1, error_string=said)
                 taken.append(trajectory)
-                handle.succeed()
+                getattr(handle, ending)()
                 return action.Result()
 
             server = ActionServer(running_bench.probe, action, '/arm/follow_joint_trajectory',
                                   execute)
             running_bench.add(TrajectoryProxyNode, parameter_overrides=[
+                Parameter('demo', value=True),
                 Parameter('action', value='/arm/follow_joint_trajectory')])
             client = ActionClient(running_bench.probe, action,
                                   '/trajectory_proxy/follow_joint_trajectory')

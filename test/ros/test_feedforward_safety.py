@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from controller_rules import WAY, ControllerSettings, objection
 from feedforward_bench import EQUAL, feedforward_bench, message_of, random_motion
 from node_bench import overrides
 from rclpy.node import Node
@@ -15,6 +16,7 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.messages import conversions
 
@@ -113,6 +115,17 @@ def test_a_stale_command_is_acted_on_once_and_the_next_message_recovers(action: 
                 np.testing.assert_allclose(held.velocity, 0, atol=0)
                 np.testing.assert_allclose(
                     held.position, FORCES.mechanism.position[-1], rtol=0, atol=EQUAL)
+                # A trajectory controller would go on with the last point's speed for good.
+                assert node.bench.spin_until(
+                    lambda count=2 * round_number: len(node.joint_trajectory) == count)
+                point, = node.joint_trajectory[-1].points
+                np.testing.assert_allclose(point.effort, expected, rtol=0, atol=EQUAL)
+                np.testing.assert_allclose(
+                    point.positions, FORCES.mechanism.position[-1], rtol=0, atol=EQUAL)
+                assert not any(point.velocities)
+                assert not any(point.accelerations)
+                assert objection(node.joint_trajectory[-1], ControllerSettings(DRIVES),
+                                 node.node.get_clock().now().nanoseconds + WAY) == ''
             seen = len(node.bench.status)
             assert node.answer(message_of(MOTION)) == answer
             # Soon it is stale again: the status that passed counts.
@@ -388,3 +401,27 @@ def test_a_second_node_of_its_name_is_told() -> None:
         node.bench.executor.remove_node(twin)
         twin.destroy_node()
         assert node.bench.spin_until(lambda: node.bench.status[-1]['code'] != 'CONFLICT', 25)
+
+
+def test_a_controller_of_trajectories_is_brought_to_rest_where_its_trajectory_ends() -> None:
+    long = message_of(MOTION)
+    long.points[-1].time_from_start.sec = 2
+    with feedforward_bench() as node:
+        node.answer(long)
+        node.node.trigger_deactivate()
+        assert node.bench.spin_until(lambda: len(node.joint_trajectory) == 2)
+        point, = node.joint_trajectory[-1].points
+        left = point.time_from_start.sec + point.time_from_start.nanosec / 1e9
+        # Not a jump to a pose that is two seconds away.
+        assert 0.5 < left < 2.1
+        np.testing.assert_allclose(point.positions, FORCES.mechanism.position[-1], atol=EQUAL)
+        assert not any(point.velocities)
+
+
+def test_a_stream_ends_at_rest_by_itself_where_that_is_asked_for() -> None:
+    with feedforward_bench(stop_time=0.1) as node:
+        node.answer(message_of(MOTION))
+        assert node.bench.spin_until(lambda: node.joint_trajectory)
+        assert len(node.joint_trajectory[-1].points) == len(MOTION) + 1
+        assert objection(node.joint_trajectory[-1], ControllerSettings(DRIVES),
+                         node.node.get_clock().now().nanoseconds) == ''

@@ -291,14 +291,14 @@ def test_every_effect_of_the_interface_is_there() -> None:
     assert ' '.join(IN_CATALOGUE) == (
         'viscous_friction coulomb_friction asymmetric_friction stribeck_friction '
         'quadratic_friction load_friction hysteresis friction_drift effort_offset effort_gain '
-        'homing_error drive_spring force_ripple drive_inertia time_delay revolute_friction '
-        'spherical_friction revolute_stiffness payload_mass payload_offset platform_inertia '
-        'external_wrench base_tilt platform_drag rod_mass')
+        'homing_error drive_spring force_ripple drive_inertia time_delay effort_filter '
+        'revolute_friction spherical_friction revolute_stiffness payload_mass payload_offset '
+        'platform_inertia external_wrench base_tilt platform_drag rod_mass')
     assert not set(IN_CATALOGUE) & set(NOT_IN_CATALOGUE)
 
 
 @pytest.mark.parametrize('name', [name for name in HIDDEN_EFFECTS if name not in (
-    'effort_gain', 'homing_error', 'time_delay')])
+    'effort_filter', 'effort_gain', 'homing_error', 'time_delay')])
 def test_a_hidden_effect_changes_the_efforts_of_its_drives_alone(name: str) -> None:
     effect = drawn(name)
     error = rms(unexplained(simulate(MODEL.values, wave(0.5), [effect], control=WEIGHT_HELD,
@@ -644,6 +644,20 @@ def test_a_late_effort_is_that_of_a_moment_before() -> None:
     assert np.array_equal(run.position, plain.position)
     np.testing.assert_allclose(run.effort[3:, 0], plain.effort[:-3, 0], atol=1e-12)
     np.testing.assert_allclose(run.effort[:, 1:], plain.effort[:, 1:], atol=1e-12)
+
+
+def test_a_filtered_effort_is_rounded_as_butterworths_filter_rounds_it() -> None:
+    effect = HIDDEN_EFFECTS['effort_filter']({'slide_1': {'time_constant': 0.01}})
+    run, plain = (simulate(MODEL.values, wave(0.4), effects, control=WEIGHT_HELD, sensors=QUIET)
+                  for effects in ([effect], []))
+    assert np.array_equal(run.position, plain.position)
+    np.testing.assert_allclose(run.effort[:, 1:], plain.effort[:, 1:], atol=1e-12)
+    # On what changes slowly a filter is a delay of its T.
+    late = np.interp(run.time - 0.01, run.time, plain.effort[:, 0])
+    moving = run.time > 0.1
+    change = np.abs(plain.effort[moving, 0] - run.effort[moving, 0]).max()
+    assert change > 0.05
+    assert np.abs(late - run.effort[:, 0])[moving].mean() < 0.2 * change
 
 
 def test_an_early_effort_is_prompt_among_encoders_that_are_late() -> None:

@@ -72,6 +72,7 @@ class WornBrake(DriveEffect):
 
 class Hose(BodyEffect):
     name = 'hose'
+    acts_in = frozenset({'platform', 'arm'})
     linear = (Parameter('force', 'F', 'N', 'downward force', 0.0, 1e6),)
     card = CARD
 

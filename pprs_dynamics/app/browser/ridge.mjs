@@ -2,6 +2,27 @@
 
 const MOST_ROUNDS = 12; // until the numbers at their limits are known
 
+const dot = (a, b) => a.reduce((sum, one, i) => sum + one * b[i], 0);
+
+/* ln of the distribution function of the standard normal: a series, and far below the continued
+   fraction of Mills' ratio (G. Marsaglia, J. Stat. Softw. 11 (2004) 4). */
+const logNormal = (x) => {
+  const density = -x * x / 2 - Math.log(2 * Math.PI) / 2;
+  if (x > 8) return 0;
+  if (x < -3) {
+    let fraction = -x;
+    for (let k = 200; k > 0; k--) fraction = -x + k / fraction;
+    return density - Math.log(fraction);
+  }
+  let sum = x, term = x, before = 0;
+  for (let k = 3; sum !== before; k += 2) {
+    before = sum;
+    term *= x * x / k;
+    sum += term;
+  }
+  return Math.log(0.5 + sum * Math.exp(density));
+};
+
 /* Numbers from the letters of base64. */
 export const numbers = (letters, Kind) => new Kind(
   Uint8Array.from(atob(letters), (one) => one.charCodeAt(0)).buffer);
@@ -34,7 +55,7 @@ export class RidgeSystem {
       if (this.beyond.every((sign, i) => sign === this.held[i])) break;
     }
     const {gram} = this.data;
-    let cost = logDet + this.price(placements, c);
+    let cost = logDet + this.bothSides(c) + this.price(placements, c);
     const all = [...free, ...fixed];
     for (const i of all) {
       cost -= 2 * side[i] * c[i];
@@ -86,12 +107,48 @@ export class RidgeSystem {
     return logDet;
   }
 
+  /* What -2 ln of the integral over numbers with a tolerance has more: see `Prior`. */
+  bothSides(c) {
+    const {always, deviations, steepness} = this.data;
+    let more = 0;
+    always.forEach((k, i) => {
+      if (!this.limited.has(k)) return;
+      const column = this.whitened(i), variance = dot(column, column);
+      const isBeyond = this.held[i] ? 1 : 0;
+      const precise = 1 / variance - steepness * isBeyond, steep = precise + steepness;
+      const pulled = Math.abs(c[k]) / variance - steepness * deviations * isBeyond;
+      const within = pulled / precise, outside = (pulled + steepness * deviations) / steep;
+      const above = steepness * precise / steep * (within - deviations) ** 2
+        + Math.log(steep / precise);
+      const inner = logNormal((deviations - within) * Math.sqrt(precise));
+      const outer = logNormal((outside - deviations) * Math.sqrt(steep)) - above / 2;
+      const most = Math.max(inner, outer);
+      more -= 2 * (most + Math.log(Math.exp(inner - most) + Math.exp(outer - most)))
+        + isBeyond * above;
+    });
+    return more;
+  }
+
+  /* A column of the inverse of the factor: its square is the variance. */
+  whitened(at) {
+    const {L, size, factored} = this;
+    const z = new Float64Array(factored.length);
+    for (let i = at; i < factored.length; i++) {
+      let sum = i === at ? 1 : 0;
+      for (let j = at; j < i; j++) sum -= L[i * size + j] * z[j];
+      z[i] = sum / L[i * size + i];
+    }
+    return z;
+  }
+
   price(placements, c) {
-    const {effects, name_price, wrong_sign_price, drive_prices} = this.data;
+    const {effects, name_price, wrong_sign_odds, drive_prices} = this.data;
     let price = 0;
     for (const one of placements) {
       price += one.price;
-      if (one.signs.some(([k, bound]) => c[k] < bound)) price += wrong_sign_price;
+      if (one.signs.some(([k, bound]) => c[k] < bound)) {
+        price -= 2 * Math.log(wrong_sign_odds / (1 - wrong_sign_odds) / (2 ** one.signs.length - 1));
+      }
     }
     for (const effect of effects) {
       const used = effect.placements.filter((one) => placements.includes(one));

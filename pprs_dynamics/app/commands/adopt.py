@@ -15,15 +15,20 @@ from pprs_dynamics.app.commands.input_output import read_inputs, tell
 from pprs_dynamics.app.front_door.adopt import adopt
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.adoption.request import requested
+from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.parameter_file import find_file
+
+EXAMPLE = 'pprs adopt stribeck_friction run.mcap --validate other.mcap --output better.yaml'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    parser.add_argument('effect', metavar='EFFECT', help='name of an effect, on the drives that '
-                        'the recordings call for; or EFFECT:drive,drive; or '
-                        'measured_curve:DRIVE@VARIABLE for what no effect explains')
+    effect = parser.add_argument(
+        'effect', metavar='EFFECT', help='name of an effect, on the drives that the recordings '
+        'call for; or EFFECT:drive,drive; or measured_curve:DRIVE@VARIABLE for what no effect '
+        'explains')
+    effect.completer = lambda **_: catalogue()  # type: ignore[attr-defined]  # of argcomplete
     arguments.add_recordings(parser)
     arguments.add_validation(parser)
     arguments.add_model_output(parser, 'model file to write')

@@ -12,6 +12,8 @@ from pprs_dynamics.app.commands.input_output import read_inputs, tell
 from pprs_dynamics.app.front_door.compare import compare
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 
+EXAMPLE = 'pprs compare run.mcap --model robot.yaml --report page.html'
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""

@@ -16,6 +16,8 @@ from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.fit.base_fit import require_open_numbers
 from pprs_dynamics.system.plain_text import counted
 
+EXAMPLE = 'pprs diagnose run.mcap --model robot.yaml --validate other.mcap --report why.html'
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""

@@ -28,6 +28,8 @@ from pprs_dynamics.system.output_files import write_text
 ENDINGS = ('.urdf', '.xml', '.mjcf')
 FEW = 8  # names that the terminal lists
 
+EXAMPLE = 'pprs export better.yaml --to mjcf --output better.xml'
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""

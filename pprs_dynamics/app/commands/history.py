@@ -19,6 +19,8 @@ from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import find_file
 
+EXAMPLE = 'pprs history better.yaml --report history.html'
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""

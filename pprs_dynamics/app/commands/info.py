@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -20,10 +21,13 @@ from pprs_dynamics.app.report.mechanism_view import (
 )
 from pprs_dynamics.app.report.tables import recording_table
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
-from pprs_dynamics.measurement.files.recording import describe
+from pprs_dynamics.measurement.files.recording import Summary, describe
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model
+
+EXAMPLE = 'pprs info run.mcap --model robot.yaml'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,14 +45,25 @@ def run(options: argparse.Namespace) -> int:
         content['robot'] = describe_mechanism(model)
         for line in mechanism_lines(model):
             screen.print(shown(line))
+        for remark in model.robot.structure.description.remarks:
+            screen.print(f'[yellow]![/] {shown(remark)}')
         if options.report:
             write_mechanism_page(options.report, model, Path(options.model).stem)
     elif options.report or not options.recordings:
         raise UsageError('a RECORDING is needed: without one, info tells of an arm or of a robot '
                          'with loops, and --report draws it')
+    summaries = show_recordings(model, options.recordings, options.topic, screen)
+    if options.json:
+        write_json(options.json, {
+            **content, 'recordings': [asdict(summary) for summary in summaries]})
+    return 0
+
+
+def show_recordings(model: ForceModel, paths: Sequence[str], topic: str | None, screen: Any,
+                    ) -> list[Summary]:
+    """Print what is in recordings, and what is wrong with them."""
     with staged_bar(screen) as progress:
-        recordings = [read_checked(model, path, options.topic, progress)
-                      for path in options.recordings]
+        recordings = [read_checked(model, path, topic, progress) for path in paths]
     summaries = [describe(recording) for recording in recordings]
     for summary in summaries:
         for table in recording_table(summary, model.units):
@@ -61,7 +76,4 @@ def run(options: argparse.Namespace) -> int:
     if repeat is not None:
         index, clause = repeat
         screen.print(f'[yellow]![/] {shown(summaries[index].name)}: {shown(clause)}')
-    if options.json:
-        write_json(options.json, {
-            **content, 'recordings': [asdict(summary) for summary in summaries]})
-    return 0
+    return summaries

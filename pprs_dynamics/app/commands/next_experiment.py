@@ -37,6 +37,8 @@ FASTEST = 1e4  # [Hz]; beyond what any controller takes, and a file of 1.2 milli
 LIMITS = MotionLimits()
 PLAYED = 'positions, velocities and accelerations of its joints'
 
+EXAMPLE = 'pprs next-experiment run.mcap --output next.csv'
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""

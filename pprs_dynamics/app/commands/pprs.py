@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import argparse
 import ast
+import os
+import re
 import signal
 import sys
 import threading
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -24,15 +26,15 @@ from typing import Any, NoReturn
 from pprs_dynamics import __version__
 from pprs_dynamics.app.commands.arguments import DEFAULT_MODEL, JSON, check_files, output_file
 from pprs_dynamics.app.commands.streams import lasting_output
-from pprs_dynamics.errors import PprsError
+from pprs_dynamics.errors import PprsError, suggestion
 from pprs_dynamics.system.plain_text import displayed
 from pprs_dynamics.system.threads import use_one_thread
 
-# Each a module of this folder with a docstring, add_arguments and run.
+# Each a module of this folder with a docstring, EXAMPLE, add_arguments and run.
 COMMANDS = ('adopt', 'compare', 'diagnose', 'export', 'fit', 'history', 'info',
-            'next-experiment', 'reproduce', 'simulate', 'survey', 'trend', 'workbench')
+            'init', 'next-experiment', 'reproduce', 'simulate', 'survey', 'trend', 'workbench')
 # What all others take: models there are in the file or the store, and a session has no result.
-WITHOUT_MODEL, WITHOUT_JSON = ('history', 'trend'), ('workbench',)
+WITHOUT_MODEL, WITHOUT_JSON = ('history', 'init', 'trend'), ('workbench',)
 # Characters of an error: ten lines of a terminal, more than any sentence with usual names has.
 LONGEST_SENTENCE = 800
 
@@ -41,6 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run `pprs` and return its exit status."""
     use_one_thread()
     given = sys.argv[1:] if arguments is None else list(arguments)
+    if '_ARGCOMPLETE' in os.environ:
+        _complete()
     with lasting_output() as output, warnings.catch_warnings(), _cleaned_up():
         warnings.showwarning = _show_warning
         status = _ended(given)
@@ -49,6 +53,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return status
     _say(f'output: {output.error.strerror or output.error}', given)
     return 2
+
+
+def _complete() -> None:
+    """Answer a shell that completes a line, where argcomplete is installed; then end."""
+    with suppress(ImportError):
+        import argcomplete
+
+        argcomplete.autocomplete(_parser(os.environ.get('COMP_LINE', '').split()))
 
 
 @contextmanager
@@ -68,7 +80,11 @@ def _ended(given: Sequence[str]) -> int:
     """Run the command; what ends it early is one sentence."""
     try:
         # Importing a command takes long enough to be interrupted.
-        options = _parser(given).parse_args(given)
+        parser = _parser(given)
+        if not given:
+            parser.print_help()
+            return 0
+        options = parser.parse_args(given)
         check_files(options)
         from pprs_dynamics.physics.mechanism.evaluation import postpone_compiling
 
@@ -110,11 +126,28 @@ def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Parser whose errors are one line, without the usage."""
+    """Parser whose errors are one line, without the usage, and name what was meant."""
 
     def error(self, message: str) -> NoReturn:
         """End with status 2."""
-        self.exit(2, f'{self.prog}: {_short(message)}\n')
+        unknown = re.match(r'unrecognized arguments: (--[^\s=]+)', message)
+        hint = suggestion(unknown[1], self._options()) if unknown else ''
+        self.exit(2, f'{self.prog}: {_short(message)}{hint}\n')
+
+    def _options(self) -> list[str]:
+        """Return the options of the command that was called, and of this parser."""
+        called = [parser for action in self._actions if isinstance(action.choices, dict)
+                  for parser in action.choices.values() if parser.epilog]
+        return [name for parser in (self, *called) for action in parser._actions
+                for name in action.option_strings]
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Refuse a word that is no choice, and name the one that is like it."""
+        if action.choices is not None and value not in action.choices:
+            known = [str(choice) for choice in action.choices]
+            raise argparse.ArgumentError(action, f'unknown {action.metavar or "value"} {value!r}'
+                                         f'{suggestion(str(value), known)}, must be one of '
+                                         f'{", ".join(known)}')
 
     def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
         """Return the value of an argument; of `--model=--` argparse itself makes an empty list."""
@@ -153,7 +186,9 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
                                  help='write the result as JSON too')
         if name in given:
             # Only this one: importing all would take longer than most of them run.
-            _module(name).add_arguments(command)
+            module = _module(name)
+            module.add_arguments(command)
+            command.epilog = f'example: {module.EXAMPLE}'
     return parser
 
 

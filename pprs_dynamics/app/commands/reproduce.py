@@ -24,6 +24,8 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.reproduction import Reproduction, reproduce
 from pprs_dynamics.system.csv_tables import write_table
 
+EXAMPLE = 'pprs reproduce --output output'
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""

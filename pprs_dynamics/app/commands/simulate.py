@@ -34,6 +34,8 @@ from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, RANDOM
 
 LONGEST = 3600.0  # [s], of an excitation: minutes of simulation, and hundreds of megabytes
 
+EXAMPLE = 'pprs simulate --output run.mcap --effect stribeck_friction --seed 2'
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""

@@ -34,6 +34,8 @@ from pprs_dynamics.system.plain_text import counted, displayed
 MOST_SHOWN = 10  # errors
 MOST_WORKERS = 1024
 
+EXAMPLE = 'pprs survey recordings --model robot.yaml --output store'
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""

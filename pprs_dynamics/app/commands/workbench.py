@@ -24,6 +24,8 @@ HOST = '127.0.0.1'
 ANY = ('', '0.0.0.0', '::', '*')
 ROS_NAME = re.compile(r'/|/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*')
 
+EXAMPLE = 'pprs workbench run.mcap --validate other.mcap'
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""

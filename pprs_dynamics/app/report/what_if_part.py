@@ -56,7 +56,7 @@ def add_what_if(page: Page, system: WhatIf, residuals: Residuals) -> None:
             'effects': [asdict(one) for one in system.effects],
             'always': system.always, 'limited': system.limited,
             'gram': _letters(system.gram, 'f8'), 'side': _letters(system.side, 'f8'),
-            'name_price': system.name_price, 'wrong_sign_price': system.wrong_sign_price,
+            'name_price': system.name_price, 'wrong_sign_odds': system.wrong_sign_odds,
             'drive_prices': system.drive_prices,
             'units': {one.name: {'effort': residuals.units_of(one.name).effort}
                       for one in system.drives},

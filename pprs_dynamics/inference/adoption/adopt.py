@@ -70,7 +70,7 @@ def adopt(
         Called with the share of the work that is done.
     diagnosis : Diagnosis, optional
         On the same recordings, where it is known already: of `original(model)`, and for a curve
-        of the model itself.
+        of the model itself. The fit is made with its decisions.
 
     Raises
     ------
@@ -98,7 +98,8 @@ def adopt(
     placed = replace(request, drives=named.drives) if named and not request.drives else request
     try:
         fitted = fit_effect(start, placed, recordings,
-                            lambda share: report(DIAGNOSIS + (FIT - DIAGNOSIS) * share))
+                            lambda share: report(DIAGNOSIS + (FIT - DIAGNOSIS) * share),
+                            diagnosis.decisions)
     except (ModelError, StandingError) as error:
         return case.without_model(str(error))
     if fitted is None:

@@ -16,7 +16,7 @@ from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
-from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import (
     Calibration,
     Estimate,
@@ -98,7 +98,7 @@ class EffectFit:
 
 def fit_effect(
     model: ForceModel, request: EffectRequest, recordings: Sequence[Recording],
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
 ) -> EffectFit | None:
     """Return the model with an effect, new or with other numbers; None where it cannot act.
 
@@ -114,7 +114,7 @@ def fit_effect(
     report = progress or (lambda share: None)
     design = Design.of(model, recordings, lambda share: report(0.3 * share), request.name)
     _require_motion(design, request)
-    fits = FittedSets(design, DECISIONS)
+    fits = FittedSets(design, decisions)
     without = fits.evaluate(())
     found = Search(fits).best_of(request.effect, _numbers(design, request))
     report(0.6)

@@ -14,6 +14,7 @@ from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 
@@ -77,7 +78,7 @@ def adopt_all(
     progress : callable, optional
         Called with what is being done and the share of it that is done.
     diagnosis : Diagnosis, optional
-        Of the model as given, where it is known already.
+        Of the model as given, where it is known already; its decisions hold for all others.
 
     Raises
     ------
@@ -88,12 +89,13 @@ def adopt_all(
     steps: list[Adoption] = []
     taken = 0
     refused: list[Adoption] = []
+    decisions = DECISIONS if diagnosis is None else diagnosis.decisions
     if diagnosis is not None and original(model) is not model:
         diagnosis = None
     while True:
         if diagnosis is None:
             diagnosis = diagnose(original(model), recordings, (),
-                                 lambda share: report('diagnosing', share))
+                                 lambda share: report('diagnosing', share), decisions)
         found = _next(diagnosis, {step.effect for step in refused})
         if found is None and refused:
             reasons = '; '.join(f'{step.effect}: {step.reason}' for step in refused)

@@ -5,12 +5,11 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.errors import PprsError
+from pprs_dynamics.errors import PprsError, suggestion
 from pprs_dynamics.inference.adoption.fit_curve import CurveRequest
 from pprs_dynamics.physics.effects.catalogue import REPLACED, catalogue, find_effect
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -65,10 +64,8 @@ class EffectRequest:
             if name in REPLACED:
                 raise EffectRequestError(f'unknown effect {name!r}, must be one of the catalogue: '
                                          f'use {REPLACED[name]}')
-            close = difflib.get_close_matches(name, list(catalogue()), 1)
-            hint = f' (did you mean {close[0]}?)' if close else ''
-            raise EffectRequestError(f'unknown effect {name!r}{hint}, must be one of '
-                                     f'{", ".join(catalogue())}')
+            raise EffectRequestError(f'unknown effect {name!r}{suggestion(name, catalogue())}, '
+                                     f'must be one of {", ".join(catalogue())}')
         if on is None:
             return cls(effect)
         drives = tuple(dict.fromkeys(on))
@@ -77,8 +74,8 @@ class EffectRequest:
                                      f'{", ".join(drives) or "drives"}')
         for drive in drives:
             if drive not in known:
-                raise EffectRequestError(f'unknown drive {drive!r}, must be one of '
-                                         f'{", ".join(known)}')
+                raise EffectRequestError(f'unknown drive {drive!r}{suggestion(drive, known)}, '
+                                         f'must be one of {", ".join(known)}')
         return cls(effect, tuple(sorted(drives, key=known.index)))
 
     def require_place(self, model: ForceModel) -> None:

@@ -96,6 +96,8 @@ class Diagnosis:
     held_out_on : {'blocks', 'validation'}
     selection : Ranking, optional
         All that was tried, for looking closer.
+    decisions : Decisions
+        With which it was made.
     """
 
     verdict: str
@@ -120,6 +122,7 @@ class Diagnosis:
     above_noise: Mapping[str, float] = field(default_factory=dict)
     held_out_on: str = 'blocks'
     selection: Ranking | None = field(default=None, repr=False, compare=False)
+    decisions: Decisions = DECISIONS
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON: the keys that docs/commands.md lists."""
@@ -217,7 +220,7 @@ class _Answer:
             tuple(moved), find_cautions(self.fits, self.best, effects), first.notes,
             first.given, final.model, first.residuals, self.remaining, noise, floors,
             root_mean_square(list(floors.values())), above,
-            'validation' if self.validate else 'blocks', self.ranking)
+            'validation' if self.validate else 'blocks', self.ranking, self.decisions)
 
     def _effects(self) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""

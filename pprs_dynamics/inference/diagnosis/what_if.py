@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import chain
-from math import inf, log
+from math import inf
 
 import numpy as np
 
@@ -47,7 +47,7 @@ class OptionalPlacement:
     signs : tuple of (int, float)
         Columns and the bounds below which their coefficients are unphysical.
     price : float
-        Of its shape, less ln det of its prior's precision.
+        Of its shape and of physical signs, less ln det of its prior's precision.
     hypotheses : tuple of str
         That it claims: over all placements of an effect each is priced as a name.
     """
@@ -131,8 +131,10 @@ class WhatIf:
         Whitened products of the columns, with the precision of their prior.
     side : (P,) array
         Whitened products with the error.
-    name_price, wrong_sign_price : float
-        Of an effect, and of a placement with coefficients beyond their bounds.
+    name_price : float
+        Of an effect.
+    wrong_sign_odds : float
+        Of coefficients beyond their bounds.
     drive_prices : tuple of float
         Of a choice of one drive, of two and so on.
     drives : tuple of OptionalForces
@@ -144,7 +146,7 @@ class WhatIf:
     gram: Array = field(repr=False)
     side: Array = field(repr=False)
     name_price: float
-    wrong_sign_price: float
+    wrong_sign_odds: float
     drive_prices: tuple[float, ...]
     drives: tuple[OptionalForces, ...]
 
@@ -219,7 +221,7 @@ class _System:
                     self.placements.items(), key=lambda item: item[0][1] or 0) if of == name)
             ) for name in self.first_choice),
             tuple(always), tuple(np.flatnonzero(self.equations.prior.limited).tolist()),
-            self.gram, self.side, prices.of_name(), -2 * log(fits.decisions.wrong_sign_odds),
+            self.gram, self.side, prices.of_name(), fits.decisions.wrong_sign_odds,
             tuple(prices.of_drives(count + 1) for count in range(len(fits.regression.drives))),
             tuple(self._forces(d, drive, index) for d, drive, index in zip(
                 fits.regression.drives, self.equations.drives, self.equations.indices,
@@ -229,7 +231,6 @@ class _System:
         effect, d = placement.effect, placement.drive
         own = self.blocks[placement]
         free = [block for block in own if block.mean is None]
-        bounds = effect.unphysical_below
         return OptionalPlacement(
             None if d is None else self.fits.design.drives[d],
             any(placement in one.components for one in self.kept.effects),
@@ -237,8 +238,8 @@ class _System:
             tuple(column for block in free for column in self.columns[block]),
             tuple(column for block in own if block.mean is not None
                   for column in self.columns[block]),
-            tuple((column, bounds[name]) for name, column in zip(
-                placement.names, self.columns[own[0]], strict=False) if name in bounds),
+            tuple((column, effect.unphysical_below[name]) for name, column in zip(
+                placement.names, self.columns[own[0]], strict=False) if name in placement.signed),
             self.fits.library.component_price(placement)
             - sum(float(np.linalg.slogdet(one.precision)[1]) for one in free),
             tuple(sorted(map(str, effect.hypotheses(placement.names)))))

@@ -28,7 +28,7 @@ from pprs_dynamics.inference.experiments.question import (
 )
 from pprs_dynamics.inference.experiments.trajectory_search import ArmSearch, Found, TrajectorySearch
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
-from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -197,6 +197,7 @@ def next_experiment(
     model: DriveModel | ArmModel, recordings: Sequence[Recording] = (), purpose: str = 'separate',
     limits: MotionLimits | ArmLimits | None = None, duration: float = 20.0, seed: int = 0,
     noise: float = 0.05, progress: Callable[[float], None] | None = None,
+    decisions: Decisions = DECISIONS,
 ) -> Experiment:
     """Return the motion that tells most about what is open; see `pprs_dynamics.next_experiment`.
 
@@ -214,9 +215,9 @@ def next_experiment(
     report = progress or (lambda share: None)
     check_purpose(purpose, recordings)
     check_duration(duration)
-    question = (commissioning(model, recordings, noise)
+    question = (commissioning(model, recordings, noise, decisions)
                 if purpose == 'commission' and isinstance(model, DriveModel) else
-                question_of(model, recordings, lambda share: report(0.2 * share)))
+                question_of(model, recordings, lambda share: report(0.2 * share), decisions))
     limits = limits or (ArmLimits() if isinstance(model, ArmModel) else MotionLimits())
     limits = replace(limits, effort_reserve=max(
         limits.effort_reserve, RESERVE * question.noise_floor))
@@ -248,7 +249,8 @@ def check_duration(duration: float) -> None:
 def experiment_of(question: Question, found: Found) -> Experiment:
     """Return a motion with what it promises for a question."""
     known, after = question.known, question.known + found.gram
-    contests = tuple(found for one in question.contests for found in _expected(one, known, after))
+    contests = tuple(found for one in question.contests for found in _expected(
+        one, known, after, question.decisions.rival_margin))
     decided = [one.expected for one in contests if one.probability >= SURE]
     evidences = _evidences(question, after)
     if contests:
@@ -264,11 +266,12 @@ def experiment_of(question: Question, found: Found) -> Experiment:
         lambda time: question.model.drive_forces(found.path.motion(time)), question.model)
 
 
-def _expected(contest: Contest, known: Array, after: Array) -> list[ExpectedEvidence]:
+def _expected(contest: Contest, known: Array, after: Array, margin: float,
+              ) -> list[ExpectedEvidence]:
     """Return what a motion promises for every pair of effects of a contest."""
     expected, gained = contest.evidence(known, after), contest.gained(known, after)
     # Twice a log-likelihood ratio scatters by twice the root of its mean.
-    sure = float(ndtr((expected - DECISIONS.rival_margin) / (2 * np.sqrt(gained) + 1e-9)))
+    sure = float(ndtr((expected - margin) / (2 * np.sqrt(gained) + 1e-9)))
     return [ExpectedEvidence(truth, rival, contest.now, expected, sure)
             for truth, rival in product(*contest.sides)]
 

@@ -34,8 +34,13 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.regression.sensitivities import PASSIVE_WIDTHS, model_numbers
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate, Prices
-from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.candidates import (
+    CandidateSet,
+    EffectCandidate,
+    Prices,
+    names_of,
+)
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.ranking import Ranking, Rival, select
 from pprs_dynamics.measurement.files.recording import Recording
@@ -85,6 +90,7 @@ class Question:
         Effects in question.
     noise_floor : float
         Largest root of the mean squared noise of a drive [N].
+    decisions : Decisions
     """
 
     kind: str
@@ -95,6 +101,7 @@ class Question:
     contests: tuple[Contest, ...]
     subjects: tuple[Explanation, ...]
     noise_floor: float
+    decisions: Decisions = DECISIONS
 
     @property
     def model(self) -> Any:
@@ -125,10 +132,10 @@ class Question:
 
 
 def question_of(model: ForceModel, recordings: Sequence[Recording],
-                progress: Callable[[float], None]) -> Question:
+                progress: Callable[[float], None], decisions: Decisions = DECISIONS) -> Question:
     """Return what recordings leave open; errors as `diagnose`."""
-    ranking = select(model, recordings, DECISIONS, progress)
-    return question_after(ranking, ranking.rivals(DECISIONS.rival_margin))
+    ranking = select(model, recordings, decisions, progress)
+    return question_after(ranking, ranking.rivals(decisions.rival_margin))
 
 
 def question_after(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
@@ -215,7 +222,7 @@ def _excitation(fits: FittedSets, nothing: CandidateSet) -> Question:
         gain = np.diag(regression.own_information(nothing.fit, block))
         found = FittedTerm.at_scale(term.effect, None, {})
         here = [term.names.index(name) for name in found.names]
-        if np.any(gain[here] * found.scales ** 2 < DECISIONS.unexcited):
+        if np.any(gain[here] * found.scales ** 2 < fits.decisions.unexcited):
             weak.append(found)
     plan = ColumnPlan.of_design(fits.design, weak)
     subjects = subjects_of(plan, fits.library.prices)
@@ -250,7 +257,8 @@ def _asked(kind: str, fits: FittedSets, found: CandidateSet, plan: ColumnPlan,
     noise = regression.noise(fit)
     known = Information(plan, noise).of_recordings(fits.design, regression, fit)
     floor = max(regression.noise_floor(fit, d) for d in regression.drives)
-    return Question(kind, plan, noise, known, criterion, tuple(contests), tuple(subjects), floor)
+    return Question(kind, plan, noise, known, criterion, tuple(contests), tuple(subjects), floor,
+                    fits.decisions)
 
 
 class _Terms:
@@ -329,7 +337,8 @@ def _holds(larger: Sequence[FittedTerm], smaller: FittedTerm, design: Design) ->
     return True
 
 
-def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: float) -> Question:
+def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: float,
+                  decisions: Decisions = DECISIONS) -> Question:
     """Return the question of a robot that nothing, or little, is known of.
 
     It is of the model's own numbers, and of the effects that are common.
@@ -371,10 +380,11 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: flo
         plan = ColumnPlan(model, model, base_without_recordings(model), tuple(terms))
         spectra = dict.fromkeys(range(len(DRIVES)), white)
         known = Information(plan, spectra).prior()
-    subjects = subjects_of(plan, Prices(len(catalogue()), len(DRIVES), samples, DECISIONS))
+    subjects = subjects_of(plan, Prices(names_of(model), len(DRIVES), samples, decisions))
     scales = np.concatenate([np.ones(len(plan.numbers)), *(term.scales for term in terms)])
     criterion = Precision((*plan.numbers, *free_of(subjects)), plan.others, scales)
-    return Question('commission', plan, spectra, known, criterion, (), tuple(subjects), noise)
+    return Question('commission', plan, spectra, known, criterion, (), tuple(subjects), noise,
+                    decisions)
 
 
 def base_without_recordings(model: DriveModel) -> tuple[BaseColumn, ...]:

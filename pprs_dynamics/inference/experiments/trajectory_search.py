@@ -27,7 +27,6 @@ from pprs_dynamics.inference.experiments.fourier_path import (
 )
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits, limit_names
 from pprs_dynamics.inference.experiments.question import Question
-from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.measurement.motion.treatment import block_length
 from pprs_dynamics.physics.mechanism.paths import HOME
 from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel
@@ -155,7 +154,7 @@ class TrajectorySearch:
         gained = np.max([misfits_of(contests, known + draw.gram) for draw in drawn],
                         axis=0) - misfits_of(contests, known)
         return [one for one, more in zip(contests, gained, strict=True)
-                if one.now + more > DECISIONS.rival_margin]
+                if one.now + more > self.question.decisions.rival_margin]
 
     def screen(self, progress: Callable[[float], None] = lambda share: None,
                draws: int = DRAWS) -> list[Drawn]:

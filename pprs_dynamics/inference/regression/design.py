@@ -162,9 +162,11 @@ class Design:
         alone : bool
             Nothing is to be added to its effects: others outside the drives get no columns.
         """
-        design = self._evaluated(point.model, self.given, self.reconstructed(point.model), None,
-                                 {one.effect for one in point.effects} if alone else None,
-                                 self.joining)
+        design = self._evaluated(
+            point.model, self.given, self.reconstructed(point.model), None,
+            {one.effect for one in point.effects} if alone else None,
+            {(one.drive, one.number) for one in self.base if isinstance(one, ReversalShape)},
+            self.joining)
         shift = np.zeros_like(design.residuals.model)
         for column, c in zip(design.base, point.base, strict=True):
             if not isinstance(column, ReversalShape):
@@ -199,7 +201,13 @@ class Design:
                    reconstructions: tuple[Reconstruction, ...],
                    progress: Callable[[float], None] | None,
                    effects: Container[type[CatalogueEffect]] | None = None,
-                   joining: str = '') -> Design:
+                   reversals: Container[tuple[int | None, int]] | None = None, joining: str = '',
+                   ) -> Design:
+        """Return the design around a model; `reversals` are the widths that are left open there.
+
+        They are those of the given model around every other one: a sensor that says nothing of
+        small efforts, say, would leave some of them without a column.
+        """
         sensitivities = sensitivities_of(model, given)
         if effects is not None:
             sensitivities.restrict(effects)
@@ -232,11 +240,17 @@ class Design:
             ModelNumber(_rows(column), 1.0, number)
             for number, column in zip(sensitivities.numbers, stacked[NUMBERS], strict=True)]
         # Where a drive stands, friction that turns over otherwise is any constant force.
+        def is_open(drive: int | None, number: int, column: Array) -> bool:
+            if reversals is not None:
+                return (drive, number) in reversals
+            return bool(np.any(column)) and (drive is None or design.moves(drive))
+
         base += [ReversalShape({d: column[d]}, 1.0, d, number)
                  for number, column in enumerate(stacked[OF_DRIVES])
-                 for d in range(count) if np.any(column[d]) and design.moves(d)]
+                 for d in range(count) if is_open(d, number, column[d])]
         base += [ReversalShape(_rows(column), 1.0, None, number)
-                 for number, column in enumerate(stacked.get(OF_JOINTS, ())) if np.any(column)]
+                 for number, column in enumerate(stacked.get(OF_JOINTS, ()))
+                 if is_open(None, number, column)]
         for effect in given.effects:
             if isinstance(effect, (DriveEffect, StructureEffect)):
                 base += [replace(one, rows=design.present_rows(one))

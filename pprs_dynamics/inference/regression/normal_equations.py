@@ -11,6 +11,7 @@ from typing import Protocol
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.special import log_ndtr
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import BaseColumn, ModelNumber
@@ -141,7 +142,31 @@ class Prior:
         penalty = float(away @ self.precision @ away + BEYOND_TOLERANCE * np.sum(
             np.abs(beyond) * (np.abs(away) - DEVIATIONS) ** 2))
         log_det = 2 * float(np.log(np.diag(factor[0])).sum() - np.log(scale).sum())
+        log_det += self._both_sides(away, np.diag(covariance), beyond)
         return Posterior(self.mean + away, covariance, penalty, log_det - self.log_det)
+
+    def _both_sides(self, away: Array, variance: Array, beyond: Array) -> float:
+        """Return what -2 ln of the integral over numbers with a tolerance has more.
+
+        The prior of such a number is one Gaussian within its tolerance and a narrower one beyond,
+        so that its posterior is, too. The determinant is that of the side on which its mode lies,
+        as if it went on there; integrated is over both sides, each with the probability that its
+        own Gaussian has there. Else the cost would have a step where a mode passes a tolerance.
+        """
+        k = np.flatnonzero(self.limited)
+        mode, variance, is_beyond = np.abs(away[k]), variance[k], beyond[k] != 0
+        # Of the number alone, the others as they are: its Gaussian within, and beyond.
+        precise = 1 / variance - BEYOND_TOLERANCE * is_beyond
+        steep = precise + BEYOND_TOLERANCE
+        pulled = mode / variance - BEYOND_TOLERANCE * DEVIATIONS * is_beyond
+        within, outside = pulled / precise, (pulled + BEYOND_TOLERANCE * DEVIATIONS) / steep
+        # By how much the least of the steep parabola lies above that of the other one.
+        above = BEYOND_TOLERANCE * precise / steep * (within - DEVIATIONS) ** 2
+        inner = log_ndtr((DEVIATIONS - within) * np.sqrt(precise))
+        outer = log_ndtr((outside - DEVIATIONS) * np.sqrt(steep)) - (
+            above + np.log(steep / precise)) / 2
+        more = -2 * np.logaddexp(inner, outer) - is_beyond * (above + np.log(steep / precise))
+        return float(more.sum())
 
 
 @dataclass(frozen=True)

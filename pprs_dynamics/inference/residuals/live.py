@@ -71,12 +71,13 @@ class LiveComparison:
         self._gaps_before = self._gaps_in_a_row = 0
         self._waiting: list[LiveSample] = []
         self._recent: deque[tuple[float, Array]] = deque()
+        self._model, self._state = model, model.initial_state()
         self.use_model(model)
 
     def use_model(self, model: ForceModel) -> None:
         """Compare with another model from the next sample on; the running error starts afresh."""
+        self._state = model.continued_state(self._model, self._state)
         self._model = model
-        self._state = model.initial_state()
         self._seed: PlatformMotion | None = None
         self._recent.clear()
 
@@ -117,7 +118,7 @@ class LiveComparison:
                 if first == last:
                     continue
                 if first in starts:
-                    self._state, self._seed = self._model.initial_state(), None
+                    self._begin_again(samples[first].time)
                 model_effort.append(self._forces(samples[first:last]))
         except PprsError:
             self._seed = None
@@ -135,6 +136,13 @@ class LiveComparison:
         while not time[-1] - self._span <= self._recent[0][0] <= time[-1]:
             self._recent.popleft()
         return Compared(time, model, residual)
+
+    def _begin_again(self, time: float) -> None:
+        """Start afresh after a gap, in the same machine unless time went back."""
+        start = self._state.start
+        self._state = self._model.initial_state(
+            start if start is not None and start <= time else None)
+        self._seed = None
 
     def running_error(self) -> Array:
         """Return the root of the mean squared residual of the last span, (D,); NaN: none."""

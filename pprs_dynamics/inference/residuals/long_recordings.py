@@ -30,7 +30,7 @@ TOO_LONG = 'too_long'
 # Blocks of all recordings together. A search takes 50 to 150 kB for each, with six drives: as many
 # as the first stay whole, and take up to 2 GB; beside the samples of an hour there is room for the
 # second.
-MOST_WHOLE, MOST_BLOCKS = 16_000, 10_000
+MOST_WHOLE, MOST_BLOCKS = 16_000, 9_000
 # Stretches of one recording, and how long they are at least [s]: slow noise, and what drifts, is
 # told by long ones, what changes over hours by many.
 STRETCHES, SHORTEST_STRETCH = 12, 5.0

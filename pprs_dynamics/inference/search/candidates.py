@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import comb, inf, log
+from math import comb, inf, log, log1p
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,8 +18,9 @@ from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.patterns import Family, Pattern
-from pprs_dynamics.physics.effects.catalogue import catalogue
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE, catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.model.force_model import ForceModel
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,11 @@ class Component:
         """Return whether all linear parameters are within the bounds of the catalogue."""
         values = self.values(coefficients)
         return all(p.lower <= values[p.name] <= p.upper for p in self.effect.linear)
+
+    @property
+    def signed(self) -> tuple[str, ...]:
+        """Fitted coefficients of which one sign is unphysical."""
+        return tuple(name for name in self.names if name in self.effect.unphysical_below)
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -270,6 +276,11 @@ def set_key(candidates: tuple[Candidate, ...]) -> Hashable:
     return frozenset(candidate.key for candidate in candidates)
 
 
+def names_of(model: ForceModel) -> int:
+    """Return how many effects the catalogue has for what a model is of."""
+    return sum(map(model.offers, catalogue().values()))
+
+
 @dataclass(frozen=True)
 class Prices:
     """Twice the logarithms of prior odds, for everything that is chosen.
@@ -277,7 +288,7 @@ class Prices:
     Parameters
     ----------
     names : int
-        Effects in the catalogue.
+        Effects that the robot can have.
     drives : int
     samples : int
         Of a drive.
@@ -290,9 +301,15 @@ class Prices:
     decisions: Decisions
 
     @classmethod
-    def of(cls, regression: Regression, decisions: Decisions) -> Prices:
-        """Return the prices for the drives and samples of a regression."""
-        return cls(len(catalogue()), len(regression.drives), regression.samples, decisions)
+    def of(cls, regression: Regression, decisions: Decisions,
+           model: ForceModel | None = None) -> Prices:
+        """Return the prices for the drives and samples of a regression, of a model's errors.
+
+        Names are those of effects that can act in what it is a model of, those of other packages
+        among them. Of errors without a model they are the package's own.
+        """
+        names = len(CATALOGUE) if model is None else names_of(model)
+        return cls(names, len(regression.drives), regression.samples, decisions)
 
     def of_name(self) -> float:
         """Return the price of one more effect, whichever."""
@@ -337,8 +354,19 @@ class Prices:
         return (self.of_name() + self.of_drives(drives) + 2 * log(families) + 2 * log(patterns)
                 - 2 * log(self.decisions.unknown_odds))
 
-    def of_signs(self, effect: type[CatalogueEffect], values: Mapping[str, Any]) -> float:
-        """Return the price of parameters that are unphysical by their sign."""
-        wrong = any(values.get(name, bound) < bound
-                    for name, bound in effect.unphysical_below.items())
-        return -2 * log(self.decisions.wrong_sign_odds) if wrong else 0.0
+    def of_right_signs(self, component: Component) -> float:
+        """Return the price of physical signs: less than nothing.
+
+        The prior of k signed coefficients is symmetric; of its 2^k orthants one has all but the
+        odds of a wrong sign, and the others share these.
+        """
+        k = len(component.signed)
+        return -2 * (k * log(2) + log1p(-self.decisions.wrong_sign_odds)) if k else 0.0
+
+    def of_wrong_signs(self, component: Component, values: Mapping[str, float]) -> float:
+        """Return what it costs more that parameters are unphysical by their sign."""
+        if all(values[name] >= component.effect.unphysical_below[name]
+               for name in component.signed):
+            return 0.0
+        odds = self.decisions.wrong_sign_odds
+        return -2 * log(odds / (1 - odds) / (2 ** len(component.signed) - 1))

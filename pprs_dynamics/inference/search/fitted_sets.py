@@ -63,7 +63,7 @@ class FittedSets:
         self.design, self.decisions = design, decisions
         self.stepped: Callable[[], None] = lambda: None
         self.regression = Regression(design.residuals, design.base, error_scale=error_scale)
-        self.prices = Prices.of(self.regression, decisions)
+        self.prices = Prices.of(self.regression, decisions, design.given)
         self.library = Library(design, self.regression, self.prices)
         self._evaluated: dict[Hashable, CandidateSet] = {}
         self._nuisance: dict[Hashable, tuple[Block, ...]] = {}
@@ -185,7 +185,7 @@ class FittedSets:
     def price(self, found: CandidateSet) -> float:
         """Return the price of all that was chosen, and of signs that are unphysical."""
         return sum(map(self.library.price, found.candidates)) + sum(
-            self.prices.of_signs(one.effect, one.values(found.coefficients(one)))
+            self.prices.of_wrong_signs(one, one.values(found.coefficients(one)))
             for one in found.blocks)
 
     def drop_cost(self, found: CandidateSet, component: Component) -> float:

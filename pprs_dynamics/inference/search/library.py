@@ -289,11 +289,13 @@ class Library:
     def component_price(self, component: Component) -> float:
         """Return the price of a component beside that of its candidate's hypotheses and drives.
 
+        With signs that are physical; what others cost more is known once they are fitted.
         That an effect is usually small makes large values unlikely, and small ones no likelier:
         it costs by how much that narrows the prior, and the odds that it is otherwise at all.
         """
         if component not in self._prices:
-            price = self.prices.of_component(component.effect, len(self.trials(component)))
+            price = (self.prices.of_component(component.effect, len(self.trials(component)))
+                     + self.prices.of_right_signs(component))
             usual = self._expected(component)
             if np.any(usual):
                 decisions, both = self.prices.decisions, self.block(component).precision

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import import_module
 from io import TextIOWrapper
+from itertools import islice
 from pathlib import Path
 from typing import IO, Any, TextIO, cast
 
@@ -136,6 +137,27 @@ class CsvTable:
         if not blocks:
             raise UnreadableFileError(self.path, 'no samples below the header')
         return list(np.concatenate(blocks).T)
+
+    def head(self, most: int) -> list[Array]:
+        """Return the first rows of all columns, NaN for what is no number; broken rows left out."""
+        found: list[list[float]] = []
+        with _text_of(self.path) as (file, _):
+            for _ in range(self.above):
+                file.readline()
+            for line in islice(file, most):
+                cells = _cells(self.path, 0, line, self.separator) if line.strip() else []
+                if len(cells) == self.count:
+                    found.append([self._any(cell) for cell in cells])
+        if not found:
+            raise UnreadableFileError(self.path, 'no samples below the header')
+        return list(np.array(found).T)
+
+    def _any(self, cell: str) -> float:
+        try:
+            return (parse_number(cell.replace(self.decimal, '.'))
+                    if _is_number(cell, self.decimal) else _seconds_of(cell))
+        except ValueError:
+            return float('nan')
 
     def _place(self, column: Column) -> int:
         if isinstance(column, int):

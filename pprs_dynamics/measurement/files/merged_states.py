@@ -130,7 +130,7 @@ def read_merged(bag: Bag, connections: list[Connection], drives: tuple[str, ...]
         stamp = _stamp(message) or received
         states = [(one.joint, one.quantity, _value(message, one.way), False)
                   for one in fields if one.topic == connection.topic]
-        states += [one for one in _states(message, connection.msgtype) if one[:2] not in named]
+        states += [one for one in states_of(message, connection.msgtype) if one[:2] not in named]
         for joint, quantity, value, is_command in states:
             if joint in drives and np.isfinite(value):
                 times[joint, quantity].append(stamp)
@@ -165,7 +165,7 @@ def _stamp(message: Any) -> int:
     return 0 if header is None else header.stamp.sec * 10**9 + header.stamp.nanosec
 
 
-def _states(message: Any, kind: str) -> Iterator[tuple[str, str, float, bool]]:
+def states_of(message: Any, kind: str) -> Iterator[tuple[str, str, float, bool]]:
     """Yield joint, quantity, value, and whether that is a command, of one message."""
     if kind == JOINT_STATE:
         for quantity in QUANTITIES:

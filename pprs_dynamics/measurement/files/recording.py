@@ -227,12 +227,22 @@ def _as_efforts(path: Path, samples: Samples, drives: RecordedDrives,
     """Return samples with currents times the gain, and the gain where it was applied."""
     gain = drives.gain
     currents = np.array(samples.in_amperes or [False] * len(samples.drives)) | drives.in_amperes
+    names = ', '.join(np.array(samples.drives)[currents])
+    is_known = gain is not None and any(one != 1 for one in gain)
     if not np.any(currents):
-        return samples, None
+        unused = Defect('gain_unused', int(np.isfinite(samples.effort).sum()),
+                        'the model has a gain, but these efforts are no columns of currents '
+                        '(where they are currents write effort_unit: A)')
+        told = (unused,) if is_known and unused.count else ()
+        return replace(samples, findings=(*samples.findings, *told)), None
     if gain is None:
-        names = ', '.join(np.array(samples.drives)[currents])
         raise UnreadableFileError(path, f'there are currents of {names}, but only the model of an '
                                   'arm has a gain, by which they become efforts')
+    if not is_known:
+        samples = replace(samples, findings=(*samples.findings, Defect(
+            'no_gain', int(np.sum(currents)), f'the efforts of {names} are currents, and the model '
+            'has no gain (write gain, the effort per ampere of each drive)',
+            drives=tuple(np.array(drives.names)[currents].tolist()))))
     applied: Array = np.where(currents, np.asarray(gain), np.nan)
     efforts = np.where(currents, samples.effort * np.asarray(gain), samples.effort)
     return replace(samples, effort=efforts, in_amperes=()), applied

@@ -42,6 +42,8 @@ POLICY = {
     'commanded_efforts': 'they stand for the efforts',
     'receive_times': 'the times at which the messages were recorded are used',
     'epoch_unit': 'they are read so',
+    'gain_unused': 'they are taken as N m or N',
+    'no_gain': 'they stay amperes',
     'non_finite_time': 'those samples are dropped',
     'non_finite_position': 'those samples are dropped',
     'clock_reset': 'the recording is split there',

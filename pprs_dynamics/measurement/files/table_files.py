@@ -42,6 +42,7 @@ TIME_LIKE = ('t', 'stamp', 'timestamp', 'times', 'seconds', 'sec', 'clock', 'ros
 ELEMENT = re.compile(r'(.+)\[(\d+)\]')
 # From here on a stamp counts no seconds since 1970, but a thousandth, a millionth, ... of them.
 LATEST_SECOND = 1e11
+KINDS = {'.mat': 'MAT', '.parquet': 'Parquet', '.pq': 'Parquet', '.npz': 'NumPy'}
 PARTS = {3: 'milli', 6: 'micro', 9: 'nano'}
 Table = CsvTable | ArrayTable
 
@@ -107,10 +108,9 @@ def _opened(path: Path, columns: RecordedColumns) -> Table:
 
 
 def _source(path: Path, columns: RecordedColumns, prefix: str = '') -> str:
-    kind = 'LeRobot' if path.is_dir() else path.suffix.lstrip('.') or 'table'
+    kind = 'LeRobot' if path.is_dir() else KINDS.get(path.suffix, 'CSV')
     if columns.time is not None or any(of.names for of in columns.drives.values()):
         return f'{kind} by columns of the model file'
-    kind = {'mat': 'MAT', 'parquet': 'Parquet', 'npz': 'NumPy'}.get(kind, 'CSV')
     return f'{kind}, {prefix}' if prefix else kind
 
 

@@ -23,6 +23,7 @@ from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
+from pprs_dynamics.physics.effects.laws.effort_filter import EffortFilter
 from pprs_dynamics.physics.effects.laws.effort_gain import EffortGain
 from pprs_dynamics.physics.effects.laws.effort_offset import EffortOffset
 from pprs_dynamics.physics.effects.laws.external_wrench import ExternalWrench
@@ -64,6 +65,7 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         CoulombFriction,
         DriveInertia,
         DriveSpring,
+        EffortFilter,
         EffortGain,
         EffortOffset,
         ExternalWrench,

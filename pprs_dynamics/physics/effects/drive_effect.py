@@ -135,6 +135,11 @@ class DriveEffect(CatalogueEffect):
                 self.begin(of_drive, start)
         return memory
 
+    def continued_memory(self, fresh: Any, before: Any) -> Any:
+        """Return the memories of drives that were there before, and fresh ones of others."""
+        return None if fresh is None else {
+            drive: before.get(drive, memory) for drive, memory in fresh.items()}
+
     def check_memory(self, memories: Mapping[str, Any]) -> None:
         """Raise ModelError where memories, by effect, are not those of these drives."""
         super().check_memory(memories)

@@ -86,6 +86,8 @@ class Effect(ABC):
     ----------------
     name : str
         Name in files, topics and reports.
+    assumed_at_start : str
+        What a fresh memory takes for granted, of an effect with one; nodes tell it.
 
     Attributes
     ----------
@@ -95,6 +97,7 @@ class Effect(ABC):
     """
 
     name: ClassVar[str]
+    assumed_at_start: ClassVar[str] = ''
     is_measurement: bool = False
 
     @abstractmethod
@@ -117,6 +120,16 @@ class Effect(ABC):
             When the recording began [s]; else the first sample counts as the start.
         """
         return None
+
+    def continued_memory(self, fresh: Any, before: Any) -> Any:
+        """Return the memory with which this effect goes on from the one with other parameters.
+
+        Parameters
+        ----------
+        fresh, before : object
+            What `initial_memory` returns, and what the other one remembered.
+        """
+        return before
 
     def check_memory(self, memories: Mapping[str, Any]) -> None:
         """Raise ModelError where memories, by effect, were not made for this one."""

@@ -23,6 +23,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import EffectError, ModelError, WorkspaceError
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, names
+from pprs_dynamics.physics.mechanism.mechanism import LinkageState, Mechanism
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.three_pprs.robot import Robot
 from pprs_dynamics.physics.three_pprs.state import DriveStates, MechanismState
@@ -182,27 +183,38 @@ def _memory(result: Any, _: Any, effect: CatalogueEffect, *__: Any) -> Any:
     return result
 
 
-def _robot(result: Any, *_: Any) -> Robot:
-    if not isinstance(result, Robot):
-        raise _WrongResultError(f'{result!r:.80}, must be a Robot')
-    _finite(result.kernel_parameters.row, (), 'a robot')
-    return result
+def _robot(result: Any, _: Any, __: Any, robot: Robot | Mechanism) -> Robot | Mechanism:
+    if isinstance(robot, Robot) and isinstance(result, Robot):
+        _finite(result.kernel_parameters.row, (), 'a robot')
+        return result
+    if isinstance(robot, Mechanism) and isinstance(result, Mechanism):
+        for numbers in (result.inertial, result.armature, result.gravity):
+            _finite(np.asarray(numbers, dtype=float), (), 'a mechanism')
+        return result
+    raise _WrongResultError(f'{result!r:.80}, must be a {type(robot).__name__}')
 
 
-def _load(result: Any, _: Any, __: Any, state: MechanismState) -> StructureLoad | None:
+def _load(result: Any, _: Any, __: Any, state: MechanismState | LinkageState,
+          ) -> StructureLoad | None:
     if result is None:
         return None
     samples, given = len(state.velocity), (state.velocity.sum(axis=1, keepdims=True),)
     wrench, hinge = result
+    if isinstance(state, LinkageState) and np.any(hinge):
+        raise _WrongResultError('a hinge that is not 0, must be 0 in a robot of its own joints')
+    if not np.ndim(hinge):
+        hinge = np.full((samples, 3), hinge)
     return StructureLoad(_finite(_array(wrench, (samples, 6), 'a wrench'), given, 'a wrench'),
                          _finite(_array(hinge, (samples, 3), 'a hinge'), given, 'a hinge'))
 
 
-def _state(result: Any, _: Any, __: Any, state: MechanismState) -> MechanismState:
-    if not isinstance(result, MechanismState):
-        raise _WrongResultError(f'{result!r:.80}, must be a MechanismState')
-    _finite(result.rigid_body.force, (state.rigid_body.force,), 'a state')
-    return result
+def _state(result: Any, _: Any, __: Any, state: MechanismState | LinkageState,
+           ) -> MechanismState | LinkageState:
+    for kind in (MechanismState, LinkageState):
+        if isinstance(state, kind) and isinstance(result, kind):
+            _finite(result.rigid_force, (state.rigid_force,), 'a state')
+            return result
+    raise _WrongResultError(f'{result!r:.80}, must be a {type(state).__name__}')
 
 
 def _built(result: Any, effect: type[CatalogueEffect], *_: Any) -> CatalogueEffect:
@@ -220,7 +232,7 @@ def _block(result: Any, *_: Any) -> Mapping[str, Any]:
 CHECKS: dict[str, Callable[..., Any]] = {
     '__init__': _any, 'from_file': _built, 'to_file': _block,
     'to_coefficients': _coefficients, 'from_coefficients': _parameters,
-    'drive_memory': _any, 'begin': _any, 'initial_memory': _memory,
+    'drive_memory': _any, 'begin': _any, 'initial_memory': _memory, 'continued_memory': _memory,
     'columns': _columns, 'force': _force, 'sensed': _sensed, 'sensor_columns': _sensor_columns,
     'position_error': _position_error, 'shifts_positions': _any,
     'changed': _robot, 'load': _load, 'apply': _state,

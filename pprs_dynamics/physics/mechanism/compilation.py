@@ -50,18 +50,8 @@ def compiler() -> Callable[[Any, tuple[Any, ...]], Callable[..., int]] | None:
     return _compiled_loop
 
 
-def compiled_or_none(function: Any) -> Callable[..., Any] | None:
-    """Return a function of this package compiled, or None where `compiler` is."""
-    return _kept(function) if _compiles() else None
-
-
 @cache
-def _compiles() -> bool:
-    return compiler() is not None
-
-
-@cache
-def _kept(function: FunctionType) -> Callable[..., Any]:
+def compiled_function(function: FunctionType) -> Callable[..., Any]:
     """Return a function compiled for the arguments that it gets, kept on disk."""
     import numba
 

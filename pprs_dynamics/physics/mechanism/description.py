@@ -81,6 +81,14 @@ class Joint:
     lower, upper, speed, effort : float
         Limits, infinite where there are none.
     mimic : Mimic, optional
+    start : float, optional
+        Position in which the file places it, where that is not 0.
+    armature, damping, dry : float
+        Inertia of the rotor, viscous and dry friction, of a format that has them.
+    reduction : float, optional
+        Turns of the motor per turn of the joint.
+    spring : (float, float), optional
+        Stiffness, and where it is relaxed.
     """
 
     name: str
@@ -94,6 +102,12 @@ class Joint:
     speed: float = np.inf
     effort: float = np.inf
     mimic: Mimic | None = None
+    start: float | None = None
+    armature: float = 0.0
+    damping: float = 0.0
+    dry: float = 0.0
+    reduction: float | None = None
+    spring: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +133,16 @@ class Loop:
 
 
 @dataclass(frozen=True, eq=False)
+class Transmission:
+    """A gear between motors and joints; `reduction`, motor over joint, of a simple one."""
+
+    name: str
+    kind: str
+    joints: tuple[str, ...]
+    reduction: float | None
+
+
+@dataclass(frozen=True, eq=False)
 class Description:
     """Description of a robot: links, joints, closures.
 
@@ -132,6 +156,11 @@ class Description:
         SHA-256 of the file.
     loops : tuple of Loop
         Of a format that has them.
+    gravity : (3,) tuple, optional
+        In the frame of its root, of a format that has it [m/s^2].
+    remarks : tuple of str
+        Sentences on what looks wrong in it, and on what it holds that is not used.
+    transmissions : tuple of Transmission
     """
 
     path: str
@@ -139,6 +168,9 @@ class Description:
     joints: dict[str, Joint]
     digest: str
     loops: tuple[Loop, ...] = ()
+    gravity: tuple[float, float, float] | None = None
+    remarks: tuple[str, ...] = ()
+    transmissions: tuple[Transmission, ...] = ()
 
 
 def inertial_in(frame: Frame, parameters: Array) -> Array:

@@ -32,8 +32,12 @@ FEW = 8  # samples, up to which floats are faster than arrays
 # Loading what is compiled takes 0.9 s of processor time; on arrays a sample takes 1 us more, a call
 # 0.1 ms.
 PAYS, CALL = 500_000, 100  # samples
+# A function over the tables of a mechanism takes longer without a compiler: a sample 0.1 ms, a call
+# 5 ms and more (hexapod), of which a call of the forces makes four.
+TREE_SAMPLE, TREE_CALL = 100, 5_000  # of such samples
 
 _loops: dict[Kernel, Callable[..., int]] = {}
+_functions: dict[Kernel, Callable[..., Any]] = {}
 _compile: Callable[[Kernel, tuple[Any, ...]], Callable[..., int]] | None = None
 _decided = False
 _plain_samples = 0  # that may still be evaluated before compiling pays
@@ -87,22 +91,53 @@ def evaluate(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) 
     tables : arrays
         C-contiguous; the first is (N, k), N samples.
     """
-    global _plain_samples
     loop = _loops.get(kernel)
     if loop is not None:
         return loop(parameters.row, *tables)
-    if _plain_samples > 0 and not _decided:
-        _plain_samples -= len(tables[0]) + CALL
-        return evaluate_plainly(kernel, parameters, *tables)
-    # Who compiles in the background wants answers meanwhile.
-    elsewhere = _compiling and threading.get_ident() not in _compiling
-    if elsewhere or not is_compiled():
+    if _is_plain(len(tables[0]) + CALL):
         return evaluate_plainly(kernel, parameters, *tables)
     assert _compile is not None
     loop = _compile(kernel, parameters.named)
     first = loop(parameters.row, *tables)
     _loops[kernel] = loop  # only now: another thread would wait for the compiler
     return first
+
+
+def compiled_or_none(function: Kernel, samples: int) -> Callable[..., Any] | None:
+    """Return a function over a mechanism's tables compiled, or None where NumPy is to do.
+
+    Parameters
+    ----------
+    function : function
+        Over all samples, with loops; see `compilation.compiled_function`.
+    samples : int
+        That it is about to be called for.
+    """
+    ready = _functions.get(function)
+    if ready is not None:
+        return ready
+    if _is_plain(TREE_SAMPLE * samples + TREE_CALL):
+        return None
+    from pprs_dynamics.physics.mechanism.compilation import compiled_function
+
+    compiled = compiled_function(function)
+
+    def first(*arguments: Any) -> Any:
+        result = compiled(*arguments)
+        _functions[function] = compiled  # only now: another thread would wait for the compiler
+        return result
+
+    return first
+
+
+def _is_plain(samples: int) -> bool:
+    """Return whether as many samples are to be evaluated without compiled code now."""
+    global _plain_samples
+    if _plain_samples > 0 and not _decided:
+        _plain_samples -= samples
+        return True
+    # Who compiles in the background wants answers meanwhile.
+    return bool(_compiling and threading.get_ident() not in _compiling) or not is_compiled()
 
 
 def postpone_compiling() -> None:

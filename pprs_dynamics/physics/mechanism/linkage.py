@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.compilation import compiled_or_none
+from pprs_dynamics.physics.mechanism.evaluation import compiled_or_none
 from pprs_dynamics.physics.mechanism.linkage_equations import (
     JointFriction,
     Loads,
@@ -189,7 +189,7 @@ def follow(t: Tables, home: Array, q: Array, v: Array, a: Array, start: Array | 
     m.q[:, t.drives] = q
     passive_of, drive_of = (columns_of(which, len(home)) for which in (t.passive, t.drives))
     v, a = (np.ascontiguousarray(values, dtype=float) for values in (v, a))
-    loop = compiled_or_none(_follow)
+    loop = compiled_or_none(_follow, len(q))
     if loop is not None:
         begin = np.array(home if start is None else start)
         return m, int(loop(t, m, begin, home, v, a, passive_of, drive_of))
@@ -207,7 +207,7 @@ def openings(t: Tables, m: Motion) -> Array:
     The rows may be others than those that the motion was closed by.
     """
     found = np.zeros((len(m.q), len(t.row_loop)))
-    loop = compiled_or_none(_openings)
+    loop = compiled_or_none(_openings, len(m.q))
     if loop is not None:
         loop(t, m, found)
     else:
@@ -229,7 +229,7 @@ def press(t: Tables, m: Motion, inertial: Array, gravity: Array, wrenches: Wrenc
     With or without reactions of closures.
     """
     o = new_loads(t, m)
-    loop = compiled_or_none(_press)
+    loop = compiled_or_none(_press, len(m.q))
     if loop is not None:
         loop(t, m, inertial, gravity, wrenches, with_reactions, o)
         return o
@@ -246,7 +246,7 @@ def twists(t: Tables, m: Motion) -> tuple[Array, Array]:
     """Return angular and linear velocities of links per rate of drives, (N, J + 1, 3, D)."""
     shape = (len(m.q), len(t.parent), 3, len(t.drives))
     W, U = np.zeros(shape), np.zeros(shape)
-    loop = compiled_or_none(_twist)
+    loop = compiled_or_none(_twist, len(m.q))
     if loop is not None:
         loop(t, m, W, U)
     else:
@@ -257,7 +257,7 @@ def twists(t: Tables, m: Motion) -> tuple[Array, Array]:
 def friction_efforts(t: Tables, m: Motion, o: Loads, friction: JointFriction, W: Array) -> Array:
     """Return the drives' efforts against friction of passive joints, (N, D)."""
     efforts = np.zeros((len(m.q), len(t.drives)))
-    loop = compiled_or_none(_rub)
+    loop = compiled_or_none(_rub, len(m.q))
     if loop is not None:
         loop(t, m, o, friction, W, efforts)
     else:
@@ -271,7 +271,7 @@ def survey(t: Tables, q: Array, columns: Integers) -> tuple[Array, Array, Motion
     m.q[0] = q
     column_of = columns_of(columns, len(q))
     gaps, J = np.zeros(len(t.row_loop)), np.zeros((len(t.row_loop), max(1, len(columns))))
-    loop = compiled_or_none(_survey)
+    loop = compiled_or_none(_survey, 1)
     if loop is not None:
         loop(t, motion_at(m, 0), column_of, gaps, J)
     else:

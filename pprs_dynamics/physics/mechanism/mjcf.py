@@ -5,11 +5,14 @@
 
 Hinges, slides, balls and free joints make the tree; `connect`, `weld` and linear `joint`
 constraints its loops and couplings. Several joints on one body are as many links without mass.
+Positions are MuJoCo's, which stands at `ref` where a body is placed. What a mechanism cannot have
+is refused by name.
 """
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -33,6 +36,8 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.physics.mechanism.urdf import read_content
 
 WORLD = 'world'
+# Numbers of parts that a mechanism here has not got, and what they are.
+FOREIGN_PARTS = {'ntendon': 'tendons', 'nflex': 'flexible bodies', 'nplugin': 'plugins'}
 
 
 def read_mjcf(path: str) -> Description:
@@ -73,12 +78,38 @@ class _Reader:
 
     def description(self, digest: str) -> Description:
         """Return the description."""
+        self._require_known_forces()
         links: dict[str, Array] = {WORLD: np.zeros(PARAMETERS)}
         joints: dict[str, Joint] = {}
         for b in range(1, self.model.nbody):
             self._body(b, links, joints)
         loops = self._constraints(joints)
-        return Description(self.path, links, joints, digest, tuple(loops))
+        off = self.model.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+        x, y, z = np.zeros(3) if off else self.model.opt.gravity
+        return Description(self.path, links, joints, digest, tuple(loops),
+                           (float(x), float(y), float(z)), tuple(self._remarks()))
+
+    def _require_known_forces(self) -> None:
+        """Raise ModelError for forces that no part of a mechanism here stands for."""
+        model = self.model
+        for name, what in FOREIGN_PARTS.items():
+            if getattr(model, name, 0):
+                raise ModelError('robot.mjcf', self.path, f'have no {what}: they are not covered')
+        for name in ('density', 'viscosity'):
+            if value := float(getattr(model.opt, name)):
+                raise ModelError('robot.mjcf', f'{name} {value:g}', 'have no medium about the '
+                                 f'robot: take {name} off <option>, and let diagnose find the drag')
+        for b in range(1, model.nbody):
+            if value := float(model.body_gravcomp[b]):
+                raise ModelError('robot.mjcf', self.bodies[b], 'weigh what it weighs: take '
+                                 f'gravcomp="{value:g}" off')
+
+    def _remarks(self) -> Iterator[str]:
+        """Yield sentences on what is not used."""
+        balls = [self.names[k] for k in range(self.model.njnt) if self.model.jnt_limited[k]
+                 and self.model.jnt_type[k] == self.mujoco.mjtJoint.mjJNT_BALL]
+        if balls:
+            yield f'the range of {", ".join(balls)} is not used: a ball has no limits here'
 
     def _body(self, b: int, links: dict[str, Array], joints: dict[str, Joint]) -> None:
         model = self.model
@@ -93,6 +124,9 @@ class _Reader:
         for k in range(first, first + count):
             kind = int(model.jnt_type[k])
             axes, kinds, place = [model.jnt_axis[k].copy()], [REVOLUTE], model.jnt_pos[k].copy()
+            ref = float(model.qpos0[model.jnt_qposadr[k]])
+            if kind in (self.mujoco.mjtJoint.mjJNT_FREE, self.mujoco.mjtJoint.mjJNT_BALL):
+                self._require_bare(k)
             if kind == self.mujoco.mjtJoint.mjJNT_FREE:
                 joints[self.names[k]] = Joint(self.names[k], FLOATING, parent, name, at,
                                               np.array([1.0, 0, 0]))
@@ -100,7 +134,7 @@ class _Reader:
             if kind == self.mujoco.mjtJoint.mjJNT_SLIDE:
                 kinds, place = [PRISMATIC], np.zeros(3)
             elif kind == self.mujoco.mjtJoint.mjJNT_BALL:
-                axes, kinds = list(np.eye(3)), [REVOLUTE] * 3
+                axes, kinds, ref = list(np.eye(3)), [REVOLUTE] * 3, 0.0
             for n, (axis, one) in enumerate(zip(axes, kinds, strict=True)):
                 own = self.names[k] if len(axes) == 1 else f'{self.names[k]}_{"xyz"[n]}'
                 last = k == first + count - 1 and n == len(axes) - 1
@@ -109,11 +143,50 @@ class _Reader:
                 links[child] = np.zeros(PARAMETERS)
                 lower, upper = (model.jnt_range[k] if model.jnt_limited[k] and len(axes) == 1
                                 else (-np.inf, np.inf))
-                joints[own] = Joint(own, one, parent, child, at @ Frame(np.eye(3), place), axis,
-                                    float(lower), float(upper))
+                back = (Frame(p=-ref * axis) if one == PRISMATIC
+                        else Frame(_turned(self.mujoco, axis, -ref)))
+                joints[own] = Joint(
+                    own, one, parent, child, at @ Frame(np.eye(3), place) @ back, axis,
+                    float(lower), float(upper), effort=self._effort(k), start=ref or None,
+                    **({} if len(axes) > 1 else self._own_forces(k)))
                 parent, at = child, Frame(np.eye(3), -place)
                 if last:
                     joints[f'{name}_on'] = Joint(f'{name}_on', FIXED, parent, name, at, axis)
+
+    def _own_forces(self, k: int) -> dict[str, Any]:
+        """Return rotor, friction and spring of a hinge or slide."""
+        model, d = self.model, int(self.model.jnt_dofadr[k])
+        for name, of in (('dof_dampingpoly', d), ('jnt_stiffnesspoly', k)):
+            if np.any(getattr(model, name, np.zeros((of + 1, 1)))[of]):
+                raise ModelError('robot.mjcf', self.names[k], f'have no {name[4:]}: damping and '
+                                 'stiffness are constants here')
+        stiffness = float(model.jnt_stiffness[k])
+        relaxed = float(model.qpos_spring[model.jnt_qposadr[k]])
+        return {'armature': float(model.dof_armature[d]), 'damping': float(model.dof_damping[d]),
+                'dry': float(model.dof_frictionloss[d]),
+                'spring': (stiffness, relaxed) if stiffness else None}
+
+    def _require_bare(self, k: int) -> None:
+        """Raise ModelError for a ball or free joint with forces of its own."""
+        model, d = self.model, int(self.model.jnt_dofadr[k])
+        for name, value in (('armature', model.dof_armature[d]), ('damping', model.dof_damping[d]),
+                            ('frictionloss', model.dof_frictionloss[d]),
+                            ('stiffness', model.jnt_stiffness[k])):
+            if value:
+                raise ModelError('robot.mjcf', self.names[k], f'have no {name} ({value:g}): of '
+                                 'joints, hinges and slides alone may; take it off')
+
+    def _effort(self, k: int) -> float:
+        """Return the largest effort of a joint: by its own range, and those of its motors."""
+        model = self.model
+        largest = float(np.min(np.abs(model.jnt_actfrcrange[k]))) if (
+            model.jnt_actfrclimited[k]) else np.inf
+        for a in range(model.nu):
+            if (model.actuator_trntype[a] == self.mujoco.mjtTrn.mjTRN_JOINT
+                    and model.actuator_trnid[a, 0] == k and model.actuator_forcelimited[a]):
+                largest = min(largest, float(np.min(np.abs(model.actuator_forcerange[a]))
+                                             * abs(model.actuator_gear[a, 0])))
+        return largest
 
     def _inertial(self, b: int) -> Array:
         model = self.model
@@ -143,8 +216,9 @@ class _Reader:
                 frames = [Frame(np.eye(3), numbers[:3].copy()),
                           Frame(np.eye(3), numbers[3:6].copy())]
             else:
-                # Pose of the second body in the first, and a point of the second.
-                frames = [Frame(_matrix(self.mujoco, numbers[6:10]), numbers[3:6].copy()), Frame()]
+                # A point and the attitude of the second body in the first, and that point in it.
+                frames = [Frame(_matrix(self.mujoco, numbers[6:10]), numbers[3:6].copy()),
+                          Frame(p=numbers[:3].copy())]
             loops.append(Loop(name, 'spherical' if kind == kinds.mjEQ_CONNECT else 'fixed',
                               self.bodies[a], frames[0], self.bodies[b], frames[1]))
         return loops
@@ -153,12 +227,21 @@ class _Reader:
         if np.any(numbers[2:5]) or b < 0:
             raise ModelError('robot.mjcf', name, 'be linear in another joint: position = c0 + c1 '
                              'times its position')
-        own = joints[self.names[a]]
-        joints[own.name] = replace(own, mimic=Mimic(self.names[b], float(numbers[1]),
-                                                    float(numbers[0])))
+        # Both count from where their bodies are placed.
+        y, x = (float(self.model.qpos0[self.model.jnt_qposadr[k]]) for k in (a, b))
+        own, ratio = joints[self.names[a]], float(numbers[1])
+        joints[own.name] = replace(own, mimic=Mimic(self.names[b], ratio,
+                                                    y + float(numbers[0]) - ratio * x))
 
 
 def _matrix(mujoco: Any, quaternion: Array) -> Array:
     found = np.empty(9)
     mujoco.mju_quat2Mat(found, np.asarray(quaternion, dtype=float))
     return found.reshape(3, 3)
+
+
+def _turned(mujoco: Any, axis: Array, angle: float) -> Array:
+    """Return the rotation about an axis."""
+    quaternion = np.empty(4)
+    mujoco.mju_axisAngle2Quat(quaternion, axis, angle)
+    return _matrix(mujoco, quaternion)

@@ -185,7 +185,7 @@ class _Builder:
                     self.rows[joint.name] = added
                     self.links[joint.child] = (added, Frame())
                     if joint.mimic is None:
-                        self._coordinate(added, joint.name, home.get(joint.name),
+                        self._coordinate(added, joint.name, home.get(joint.name, joint.start),
                                          joint.lower, joint.upper)
                     else:
                         followers.append((added, joint))

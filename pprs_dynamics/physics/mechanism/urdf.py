@@ -1,13 +1,20 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Robot descriptions from URDF: links with their inertia, joints with their limits."""
+"""Robot descriptions from URDF: links with their inertia, joints with their limits.
+
+Closures are read as `<constraint>`, in the form that is proposed for urdfdom (pull request 264);
+gears from `<transmission>`. What is xacro yet is run through the package of that name, if it is
+installed.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
@@ -22,11 +29,15 @@ from pprs_dynamics.physics.mechanism.description import (
     PARAMETERS,
     PRISMATIC,
     REVOLUTE,
+    TURNING,
     Description,
     Frame,
     Joint,
+    Loop,
     Mimic,
+    Transmission,
     body_at,
+    principal_inertia,
     rotation_of,
 )
 from pprs_dynamics.system.input_files import require_file
@@ -34,6 +45,20 @@ from pprs_dynamics.system.input_files import require_file
 LARGEST_FILE = 20_000_000  # bytes; descriptions of robots without meshes have some 100 kB
 Item = TypeVar('Item')
 KINDS = (REVOLUTE, CONTINUOUS, PRISMATIC, FIXED, FLOATING)
+# Macros, and expressions in attributes, as xacro has them.
+XACRO = re.compile(rb'<xacro:|=["\'][^"\']*\$[{(]')
+# Types of <constraint>, as those of joints, and what they are here.
+CLOSURES = {'fixed': 'fixed', 'revolute': 'revolute', 'continuous': 'revolute',
+            'prismatic': 'prismatic', 'cylindrical': 'cylindrical', 'universal': 'universal',
+            'spherical': 'spherical', 'ball': 'spherical'}
+REDUCTIONS = ('mechanicalReduction', 'mechanical_reduction')
+DYNAMICS = ('damping', 'friction')
+ROUNDED = 0.01  # by which moments of inertia may break a rule: files give two digits
+TINY = 1e-9  # [kg m^2] of it, whatever the size
+# Radius of gyration over the length of all links in a row: beyond it a body would be ten times as
+# long as its robot, while a wrong unit, mm^2 for m^2, makes it a thousand times as large.
+LARGEST_GYRATION = 3.0
+MOST_NAMES = 8  # in a sentence
 
 
 def read_content(path: str) -> bytes:
@@ -58,7 +83,32 @@ def read_urdf(path: str) -> Description:
     UnreadableFileError
         Where the file is missing, no URDF, or does not make a tree.
     """
-    return _described(read_content(path), str(path))
+    return _described(expanded(path), str(path))
+
+
+def expanded(path: str) -> bytes:
+    """Return the URDF in a file, with xacro in it run through the `xacro` package.
+
+    Raises
+    ------
+    UnreadableFileError
+        Where the file cannot be read, or holds xacro that cannot be run.
+    """
+    content = read_content(path)
+    if not XACRO.search(content):
+        return content
+    try:
+        import xacro
+    except ImportError:
+        raise UnreadableFileError(path, 'holds xacro, which is no URDF yet: run `xacro '
+                                  f'{Path(path).name} > robot.urdf` and name that, or `pip '
+                                  'install xacro`') from None
+    try:
+        text: str = xacro.process_file(path).toxml()
+    except Exception as error:  # of any kind, as of what its expressions evaluate
+        reason = ' '.join(str(error).split()) or type(error).__name__
+        raise UnreadableFileError(path, f'holds xacro that cannot be run: {reason}') from None
+    return text.encode()
 
 
 @lru_cache(maxsize=16)
@@ -72,15 +122,121 @@ def _described(content: bytes, path: str) -> Description:
     links = _read(path, robot.findall('link'), _inertial)
     joints = _read(path, robot.findall('joint'), _joint)
     _require_tree(path, links, joints)
-    return Description(path, links, joints, hashlib.sha256(content).hexdigest())
+    try:
+        transmissions = tuple(map(_transmission, robot.findall('transmission')))
+    except ValueError as error:
+        raise UnreadableFileError(path, str(error)) from None
+    for each in transmissions:
+        for name in each.joints if each.reduction else ():
+            if name in joints and joints[name].kind in TURNING:
+                joints[name] = replace(joints[name], reduction=each.reduction)
+    loops = tuple(_read(path, robot.findall('constraint'), _constraint).values())
+    for loop in loops:
+        for link in (loop.a, loop.b):
+            if link not in links:
+                raise UnreadableFileError(path, f'constraint {loop.name} is on {link}, which is '
+                                          'no link')
+    remarks = (*_impossible_bodies(links, joints), *_unused(robot, joints, transmissions))
+    return Description(path, links, joints, hashlib.sha256(content).hexdigest(), loops,
+                       remarks=remarks, transmissions=transmissions)
 
 
-def transmissions(path: str) -> list[tuple[str, list[str]]]:
-    """Return the kinds of the transmissions of a URDF in lower case, and their joints."""
-    robot = ElementTree.fromstring(read_content(path))
-    return [((each.findtext('type') or each.get('type') or '').lower(),
-             [joint.get('name', '') for joint in each.findall('joint')])
-            for each in robot.findall('transmission')]
+def _transmission(element: ElementTree.Element) -> Transmission:
+    kind = next((text.strip() for text in (element.findtext('type'), element.get('type'),
+                                           element.findtext('plugin')) if text), '')
+    reductions = [found.text or '' for side in ('joint', 'actuator') for tag in REDUCTIONS
+                  for found in element.findall(f'{side}/{tag}')]
+    reduction = None
+    if reductions and 'simple' in kind.lower():
+        try:
+            reduction = abs(float(reductions[0]))
+        except ValueError:
+            reduction = 0.0
+        if not 0 < reduction < np.inf:
+            raise ValueError(f'the reduction of transmission {element.get("name", "")} is '
+                             f'"{reductions[0]}", must be a number other than 0')
+    return Transmission(element.get('name', ''), kind, tuple(
+        joint.get('name', '') for joint in element.findall('joint')), reduction)
+
+
+def _constraint(element: ElementTree.Element) -> Loop:
+    kind = CLOSURES.get(element.get('type', ''))
+    if kind is None:
+        raise ValueError(f'its type is "{element.get("type", "")}", must be one of '
+                         f'{", ".join(CLOSURES)}')
+    sides = []
+    # Both axes are the joint's own; of a universal joint they are its two.
+    for side, to in (('parent', 0 if kind == 'universal' else 2),
+                     ('child', 1 if kind == 'universal' else 2)):
+        link, origin = element.find(side), element.find(f'{side}_origin')
+        if link is None:
+            raise ValueError(f'it is without <{side} link="...">, must have one')
+        axis = np.array(_numbers(element.find(f'{side}_axis'), 'xyz', '1 0 0'))
+        if not np.linalg.norm(axis) > 0:
+            raise ValueError(f'its <{side}_axis> has no length')
+        placed = Frame.of(_numbers(origin, 'xyz', '0 0 0'), _numbers(origin, 'rpy', '0 0 0'))
+        sides.append((link.get('link', ''), placed @ Frame(_turn_to(to, axis))))
+    (a, frame_a), (b, frame_b) = sides
+    return Loop(element.get('name', ''), kind, a, frame_a, b, frame_b)
+
+
+def _turn_to(number: int, axis: np.ndarray) -> np.ndarray:
+    """Return a rotation that takes an axis of a frame to a direction; the same for the same."""
+    columns = np.zeros((3, 3))
+    columns[:, number] = axis / np.linalg.norm(axis)
+    across = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    columns[:, (number + 1) % 3] = np.cross(columns[:, number], across)
+    columns[:, (number + 1) % 3] /= np.linalg.norm(columns[:, (number + 1) % 3])
+    columns[:, (number + 2) % 3] = np.cross(columns[:, number], columns[:, (number + 1) % 3])
+    return columns
+
+
+def _impossible_bodies(links: dict[str, np.ndarray], joints: dict[str, Joint]) -> Iterator[str]:
+    """Yield sentences on bodies whose inertia no body can have."""
+    reach = sum(float(np.linalg.norm(joint.frame.p)) for joint in joints.values()) + max(
+        (float(np.linalg.norm(p[1:4])) / p[0] for p in links.values() if p[0] > 0), default=0.0)
+    for name, parameters in links.items():
+        if not parameters[0] > 0:
+            if np.any(parameters):
+                yield f'link {name} has inertia without mass: no body has'
+            continue
+        mass, _, moments, _ = principal_inertia(parameters)
+        low, middle, high = np.sort(moments)
+        listed = ', '.join(f'{each:.3g}' for each in (low, middle, high))
+        if low < -ROUNDED * high or high > (1 + ROUNDED) * (low + middle) + TINY:
+            yield (f'link {name} is no body: its principal moments of inertia are {listed} '
+                   'kg m^2, of which none may be negative, nor greater than the sum of the others')
+        gyration = float(np.sqrt(max(high, 0.0) / mass))
+        if reach > 0 and gyration > LARGEST_GYRATION * reach:
+            yield (f'link {name} has {high:.3g} kg m^2 in {mass:.3g} kg, a radius of gyration of '
+                   f'{gyration:.3g} m in a robot that reaches {reach:.3g} m: is it in kg mm^2 '
+                   f'({1e-6 * high:.3g} kg m^2), or g mm^2?')
+
+
+def _unused(robot: ElementTree.Element, joints: dict[str, Joint],
+            transmissions: tuple[Transmission, ...]) -> Iterator[str]:
+    """Yield sentences on what is in the file and not in the model."""
+    carried = {joint.child for joint in joints.values()}
+    hollow = [link.get('name', '') for link in robot.findall('link')
+              if link.get('name') in carried and link.find('inertial') is None
+              and link.find('collision') is not None]
+    if hollow:
+        yield f'{_listed(hollow)} have a shape and no <inertial>: they weigh nothing here'
+    rubbing = [joint.get('name', '') for joint in robot.findall('joint')
+               if any(_number(joint.find('dynamics'), key, 0.0) for key in DYNAMICS)]
+    if rubbing:
+        yield (f'<dynamics> of {_listed(rubbing)} is not used: friction is what the model file '
+               'says, or fit finds')
+    used = {name for name, joint in joints.items() if joint.reduction}
+    left = [each.name or each.kind for each in transmissions
+            if not each.joints or not used & set(each.joints)]
+    if left:
+        yield (f'<transmission> {_listed(left)} is not used: only a simple one with a reduction, '
+               'of a joint that turns, is; write gear_ratio')
+
+
+def _listed(names: list[str]) -> str:
+    return ', '.join(names[:MOST_NAMES]) + (', ...' if len(names) > MOST_NAMES else '')
 
 
 def _read(path: str, elements: list[ElementTree.Element],

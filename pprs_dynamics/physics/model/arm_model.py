@@ -36,7 +36,12 @@ from pprs_dynamics.physics.model.keys import ARM as ARM_BLOCK
 from pprs_dynamics.physics.model.keys import GAIN, Key, drives_key, keys_of, mechanism_block
 from pprs_dynamics.physics.model.limits import JointLimits
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
-from pprs_dynamics.physics.model.robot_block import joint_radii, passive_friction, read_structure
+from pprs_dynamics.physics.model.robot_block import (
+    described_values,
+    joint_radii,
+    passive_friction,
+    read_structure,
+)
 
 # Reversals of friction take a hundredth of a period; what is faster is ripple of motor and gear.
 BLOCKS_PER_PERIOD = 100.0
@@ -151,6 +156,7 @@ class ArmModel(ForceModel):
                 raise ModelError(listed, parameters[listed], 'name at least one joint')
             values = checked_values(parameters)
             structure = read_structure(values, Path(source).parent)
+            values.update(described_values(structure, values))
             robot = _mechanism(structure, values)
             effects = (AxisFriction(values['friction.viscous'], values['friction.coulomb']),
                        AxisOffset(values['friction.offset']), *passive_friction(structure, values),

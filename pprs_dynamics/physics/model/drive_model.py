@@ -151,6 +151,8 @@ class DriveModel(ForceModel):
             return self.forces_at(self.mechanism(motion), state)
         parts, mechanism = _parts(table), one_pass.mechanism(motion, table)
         added = self.effects[2:]
+        if state is not None:
+            state.begin(motion.time)
         return (self._with_effects(added, parts, mechanism, state, DriveForces) if added
                 else DriveForces(table[0], parts, mechanism))
 

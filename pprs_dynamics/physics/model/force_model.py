@@ -74,10 +74,23 @@ F = TypeVar('F', bound=Forces)
 
 
 class ModelState:
-    """Memory of effects between calls; made by `initial_state` of a model."""
+    """Memory of effects between calls; made by `initial_state` of a model.
 
-    def __init__(self, memories: dict[str, Any]) -> None:
-        self.memories = memories
+    Parameters
+    ----------
+    memories : dict of str to object
+        By effect.
+    start : float, optional
+        When the motion began [s]; None before its first sample.
+    """
+
+    def __init__(self, memories: dict[str, Any], start: float | None = None) -> None:
+        self.memories, self.start = memories, start
+
+    def begin(self, time: Array | None) -> None:
+        """Take the first sample of times (N,) as the start, where that is not known yet."""
+        if self.start is None and time is not None and len(time):
+            self.start = float(time[0])
 
     @property
     def has_memory(self) -> bool:
@@ -99,7 +112,7 @@ class ModelState:
             except Exception as error:  # another package's effect may keep anything
                 raise EffectError(name, 'its memory cannot be copied '
                                   f'({type(error).__name__}: {error})') from error
-        return ModelState(copied)
+        return ModelState(copied, self.start)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -335,6 +348,7 @@ class ForceModel(ABC):
                       state: ModelState | None, kind: type[F]) -> F:
         """Return the forces of parts that are there and of effects."""
         state = self.initial_state() if state is None else state
+        state.begin(mechanism.time)
         for effect in self.effects:
             effect.check_memory(state.memories)
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
@@ -364,23 +378,29 @@ class ForceModel(ABC):
         start : float, optional
             When the recording began [s], where that is before the first sample.
         """
-        return ModelState({effect.name: effect.initial_memory(start) for effect in self.effects})
+        return ModelState({effect.name: effect.initial_memory(start) for effect in self.effects},
+                          start)
 
     def continued_state(self, model: Self, state: ModelState) -> ModelState:
         """Return a state that goes on from another model's for the effects that both have.
 
-        The other state must not be used any more: memories are handed over, not copied.
+        What a machine remembers does not change with a parameter: memories are kept whatever the
+        parameters are, and new effects begin when the motion began. The other state must not be
+        used any more: memories are handed over, not copied.
         """
-        before = {effect.name: effect for effect in model.effects
-                  if isinstance(effect, CatalogueEffect)}
-        continued = self.initial_state()
+        continued = self.initial_state(state.start)
+        known = {effect.name for effect in model.effects} & state.memories.keys()
         for effect in self.effects:
-            other = before.get(effect.name)
-            # By what files say: attributes of another package's effect may be of any type.
-            if other is not None and isinstance(effect, CatalogueEffect) and (
-                    effect.to_file() == other.to_file()):
-                continued.memories[effect.name] = state.memories[effect.name]
+            if effect.name in known:
+                continued.memories[effect.name] = effect.continued_memory(
+                    continued.memories[effect.name], state.memories[effect.name])
         return continued
+
+    @property
+    def assumed_at_start(self) -> dict[str, str]:
+        """What a fresh state takes for granted, by effect with a memory."""
+        return {effect.name: effect.assumed_at_start for effect in self.effects
+                if effect.assumed_at_start}
 
     def sound_at(self, motion: Any) -> Self:
         """Return the model without those effects of other packages that fail for a motion.

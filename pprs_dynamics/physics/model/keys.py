@@ -222,6 +222,8 @@ def mechanism_block(names: Iterable[str]) -> str:
 def mechanism_keys(block: str, count: int) -> dict[str, Key]:
     """Return the keys of a mechanism with that many drives, but for those by names of its own."""
     zeros, ones = (0.0,) * count, (1.0,) * count
+    # What a description may hold; an empty list is what it says.
+    described: dict[str, Any] = {'may_be_empty': True, 'default': ()}
     listed = drives_key(block)
 
     def drives(name: str, description: str, unit: str = '', **more: Any) -> Key:
@@ -247,19 +249,21 @@ def mechanism_keys(block: str, count: int) -> dict[str, Key]:
         Key(listed, 'revolute and prismatic joints that are driven', size=count, is_text=True),
         drives(block + GAIN, 'torque, or force, per ampere', 'N m/A, N/A', positive=True,
                default=ones),
-        drives(f'{block}.gear_ratio', 'turns of the motor per turn of the joint', '',
-               positive=True, default=ones),
+        drives(f'{block}.gear_ratio', 'turns of the motor per turn of the joint; without it, as '
+               'the URDF says, else 1', '', positive=True, **described),
         Key(f'{block}.effort_unit', f'unit of the efforts of recordings; A: times {block}.gain',
             choices=EFFORT_UNITS, default=EFFORT_UNITS[0]),
-        Key(f'{block}.gravity', 'gravity in the base', 'm/s^2', size=3,
-            default=(0.0, 0.0, -9.81)),
-        drives(f'{block}.armature', 'inertia of the rotor, seen at the joint', 'kg m^2, kg',
-               lower=0),
+        Key(f'{block}.gravity', 'gravity in the base; without it, as the MJCF says, else -9.81 '
+            'along z', 'm/s^2', size=3, **described),
+        drives(f'{block}.armature', 'inertia of the rotor, seen at the joint; without it, as the '
+               'MJCF says, else 0', 'kg m^2, kg', lower=0, **described),
         links('links.mass', 'mass of what each joint moves up to the next', 'kg'),
         links('links.moment', 'x y z of mass times centre, in the frame of each joint', 'kg m'),
         links('links.inertia', 'xx yy zz xy xz yz about the origin of each joint', 'kg m^2'),
-        drives('friction.viscous', 'F_v, viscous friction', 'N m s/rad, N s/m', lower=0),
-        drives('friction.coulomb', 'F_c, dry friction', 'N m, N', lower=0),
+        drives('friction.viscous', 'F_v, viscous friction; without it, as the MJCF says, else 0',
+               'N m s/rad, N s/m', lower=0, **described),
+        drives('friction.coulomb', 'F_c, dry friction; without it, as the MJCF says, else 0',
+               'N m, N', lower=0, **described),
         drives('friction.offset', 'constant effort beside weight and friction', 'N m, N'),
         Key('friction.reversal_velocity', 'width in which sgn turns over', 'rad/s, m/s',
             positive=True, default=0.01),
@@ -353,7 +357,8 @@ NODE_KEYS = frozenset({
     'bandwidth', 'damping_ratio',
     'hidden_effects', 'hidden_scale', 'autostart', 'effort_limits', 'feedforward_scale',
     'limit_policy', 'missing_derivatives', 'timeout_action', 'warning_margin', 'lag_warning',
-    'action', 'controller_timeout', 'demo', 'max_ahead', 'max_duration',
+    'action', 'controller_timeout', 'demo', 'max_ahead', 'max_duration', 'ramp_time',
+    'stop_time',
     'use_sim_time', 'start_type_description_service'})
 NODE_PREFIXES = ('qos_overrides.',)
 

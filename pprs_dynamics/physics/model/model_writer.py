@@ -48,6 +48,7 @@ from pprs_dynamics.physics.model.parameter_file import (
 from pprs_dynamics.physics.model.uncertainties import UNCERTAINTIES
 from pprs_dynamics.system.bounded_yaml import check_bounds, check_size
 from pprs_dynamics.system.output_files import write_text
+from pprs_dynamics.system.package_files import located
 
 WRITTEN = ('effects', UNCERTAINTIES, BLOCK)  # blocks of commands; the rest is people's
 INDENT = '  '
@@ -82,7 +83,7 @@ def write_model(path: str | PathLike[str], values: Mapping[str, Any],
     for key in FILES:
         if values.get(key):
             # Files say where the URDF is from where they are.
-            urdf = Path(base or path).absolute().parent / values[key]
+            urdf = located(values[key], Path(base or path).absolute().parent)
             values = {**values, key: os.path.relpath(urdf, folder)}
     if base is None:
         text = format_model(values, str(path))

@@ -12,9 +12,10 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.errors import ModelError, UnreadableFileError
+from pprs_dynamics.errors import ModelError, UnreadableFileError, beside
 from pprs_dynamics.physics.model.keys import ADDED, NAMES
 from pprs_dynamics.system.bounded_yaml import parse, read_text
+from pprs_dynamics.system.plain_text import displayed
 
 PACKAGE = 'pprs_dynamics'
 DEFAULT_MODEL = 'config/paper.yaml'
@@ -43,7 +44,9 @@ def find_file(path: str | PathLike[str]) -> Path:
     own = Path(str(files(PACKAGE) / str(given)))
     if own.is_file():
         return own
-    raise UnreadableFileError(path, 'no such file, nor one of that name in the package')
+    close = beside(given)
+    raise UnreadableFileError(path, 'no such file, nor one of that name in the package'
+                              + (f' (did you mean {displayed(close)}?)' if close else ''))
 
 
 def default_parameters() -> dict[str, Any]:
@@ -61,7 +64,12 @@ def read_parameters(path: str | PathLike[str]) -> dict[str, Any]:
     ModelError
         For a list that mixes whole and decimal numbers, which ROS 2 refuses.
     """
-    return parse_parameters(read_text(path), path)
+    text = read_text(path)
+    if text.lstrip('\ufeff \r\n\t').startswith('<'):
+        raise UnreadableFileError(
+            path, 'a description of a robot, must be a model file: `pprs init '
+            f'{displayed(path)} RECORDING --output robot.yaml` writes one')
+    return parse_parameters(text, path)
 
 
 def parse_parameters(text: str, path: str | PathLike[str] = '') -> dict[str, Any]:

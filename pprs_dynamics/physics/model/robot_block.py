@@ -16,11 +16,13 @@ from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction, friction_rows
 from pprs_dynamics.physics.mechanism.description import Description, Frame, Loop
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
-from pprs_dynamics.physics.mechanism.urdf import read_urdf, transmissions
+from pprs_dynamics.physics.mechanism.urdf import read_urdf
 from pprs_dynamics.physics.model.keys import ARM, POSE, drives_key, mechanism_block
+from pprs_dynamics.system.package_files import located
 
 # Joints whose motors do not move one joint each.
 COUPLED = ('differential', 'fourbar')
+STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] where no description has it
 
 
 def read_structure(values: dict[str, Any], folder: Path) -> Structure:
@@ -39,13 +41,13 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
         raise ModelError(f'{block}.urdf', MISSING, f'be given, or {block}.mjcf instead')
     if len(given) > 1:
         raise ModelError(given[1], values[given[1]], f'not stand beside {given[0]}')
-    values[given[0]] = str((folder / values[given[0]]).resolve())
+    values[given[0]] = str(located(values[given[0]], folder))
     if given[0].endswith('mjcf'):
         from pprs_dynamics.physics.mechanism.mjcf import read_mjcf
         description = read_mjcf(values[given[0]])
     else:
         description = read_urdf(values[given[0]])
-        _require_one_motor_each(values, block)
+        _require_one_motor_each(description, values[drives_key(block)], block)
     own = tuple((key, value) for key, value in values.items()
                 if key.startswith((f'{block}.home.', f'{block}.loops.')))
     return _structure(description, block, values[f'{block}.base'], values[f'{block}.tool'],
@@ -72,6 +74,14 @@ def _structure(description: Description, block: str, base: str, tool: str,
     for name in poses:
         if name not in description.links:
             raise UnknownNameError('link', name, description.links, f'{block}.home')
+    if description.loops and block == ARM:
+        raise ModelError('arm.urdf', description.path, 'be of a robot without loops, but its '
+                         f'<constraint> {description.loops[0].name} closes one: write a block '
+                         '`robot`, with `drives` instead of `joints`')
+    for loop in description.loops:
+        if loop.name in loops:
+            raise ModelError(f'{block}.loops.{loop.name}', loop.kind, 'not stand in the file as '
+                             'well as in the description')
     closures = (*description.loops, *(Loop(
         name, one['type'], one['a.link'], Frame.of(one['a.xyz'], one['a.rpy']),
         one['b.link'], Frame.of(one['b.xyz'], one['b.rpy'])) for name, one in loops.items()))
@@ -79,12 +89,62 @@ def _structure(description: Description, block: str, base: str, tool: str,
                            lock_others=block == ARM)
 
 
-def _require_one_motor_each(values: Mapping[str, Any], block: str) -> None:
-    drives = values[drives_key(block)]
-    for kind, coupled in transmissions(values[f'{block}.urdf']):
-        if any(word in kind for word in COUPLED) and set(coupled) & set(drives):
-            raise ModelError(drives_key(block), coupled, 'have a motor each, but share a '
+def _require_one_motor_each(description: Description, drives: tuple[str, ...], block: str) -> None:
+    for each in description.transmissions:
+        kind = each.kind.lower()
+        if any(word in kind for word in COUPLED) and set(each.joints) & set(drives):
+            raise ModelError(drives_key(block), list(each.joints), 'have a motor each, but share a '
                              f'transmission {kind} in the URDF: coupled joints are not covered')
+
+
+def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return keys and values that the file leaves to the description, complete with defaults.
+
+    Raises
+    ------
+    ModelError
+        For what a description holds of a joint that has no place in a model.
+    """
+    block, joints = mechanism_block(values), structure.description.joints
+    drives = [joints[name] for name in structure.drives]
+    found: dict[str, Any] = {
+        f'{block}.gear_ratio': tuple(joint.reduction or 1.0 for joint in drives),
+        f'{block}.gravity': _gravity(structure),
+        f'{block}.armature': tuple(joint.armature for joint in drives),
+        'friction.viscous': tuple(joint.damping for joint in drives),
+        'friction.coulomb': tuple(joint.dry for joint in drives)}
+    found = {key: described for key, described in found.items() if not values[key]}
+    for name in structure.rows:
+        joint = joints[name]
+        if joint.spring is not None:
+            stiffness, relaxed = joint.spring
+            block_of_effect = f'{name}: {{stiffness: {stiffness:g}, position: {relaxed:g}}}'
+            way = ('take its stiffness off, and write effects: {active: [drive_spring], '
+                   f'drive_spring: {{{block_of_effect}}}}}'
+                   if name in structure.drives else 'springs of passive joints are not covered')
+            raise ModelError(f'{block}.mjcf', name, f'have no spring ({stiffness:g}): {way}')
+        if name in structure.drives:
+            continue
+        if joint.armature:
+            raise ModelError(f'{block}.mjcf', name, f'have no armature ({joint.armature:g}), as a '
+                             'joint without a motor: set its armature to 0')
+        given = f'friction.joints.{name}.'
+        if (joint.damping or joint.dry) and not any(key.startswith(given) for key in values):
+            found |= {f'{given}viscous': joint.damping, f'{given}torque': joint.dry,
+                      f'{given}coulomb': 0.0, f'{given}radius': 0.0}
+    return found
+
+
+def _gravity(structure: Structure) -> tuple[float, ...]:
+    """Return gravity in the base: the description's, which is in the frame of its root."""
+    description = structure.description
+    if description.gravity is None:
+        return STANDARD_GRAVITY
+    hung = {joint.child for joint in description.joints.values()}
+    root = next(link for link in description.links if link not in hung)
+    _, frame = structure.links[root]
+    turned = frame.R @ np.array(description.gravity)
+    return tuple(float(each) for each in turned)
 
 
 def joint_radii(values: Mapping[str, Any]) -> dict[str, float]:

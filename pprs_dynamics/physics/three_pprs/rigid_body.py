@@ -279,7 +279,7 @@ def solve_bodies(
     force, guide_load = np.empty((samples, 6)), np.empty((samples, 6))
     reactions = np.empty((samples, 18))
     loads = (np.zeros((samples, 9)) if load is None
-             else np.concatenate((load.wrench, load.hinge), axis=1))
+             else np.concatenate((load.wrench, np.broadcast_to(load.hinge, (samples, 3))), axis=1))
     parameters = robot.kernel_parameters.extended(BodyParameters, printed)
     evaluate(body_kernel, parameters, motion.rows, chains, inverse, loads, force, guide_load,
              reactions)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import struct
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from rclpy.serialization import deserialize_message, serialize_message
@@ -23,7 +23,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.samples import Indices
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.model.force_model import Forces
 from pprs_dynamics.ros.messages.conversions import (
     LATEST_SECOND,
     NANOSECONDS,
@@ -40,6 +39,14 @@ from pprs_dynamics.system.cdr import HEADER, STAMP, WORD
 
 SAMPLES = 2  # points after the first have another place than it
 MOMENT = 12 * NANOSECONDS + 345
+
+
+class HasDriveMotion(Protocol):
+    """What knows the motion of the drives."""
+
+    @property
+    def drive_motion(self) -> tuple[Array, ...]:
+        """Position, velocity and acceleration, (N, D) each."""
 
 
 class CommandBytes:
@@ -85,7 +92,7 @@ class CommandBytes:
         return bytes(template.data)
 
     def joint_trajectory(
-        self, start: int, offsets: Indices, forces: Forces, effort: Array,
+        self, start: int, offsets: Indices, forces: HasDriveMotion, effort: Array,
     ) -> bytes:
         """Return a trajectory_msgs/JointTrajectory of all samples.
 
@@ -95,7 +102,7 @@ class CommandBytes:
             Header stamp [ns].
         offsets : (N,) array of int
             time_from_start [ns].
-        forces : Forces
+        forces : Forces or DriveTrajectory
             For the drives' motion.
         effort : (N, D) array
         """
@@ -151,7 +158,7 @@ class CommandObjects:
         return joint_state(stamp, effort, position, velocity, self._names)
 
     def joint_trajectory(
-        self, start: int, offsets: Indices, forces: Forces, effort: Array,
+        self, start: int, offsets: Indices, forces: HasDriveMotion, effort: Array,
     ) -> JointTrajectory:
         """Return all samples; see `CommandBytes.joint_trajectory`."""
         return write_joint_trajectory(

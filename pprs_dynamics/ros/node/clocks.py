@@ -65,6 +65,11 @@ class CommandWatchdog:
         """Whether a command is in force that has not gone stale."""
         return self._end is not None
 
+    @property
+    def left(self) -> int:
+        """Until the end of the last trajectory [ns]; 0 where it has passed."""
+        return 0 if self._end is None else max(0, self._end - self._clock.now().nanoseconds)
+
     def feed(self, ahead: int) -> None:
         """Tell of a trajectory that ends that much from now [ns]; one in the past ends now."""
         end = self._clock.now().nanoseconds + max(ahead, 0)

@@ -17,10 +17,22 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.ros.node.clocks import steady_timer
 
 LOOK_PERIOD = 0.1  # [s] between looks at whether the server still lives
+DISCOVERY = 3.0  # [s] that a server may take to be found, after it or this node has started
 
 
 class ControllerError(PprsError):
-    """The server of the other action is not there, rejects a goal, or has fallen silent."""
+    """The server of the other action is not there, rejects a goal, or has fallen silent.
+
+    Parameters
+    ----------
+    text : str
+    began : bool
+        Whether it had accepted the goal, and the drives may be anywhere on the way.
+    """
+
+    def __init__(self, text: str, began: bool = False) -> None:
+        self.began = began
+        super().__init__(text)
 
 
 class GoalRelay:
@@ -66,7 +78,7 @@ class GoalRelay:
         ------
         ControllerError
         """
-        if not self.server_is_there():
+        if not await self._found():
             raise ControllerError(f'nobody serves {self._name}: is the controller active?')
         watched = _Watched(handle, duration)
         sent = self._client.send_goal_async(goal, feedback_callback=watched.on_feedback)
@@ -95,11 +107,33 @@ class GoalRelay:
             if said := await self._lost(answer, watched):
                 watched.cancel()
                 raise ControllerError(f'{said} in the middle of a goal; what the drives do now is '
-                                      'not known')
+                                      'not known', began=True)
             return answer.result()
         finally:
             watched.ended = True
             del self._running[bytes(watched.handle.goal_id.uuid)]
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether no goal is being followed."""
+        return not self._running
+
+    async def _found(self) -> bool:
+        """Return whether discovery knows a server, as soon as it does and after a while at most."""
+        if self.server_is_there():
+            return True
+        found: Future[bool] = Future()
+        deadline = time.monotonic() + DISCOVERY
+
+        def look() -> None:
+            if not found.done() and (self.server_is_there() or time.monotonic() > deadline):
+                found.set_result(self.server_is_there())
+
+        timer = steady_timer(self._node, LOOK_PERIOD, look)
+        try:
+            return bool(await found)
+        finally:
+            self._node.destroy_timer(timer)
 
     def cancel(self, handle: Any) -> None:
         """Cancel what was sent on for a goal, if anything was."""

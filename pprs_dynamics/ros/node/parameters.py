@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.errors import MISSING, ModelError
+from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
@@ -39,6 +39,7 @@ from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.model.parameter_values import is_known
 from pprs_dynamics.ros.node.provenance import folder_of, names_given
 from pprs_dynamics.ros.node.rclpy_internals import parameter_overrides
+from pprs_dynamics.system.package_files import located
 
 ACTIVE = 'effects.active'
 HISTORY = 'history.'
@@ -166,7 +167,7 @@ def declare_model(node: Node) -> list[str]:
         DriveModel.from_parameters(given)  # refuses it
     for key in FILES:
         if isinstance(given.get(key), str) and given[key]:
-            given[key] = str(folder_of(key) / given[key])
+            given[key] = str(located(given[key], folder_of(key)))
     # Of somebody's own robot what is missing must not become the paper's in silence.
     defaults = {} if has_model(given) else default_parameters()
     _declare_keys(node, keys_of(given), given, defaults)
@@ -251,10 +252,11 @@ def _type_of(key: Key) -> Parameter.Type:
 
 
 def refuse_unknown(node: Node) -> None:
-    """Raise ModelError where a parameter was given that neither node nor model has."""
-    for name, value in overrides(node).items():
+    """Raise UnknownNameError where a parameter was given that neither node nor model has."""
+    known = [*node.get_parameters_by_prefix('')]
+    for name in overrides(node):
         if not node.has_parameter(name) and not is_known(name):
-            raise ModelError(name, value, 'not be there: no such parameter')
+            raise UnknownNameError('parameter', name, known)
 
 
 def overrides(node: Node) -> dict[str, Any]:

@@ -61,5 +61,4 @@ class ExternalWrench(BodyEffect):
     def load(self, state: MechanismState | LinkageState) -> StructureLoad:
         """Return the wrench, the same for every sample."""
         wrench = np.array([self.values[p.name] for p in self.parameters])
-        samples = len(state.velocity)
-        return StructureLoad(np.tile(wrench, (samples, 1)), np.zeros((samples, 3)))
+        return StructureLoad(np.tile(wrench, (len(state.velocity), 1)))

@@ -19,6 +19,7 @@ class FrictionDrift(DriveEffect):
     """Friction that changes while the robot works: cold grease, seals that warm up."""
 
     name: ClassVar[str] = 'friction_drift'
+    assumed_at_start: ClassVar[str] = 'the drive is cold, the time of fading begins'
     is_friction: ClassVar[bool] = True
     linear = (Parameter('force', 'F', 'N', 'friction at the start beyond the later one', -1e6, 1e6,
                         scale=0.5),)

@@ -26,6 +26,7 @@ class Hysteresis(DriveEffect):
     """Elastic give of the contacts before they slide: preloaded ball guides, seals, belts."""
 
     name: ClassVar[str] = 'hysteresis'
+    assumed_at_start: ClassVar[str] = 'the contacts are relaxed, friction builds up first'
     is_friction: ClassVar[bool] = True
     linear = (Parameter('force', 'F', 'N', 'friction force that builds up', -1e6, 1e6, 0.0, 0.5),
               Parameter('coefficient', 'mu', '1', 'friction per guide load that builds up', -1e3,

@@ -47,4 +47,4 @@ class PlatformDrag(BodyEffect):
         motion = state.motion
         wrench = np.concatenate((self.values['coefficient'] * motion.linear_velocity,
                                  self.values['rotational'] * motion.angular_velocity), axis=1)
-        return StructureLoad(wrench, np.zeros((len(wrench), 3)))
+        return StructureLoad(wrench)

@@ -31,6 +31,7 @@ class TimeDelay(MeasurementEffect):
     """The recorder's effort is not of the recorder's positions' time."""
 
     name: ClassVar[str] = 'time_delay'
+    assumed_at_start: ClassVar[str] = 'the effort was what it is at the first sample'
     bends_columns: ClassVar[bool] = True
     idealised: ClassVar[bool] = False
     shows_at_reversals: ClassVar[bool] = True

@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A dead band of the effort sensor: y = F - b (F > b), F + b (F < -b), 0 between.
+
+A sensor effect of one's own, complete. It changes how all other effects show in the measured
+effort, and says so (`bends_columns`); the diagnosis needs nothing more. The package's own
+`effort_filter` is a sensor effect with a memory.
+
+References
+----------
+J. Fraden, Handbook of Modern Sensors, 5th ed., 2016, on dead bands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pprs_dynamics import Array, Card, DriveRange, MeasurementEffect, Parameter
+
+
+class SensorDeadBand(MeasurementEffect):
+    """A force sensor with play in its mount: small efforts do not reach it."""
+
+    name: ClassVar[str] = 'sensor_dead_band'
+    idealised: ClassVar[bool] = False
+    bends_columns: ClassVar[bool] = True
+    # No linear parameter: the shape says it all.
+    linear = ()
+    shape = (Parameter('width', 'b', 'N', 'effort that does not reach the sensor', 1e-4, 1e4,
+                       scale=0.5),)
+    card = Card(
+        'y = F - b (F > b), F + b (F < -b), 0 between',
+        'the measured effort stands at 0 while it changes sign, and is too small elsewhere',
+        'play or friction in the mount of a force sensor',
+        'hang growing weights on the sensor, and look from which on it says something',
+        'Fraden, Handbook of Modern Sensors, 2016')
+
+    @classmethod
+    def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
+        """Return widths from 0.05 to 20 N."""
+        return [{'width': float(b)} for b in np.geomspace(0.05, 20.0, 12)]
+
+    def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
+               memory: Any = None) -> Array:
+        """Return the effort that the sensor says, (N, D)."""
+        said = effort.copy()
+        for name, values in self.drives.items():
+            index = list(drives).index(name)
+            F = effort[:, index]
+            said[:, index] = np.sign(F) * np.maximum(np.abs(F) - values['width'], 0.0)
+        return said

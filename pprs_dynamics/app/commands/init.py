@@ -1,0 +1,85 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""`pprs init`: a model file from a URDF or MJCF, and from what a recording calls its joints."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from shlex import quote
+
+from pprs_dynamics.app.commands.arguments import MODEL, UsageError, number, output_file
+from pprs_dynamics.app.commands.info import show_recordings
+from pprs_dynamics.app.commands.input_output import write_json
+from pprs_dynamics.app.front_door.first_model import first_model
+from pprs_dynamics.app.report.mechanism_view import mechanism_lines
+from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.system.output_files import write_text
+from pprs_dynamics.system.plain_text import displayed
+
+EXAMPLE = 'pprs init ur10e.urdf run.csv --output robot.yaml'
+FASTEST = 1e6  # [Hz]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what the command takes."""
+    parser.add_argument('robot', metavar='ROBOT', help='URDF or MJCF')
+    parser.add_argument('recordings', metavar='RECORDING', nargs='*',
+                        help='what the robot did: joints and columns are called as in the first; '
+                        'files of one quantity each (q.csv tau.csv), or their folder, are one')
+    parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
+                        default='robot.yaml', help='model file to write (default robot.yaml)')
+    parser.add_argument('--base', metavar='LINK', default='', help='the link that stands')
+    parser.add_argument('--tool', metavar='LINK', default='', help='the link that carries the load')
+    parser.add_argument('--drives', metavar='JOINT,JOINT', default='', help='the driven joints')
+    parser.add_argument('--rate', metavar='HZ', type=number(0.0, FASTEST, 'Hz', above=True),
+                        help='samples per second of a table without times')
+    parser.add_argument('--overwrite', action='store_true', help='replace --output where it is')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command and return its exit status."""
+    if os.path.lexists(options.output) and not options.overwrite:
+        raise UsageError(f'{displayed(options.output)}: it exists already, must be another name '
+                         'for --output, or be given with --overwrite')
+    screen = console()
+    drives = [name for name in options.drives.split(',') if name]
+    first = first_model(options.robot, options.recordings, options.output, base=options.base,
+                        tool=options.tool, drives=drives, rate=options.rate,
+                        ask=_ask if sys.stdin.isatty() else None)
+    write_text(options.output, first.text)
+    for line in mechanism_lines(first.model) if isinstance(first.model, ArmModel) else ():
+        screen.print(shown(line))
+    for note in first.notes:
+        screen.print(f'[yellow]![/] {shown(note)}')
+    summaries = show_recordings(first.model, [str(one) for one in first.recordings], None, screen)
+    screen.print(f'model: {shown(options.output)} (read its comments: they say what was guessed)')
+    names = ' '.join(quote(str(one)) for one in first.recordings) or 'RECORDING'
+    model = quote(options.output)
+    if first.has_efforts:
+        screen.print(f'[bold]Next[/] pprs fit {names} --model {model} --output base.yaml')
+        screen.print(f'then pprs diagnose {names} --model base.yaml')
+    else:
+        screen.print(f'[bold]Next[/] pprs info {names} --model {model}')
+    if options.json:
+        write_json(options.json, {
+            'model': options.output, 'notes': list(first.notes),
+            'drives': list(first.model.drives),
+            'recordings': [asdict(summary) for summary in summaries]})
+    return 0
+
+
+def _ask(question: str, answers: Sequence[str]) -> int:
+    """Ask in the terminal until an answer is one of those listed."""
+    while True:
+        print(question)
+        for k, answer in enumerate(answers, 1):
+            print(f'  {k}  {displayed(answer)}')
+        given = input(f'1 to {len(answers)} [1]: ').strip() or '1'
+        if given.isdecimal() and 1 <= int(given) <= len(answers):
+            return int(given) - 1

@@ -1,0 +1,463 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A first model file of a robot, from its description and a recording."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from pprs_dynamics.drives import RecordedDrives
+from pprs_dynamics.errors import PprsError, UnknownNameError, UnreadableFileError, meant
+from pprs_dynamics.measurement.files.array_files import is_lerobot
+from pprs_dynamics.measurement.files.bag_storage import is_storage
+from pprs_dynamics.measurement.files.contents import Contents, look_into
+from pprs_dynamics.measurement.files.guessed_columns import (
+    CURRENT,
+    EFFORT,
+    POSITION,
+    VELOCITY,
+    WORDS,
+    Guess,
+    guess_columns,
+    words_of,
+)
+from pprs_dynamics.measurement.files.recording import read_recording
+from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
+from pprs_dynamics.measurement.files.way_out import common_prefix
+from pprs_dynamics.physics.mechanism.branches import (
+    Branch,
+    as_likely,
+    branch_to,
+    root_of,
+)
+from pprs_dynamics.physics.mechanism.description import (
+    FIXED,
+    FLOATING,
+    PRISMATIC,
+    TURNING,
+    Description,
+)
+from pprs_dynamics.physics.mechanism.urdf import expanded, read_urdf
+from pprs_dynamics.physics.model.model_file import Model, build_model
+from pprs_dynamics.physics.model.parameter_file import parse_parameters
+from pprs_dynamics.system.plain_yaml import scalar
+
+Ask = Callable[[str, Sequence[str]], int]
+FILE_TIME = 'time'
+SETTLED = ('position', 'velocity', 'effort', 'current')
+SCALE_KEYS = {POSITION: 'position_scale', VELOCITY: 'velocity_scale', EFFORT: 'scale',
+              CURRENT: 'scale'}
+
+
+class FirstModelError(PprsError, ValueError):
+    """What a first model file would need is not there, or cannot be told."""
+
+
+@dataclass(frozen=True)
+class Names:
+    """How a recording's joints are those of a description.
+
+    Parameters
+    ----------
+    joints : dict of str to str
+        What the recording calls each joint of the description.
+    prefix : str
+        Of all of them.
+    """
+
+    joints: Mapping[str, str] = field(default_factory=dict)
+    prefix: str = ''
+
+
+@dataclass(frozen=True)
+class FirstModel:
+    """A model file that is to be written.
+
+    Parameters
+    ----------
+    path : Path
+        Where it will stand, from which the description's path counts.
+    text : str
+        Its content, with comments.
+    model : Model
+        The same, built.
+    notes : tuple of str
+        What was guessed, and what could not be known.
+    recordings : tuple of Path
+        As they are given to commands: of several files that make one, their folder or the first.
+    has_efforts : bool
+    """
+
+    path: Path
+    text: str
+    model: Model
+    notes: tuple[str, ...]
+    recordings: tuple[Path, ...]
+    has_efforts: bool
+
+
+def first_model(
+    robot: str | os.PathLike[str], recordings: Sequence[str | os.PathLike[str]] = (),
+    output: str | os.PathLike[str] = 'robot.yaml', *, base: str = '', tool: str = '',
+    drives: Sequence[str] = (), rate: float | None = None, ask: Ask | None = None,
+) -> FirstModel:
+    """Return a first model file of a robot.
+
+    Parameters
+    ----------
+    robot : path
+        URDF or MJCF.
+    recordings : sequence of path
+        Of which the first says how its joints and columns are called; several files of one
+        quantity each are one recording.
+    output : path
+        Of the model file.
+    base, tool : str, optional
+        Links; without, the one that all hangs on, and the end of the longest chain.
+    drives : sequence of str, optional
+        Driven joints; without, those of the recording, or all up to the tool.
+    rate : float, optional
+        Samples per second of tables without times [Hz].
+    ask : callable, optional
+        Given a question and its answers, returns which; without, the first is taken.
+
+    Raises
+    ------
+    PprsError
+        Where a file cannot be read, or joints and columns cannot be told.
+    """
+    path = Path(robot)
+    is_mjcf = _root_tag(path) == 'mujoco'
+    description = _description(path, is_mjcf)
+    given, files = _grouped([Path(one) for one in recordings])
+    contents = look_into(given[0]) if given and not files else None
+    movable = [joint.name for joint in description.joints.values()
+               if joint.kind not in (FIXED, FLOATING) and joint.mimic is None]
+    names = _names(contents, movable) if contents is not None else Names()
+    recorded = set(names.joints) | (_mentioned(contents, movable) if contents else set())
+    branch, notes = _branch(description, tool, recorded, ask)
+    notes += description.remarks
+    chosen = _drives(description, path, is_mjcf, branch, drives, recorded)
+    if contents is not None and contents.joints and not names.joints:
+        names = _by_numbers(contents, chosen)
+        notes.append('joints are matched by the numbers in their names')
+    columns: list[str] = []
+    guessed: list[str] = []
+    found: Collection[str] = ()
+    if given:
+        columns, guessed, found = _columns(given[0], files, contents, names, description, chosen,
+                                           rate)
+        notes += guessed
+    has_efforts = bool({EFFORT, CURRENT} & {*found})
+    text = _text(path, Path(output), is_mjcf, description, base or root_of(description), branch,
+                 chosen, names, columns, guessed, [one.name for one in given], CURRENT in found)
+    model = build_model(parse_parameters(text, output), source=str(output))
+    if CURRENT in found:
+        notes.append('efforts are currents [A]: they stay amperes until gain is given in '
+                     f'{Path(output).name}')
+    if given and not has_efforts:
+        notes.append('no efforts were found: compare, diagnose and fit need them')
+    return FirstModel(Path(output), text, model, tuple(notes), tuple(given), has_efforts)
+
+
+# ------------------------------------------------------------------------------ description
+
+
+def _root_tag(path: Path) -> str:
+    try:
+        return ElementTree.fromstring(expanded(str(path))).tag
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise UnreadableFileError(path, f'no URDF or MJCF, it is not XML: {error}') from None
+
+
+def _description(path: Path, is_mjcf: bool) -> Description:
+    if not is_mjcf:
+        return read_urdf(str(path))
+    from pprs_dynamics.physics.mechanism.mjcf import read_mjcf
+
+    return read_mjcf(str(path))
+
+
+def _branch(description: Description, tool: str, recorded: Collection[str], ask: Ask | None,
+            ) -> tuple[Branch, list[str]]:
+    """Return what is between base and tool, and what was not clear about it."""
+    if tool:
+        if tool not in description.links:
+            raise UnknownNameError('link', tool, description.links, '--tool')
+        return branch_to(description, tool), []
+    likely = as_likely(description, recorded)
+    if not likely[0].joints:
+        raise FirstModelError(f'{description.path}: no joint of it moves, must have one that does')
+    if len(likely) == 1:
+        return likely[0], []
+    answers = [f'{one.tool} (after {", ".join(one.names)})' for one in likely]
+    if ask is not None:
+        return likely[ask('Which link carries the load?', answers)], []
+    return likely[0], [f'the load may be on {" or ".join(one.tool for one in likely)}: '
+                       f'{likely[0].tool} was taken, --tool LINK takes another']
+
+
+def _drives(description: Description, path: Path, is_mjcf: bool, branch: Branch,
+            given: Sequence[str], recorded: Collection[str]) -> tuple[str, ...]:
+    if given:
+        for name in given:
+            if name not in description.joints:
+                raise UnknownNameError('joint', name, description.joints, '--drives')
+        return tuple(given)
+    if not description.loops:
+        return tuple(name for name in branch.names if name in recorded) or branch.names
+    # What loops determine is not driven.
+    driven = recorded or (_actuated(path) if is_mjcf else {
+        joint for one in description.transmissions for joint in one.joints})
+    found = tuple(name for name in description.joints if name in driven)
+    if not found:
+        raise FirstModelError(
+            f'{path}: it has loops, so not every joint is driven: give a RECORDING that names '
+            'those that are, or --drives JOINT,JOINT,…')
+    return found
+
+
+def _actuated(path: Path) -> set[str]:
+    """Return the joints that actuators of an MJCF drive."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_path(str(path))
+    return {model.joint(int(model.actuator_trnid[k, 0])).name for k in range(model.nu)
+            if int(model.actuator_trntype[k]) == mujoco.mjtTrn.mjTRN_JOINT}
+
+
+# -------------------------------------------------------------------------------- recordings
+
+
+def _grouped(recordings: Sequence[Path]) -> tuple[list[Path], dict[str, Path]]:
+    """Return recordings, and the files by quantity where they are one recording."""
+    folder = recordings[0] if len(recordings) == 1 else None
+    if folder is not None and folder.is_dir() and not is_lerobot(folder) and not (
+            folder / 'metadata.yaml').is_file():
+        inside = sorted(one for one in folder.iterdir() if one.is_file())
+        if not any(is_storage(one) for one in inside):
+            files = _by_quantity(inside)
+            if POSITION not in files:
+                raise FirstModelError(
+                    f'{folder}: its files ({", ".join(one.name for one in inside[:12])}) are no '
+                    'bag, and none is called as positions are (position.csv, q.csv)')
+            return [folder], files
+    if len(recordings) > 1 and not any(is_storage(one) for one in recordings):
+        files = _by_quantity(recordings)
+        if len(files) == len(recordings) and POSITION in files:
+            return [files[POSITION]], files
+    return list(recordings), {}
+
+
+def _by_quantity(files: Sequence[Path]) -> dict[str, Path]:
+    """Return files whose names tell a quantity, and time; of two alike the first."""
+    found: dict[str, Path] = {}
+    for file in files:
+        words = {*words_of(file.name.split('.')[0])}
+        told = [kind for kind in SETTLED if words & {*WORDS[kind]}]
+        if words & {'time', *TIME_LIKE}:
+            told.append(FILE_TIME)
+        if told:
+            found.setdefault(told[-1] if len(told) > 1 else told[0], file)
+    return found
+
+
+def _names(contents: Contents, joints: Sequence[str]) -> Names:
+    """Return how joints of messages, or of columns of our own form, are those of a description."""
+    known = dict.fromkeys(name for of in contents.joints.values() for name in of)
+    known.update(dict.fromkeys(
+        name.rpartition('/')[0].rpartition('/')[2] for name in (
+            one.title for one in contents.series) if name.endswith(f'/{POSITION}')))
+    same = [joint for joint in joints if joint in known]
+    if same:
+        return Names({joint: joint for joint in same})
+    for count in range(len(joints), 0, -1):  # of as many as there are, from the base on
+        prefix = common_prefix(joints[:count], list(known))
+        if prefix:
+            return Names({joint: f'{prefix}{joint}' for joint in joints
+                          if f'{prefix}{joint}' in known}, prefix)
+    plain = {''.join(words_of(name)): name for name in known}
+    found = {joint: plain[''.join(words_of(joint))] for joint in joints
+             if ''.join(words_of(joint)) in plain}
+    for joint in joints:
+        # left_shoulder of the description is shoulder in the recording.
+        ends = [name for name in known if joint.endswith(f'_{name}')]
+        if joint not in found and len(ends) == 1:
+            found[joint] = ends[0]
+    return Names(found)
+
+
+def _by_numbers(contents: Contents, drives: Sequence[str]) -> Names:
+    """Match joints by the numbers in their names, or refuse."""
+    known = sorted({name for of in contents.joints.values() for name in of})
+
+    def numbered(names: Sequence[str]) -> dict[int, str]:
+        return {int(words[-1]): name for name in names
+                if (words := [word for word in words_of(name) if word.isdigit()])}
+
+    ours, theirs = numbered(drives), numbered(known)
+    start = min(theirs, default=0) - min(ours, default=0)
+    found = {joint: theirs[number + start] for number, joint in ours.items()
+             if number + start in theirs}
+    if len(found) < len(drives):
+        close = meant(drives[0], known)
+        raise FirstModelError(
+            f'joints of the recording ({", ".join(known[:12])}) are none of the description '
+            f'({", ".join(drives[:12])})' + (f'; is {close} {drives[0]}?' if close else '')
+            + ': write joint_map: {JOINT: NAME} or rename them')
+    return Names(found)
+
+
+def _mentioned(contents: Contents, joints: Sequence[str]) -> set[str]:
+    """Return the joints whose names are in the titles of columns."""
+    titles = [words_of(one.title) for one in contents.series]
+    found = set()
+    for joint in joints:
+        words = words_of(joint)
+        if not all(word.isdigit() for word in words) and any(
+                title[k:k + len(words)] == words for title in titles
+                for k in range(len(title) - len(words) + 1)):
+            found.add(joint)
+    return found
+
+
+def _columns(path: Path, files: Mapping[str, Path], contents: Contents | None, names: Names,
+             description: Description, drives: Sequence[str], rate: float | None,
+             ) -> tuple[list[str], list[str], Collection[str]]:
+    """Return the lines of `columns`, what was guessed, and which quantities there are."""
+    limits = [_limit(description, name) for name in drives]
+    if files:
+        return _file_columns(path, files, drives, limits, rate)
+    assert contents is not None
+    joints = tuple(names.joints.get(name, f'{names.prefix}{name}') for name in drives)
+    try:
+        recording = read_recording(path, RecordedDrives(
+            tuple(drives), joints, gain=(1.0,) * len(drives)))
+        known = bool(np.isfinite(recording.effort).any())
+        return [], [], [EFFORT if recording.gain is None else CURRENT] if known else []
+    except UnreadableFileError:
+        # Positions of joint states may have their efforts in arrays; what is left is a table.
+        if contents.joints and not contents.series:
+            raise
+    guess = guess_columns(contents.series, drives, limits)
+    lines = []
+    if guess.time is not None and guess.time not in TIME_COLUMNS:
+        lines.append(f'time: {scalar(guess.time)}')
+    is_bag = bool(contents.series) and all(
+        str(one.column).startswith('/') for one in contents.series)
+    if guess.time is None and not is_bag:
+        lines.append(_rate(path, rate))
+    return ([*lines, *_drive_lines(guess, drives, contents.decimal)], guess.notes,
+            {kind for _, kind in guess.columns})
+
+
+def _rate(path: Path, rate: float | None) -> str:
+    if rate is None:
+        raise FirstModelError(f'{path}: there is no column of times: give --rate HZ, the samples '
+                              'per second')
+    return f'rate: {rate}  # samples per second [Hz], as given'
+
+
+def _file_columns(path: Path, files: Mapping[str, Path], drives: Sequence[str],
+                  limits: Sequence[float], rate: float | None,
+                  ) -> tuple[list[str], list[str], Collection[str]]:
+    """Return the same of files of one quantity each."""
+    inside = {kind: look_into(file) for kind, file in files.items()}
+    guesses = {kind: guess_columns(one.series, drives, limits, kind)
+               for kind, one in inside.items() if kind != FILE_TIME}
+    merged = Guess(
+        guesses[POSITION].time, {key: column for one in guesses.values()
+                                 for key, column in one.columns.items()},
+        {key: scale for one in guesses.values() for key, scale in one.scales.items()},
+        guesses[POSITION].time_scale, [note for kind, one in guesses.items()
+                                       for note in (f'{files[kind].name}: {note}'
+                                                    for note in one.notes)])
+    lines = []
+    if FILE_TIME in inside:
+        series = inside[FILE_TIME].series
+        merged = replace(merged, time=series[0].column if series else 1)
+    if merged.time is not None:
+        if merged.time not in TIME_COLUMNS:
+            lines.append(f'time: {scalar(merged.time)}')
+    else:
+        lines.append(_rate(path, rate))
+    lines.append('files: {' + ', '.join(f'{kind}: {scalar(file.name)}'
+                                        for kind, file in files.items()) + '}')
+    return ([*lines, *_drive_lines(merged, drives, inside[POSITION].decimal)], merged.notes,
+            {*files})
+
+
+def _drive_lines(guess: Guess, drives: Sequence[str], decimal: str) -> Iterator[str]:
+    if guess.time_scale is not None:
+        yield f'time_scale: {guess.time_scale:g}  # seconds per unit of time'
+    if decimal != '.':
+        yield f'decimal: "{decimal}"'
+    for drive in drives:
+        cells = [f'{kind}: {scalar(guess.columns[drive, kind])}' for kind in SETTLED
+                 if (drive, kind) in guess.columns]
+        cells += [f'{SCALE_KEYS[kind]}: {scale:.12g}' for kind in SETTLED
+                  if (scale := guess.scales.get((drive, kind))) is not None]
+        if cells:
+            yield f'{scalar(drive)}: {{{", ".join(cells)}}}'
+
+
+def _limit(description: Description, name: str) -> float:
+    """Return the largest absolute position of a joint that turns; infinite for others."""
+    joint = description.joints[name]
+    return max(abs(joint.lower), abs(joint.upper)) if joint.kind in TURNING else np.inf
+
+
+# -------------------------------------------------------------------------------------- text
+
+
+def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, base: str,
+          branch: Branch, drives: Sequence[str], names: Names, columns: Sequence[str],
+          guessed: Sequence[str], recordings: Sequence[str], currents: bool) -> str:
+    place = os.path.relpath(robot.resolve(), output.resolve().parent)
+    slides = all(description.joints[name].kind == PRISMATIC for name in drives)
+    gain = ', '.join(['1.0'] * len(drives))
+    # Of an arm, joints that are not driven stand.
+    block, listed = (('robot', 'drives') if is_mjcf or description.loops else ('arm', 'joints'))
+    lines = [
+        f'# Model of {robot.name}'
+        + (f', read beside {", ".join(recordings[:3])}' if recordings else '')
+        + '. Lines with "guessed" or "not known" are to be checked.',
+        '/**:',
+        '  ros__parameters:',
+        f'    {block}:',
+        f'      {"mjcf" if is_mjcf else "urdf"}: {scalar(place)}  # from the folder of this file',
+        f'      base: {scalar(base)}  # the link that stands',
+        f'      tool: {scalar(branch.tool)}  # the link that carries the load',
+        f'      {listed}: [{", ".join(scalar(name) for name in drives)}]  # driven, in the order '
+        'of all results',
+        f'      effort_unit: {"N" if slides else "N m"}  # not known from the files; A where '
+        'recorded efforts are currents',
+        f'      {"" if currents else "# "}gain: [{gain}]  # not known: effort per ampere '
+        f'[{"N/A" if slides else "N m/A"}], of recorded currents',
+        f'      # gear_ratio: [{gain}]  # not known: turns of the motor per turn of the joint, '
+        'where ripple is looked for',
+    ]
+    lines += [f'      # loop {loop.name}: {loop.kind}, {loop.a} to {loop.b}, from the '
+              'description' for loop in description.loops]
+    lines.append('    # Friction is not known yet: `pprs fit` finds it and writes it here.')
+    if names.prefix:
+        lines.append(f'    joint_prefix: {scalar(names.prefix)}  # recordings call {drives[0]} '
+                     f'{names.prefix}{drives[0]}')
+    elif renamed := {drive: names.joints[drive] for drive in drives
+                     if names.joints.get(drive, drive) != drive}:
+        lines.append('    joint_map: {' + ', '.join(
+            f'{scalar(drive)}: {scalar(name)}' for drive, name in renamed.items())
+            + '}  # what recordings call them')
+    if columns:
+        lines.append('    columns:  # of tables: names, or numbers from 1')
+        lines += [f'      # guessed: {note}' for note in guessed]
+        lines += [f'      {line}' for line in columns]
+    return '\n'.join(lines) + '\n'
+

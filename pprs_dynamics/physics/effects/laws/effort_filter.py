@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Effort that a low-pass filter has rounded off: (T/2 d/dt + 1)^2 y = F.
+
+Two equal lags in series, since filters of amplifiers and recorders are of first order (an RC), of
+second (Butterworth, Bessel) or means over some samples: of a change at 20 Hz that each of them
+makes, this form leaves an eighth, where a single lag leaves a quarter of a Butterworth's and a
+third of a pure delay's. T is the filter's mean delay, whatever its order.
+
+References
+----------
+G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems, 3rd ed., 1998.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.drive_effect import DriveRange, MeasurementEffect
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+
+LAGS = 2
+# [s], tried: from cut-offs of 160 Hz to one of 1.6 Hz, beyond which no motion of a robot is left.
+SHORTEST, LONGEST, TRIALS = 0.002, 0.2, 14
+
+
+class EffortFilter(MeasurementEffect):
+    """The amplifier's or the recorder's effort signal is smoothed before it is recorded."""
+
+    name: ClassVar[str] = 'effort_filter'
+    bends_columns: ClassVar[bool] = True
+    shows_at_reversals: ClassVar[bool] = True
+    assumed_at_start: ClassVar[str] = 'the filter has settled at the first sample'
+    linear = ()
+    shape = (Parameter('time_constant', 'T', 's', 'mean delay of the filter', 1e-4, 1.0,
+                       scale=0.01),)
+    card = Card(
+        '(T/2 d/dt + 1)^2 y = F, y measured',
+        'steps of the effort at reversals come rounded and late, peaks too low; no fast noise is '
+        'left',
+        'a filter on the current or torque signal, in the amplifier, the controller or the '
+        'recorder',
+        'switch the filter off, or read its cut-off f_c (T is about 1 / (2 pi f_c) times the '
+        'order); command a step of force against a stop, and look at its shape',
+        'Franklin, Powell, Workman, Digital Control of Dynamic Systems, 1998')
+
+    @classmethod
+    def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
+        """Return time constants from 2 to 200 ms."""
+        return [{'time_constant': float(T)} for T in np.geomspace(SHORTEST, LONGEST, TRIALS)]
+
+    @classmethod
+    def drive_memory(cls) -> Any:
+        """Return the last time, and what goes into each lag and comes out of it last."""
+        return {'time': None, 'states': None}
+
+    def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
+               memory: Any = None) -> Array:
+        """Return the filtered effort, (N, D), of a filter that had settled at the first sample."""
+        if time is None or not len(time):
+            return effort
+        filtered = effort.copy()
+        for name, values in self.drives.items():
+            index = drives.index(name)
+            past = self.drive_memory() if memory is None else memory[name]
+            is_first = past['time'] is None
+            times = time if is_first else np.concatenate(([past['time']], time))
+            step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+            signal, states = effort[:, index], []
+            for k in range(LAGS):
+                entered, left = (signal[0], signal[0]) if is_first else past['states'][k]
+                smooth = lag(signal, step, values['time_constant'] / LAGS, entered, left)
+                states.append((float(signal[-1]), float(smooth[-1])))
+                signal = smooth
+            filtered[:, index] = signal
+            past.update(time=float(time[-1]), states=states)
+        return filtered
+
+
+def lag(signal: Array, step: float, time_constant: float, entered: float, left: float) -> Array:
+    """Return what a first-order lag makes of a signal, (N,), exact for straight lines.
+
+    Parameters
+    ----------
+    signal : (N,) array
+    step : float
+        Between samples, and from the last one before them [s].
+    time_constant : float
+        [s]
+    entered, left : float
+        The last sample before them, and what came out of it.
+    """
+    if not step > 0:
+        return np.full_like(signal, left)
+    from scipy.signal import lfilter  # here: few models have it, and it takes long to import
+
+    kept = np.exp(-step / time_constant)
+    share = (1 - kept) * time_constant / step
+    new, old = 1 - share, share - kept
+    start = [old * entered + kept * left]
+    smooth: Array = lfilter([new, old], [1.0, -kept], signal, zi=start)[0]
+    return smooth

@@ -1,0 +1,107 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Branches of a robot's tree: which link stands, which carries the load, what moves between."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from pprs_dynamics.physics.mechanism.description import FIXED, FLOATING, Description, Joint
+
+# What links at the end of an arm are called, the likeliest first.
+TOOLS = ('tool0', 'tcp', 'tool', 'ee_link', 'end_effector', 'flange', 'ee', 'hand', 'gripper')
+GRIPPER = 2  # joints beyond a flange that may be fingers
+
+
+@dataclass(frozen=True)
+class Branch:
+    """What is between the base and a link.
+
+    Parameters
+    ----------
+    tool : str
+    joints : tuple of Joint
+        Those that move and follow no other, from the base on.
+    """
+
+    tool: str
+    joints: tuple[Joint, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        return tuple(joint.name for joint in self.joints)
+
+
+def root_of(description: Description) -> str:
+    """Return the link that hangs on none, or what hangs on it by a floating joint."""
+    children = {joint.child: joint for joint in description.joints.values()}
+    root = next(link for link in description.links if link not in children)
+    floating = [joint.child for joint in children.values()
+                if joint.kind == FLOATING and joint.parent == root]
+    return floating[0] if len(floating) == 1 and len(
+        [joint for joint in children.values() if joint.parent == root]) == 1 else root
+
+
+def branch_to(description: Description, tool: str) -> Branch:
+    """Return what is between the base and a link."""
+    hung = {joint.child: joint for joint in description.joints.values()}
+    joints: list[Joint] = []
+    link = tool
+    while link in hung:
+        joint = hung[link]
+        if joint.kind not in (FIXED, FLOATING) and joint.mimic is None:
+            joints.append(joint)
+        link = joint.parent
+    return Branch(tool, tuple(reversed(joints)))
+
+
+def likely_branches(description: Description, recorded: Collection[str] = ()) -> list[Branch]:
+    """Return the branches to the likely tools, best first; several that move alike are one.
+
+    Parameters
+    ----------
+    description : Description
+    recorded : collection of str
+        Joints of which there are recordings: a branch with more of them is likelier.
+    """
+    parents = {joint.parent for joint in description.joints.values()}
+    leaves = [link for link in description.links if link not in parents]
+    named = [link for link in description.links if _rank(link) < len(TOOLS)]
+    closed = {link for loop in description.loops for link in (loop.a, loop.b)}
+    found = [branch_to(description, link) for link in dict.fromkeys((*leaves, *named, *closed))]
+    longest = max((len(one.joints) for one in found), default=0)
+
+    def worth(one: Branch) -> tuple[int, ...]:
+        own = len({*one.names} & {*recorded})
+        # A platform closes the most loops; a flange has fingers beyond it.
+        loops = sum(one.tool in (loop.a, loop.b) for loop in description.loops)
+        is_tool = _rank(one.tool) < len(TOOLS) and len(one.joints) >= longest - GRIPPER
+        missing = sum(name not in recorded for name in one.names) if recorded else 0
+        return (own, loops if loops > 1 else 0, -missing, int(is_tool), len(one.joints),
+                -_rank(one.tool))
+
+    best: dict[tuple[str, ...], Branch] = {}
+    for one in sorted(found, key=worth, reverse=True):
+        best.setdefault(one.names, one)
+    return list(best.values())
+
+
+def as_likely(description: Description, recorded: Collection[str] = ()) -> list[Branch]:
+    """Return the best branch, and those beside it that are as long and move by other joints."""
+    first, *others = likely_branches(description, recorded) or [
+        Branch(root_of(description), ())]
+    own = {*first.names}
+    return [first, *(one for one in others if len(one.joints) >= len(first.joints)
+                     and not own & {*one.names} and len({*one.names} & {*recorded})
+                     >= len(own & {*recorded}) and not description.loops)]
+
+
+def _rank(link: str) -> int:
+    """Return how far down a link's name stands among those of tools; their number for none."""
+    name = link.lower()
+    return next((k for k, tool in enumerate(TOOLS) if name == tool or name.endswith(
+        (f'_{tool}', f'-{tool}')) or (tool in ('tool0', 'tcp', 'flange') and tool in name)),
+        len(TOOLS))

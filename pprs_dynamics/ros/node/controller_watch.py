@@ -1,0 +1,170 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Whether a joint_trajectory_controller follows what it is sent, by the state that it publishes.
+
+A controller drops a trajectory with a line in its own log and nothing else: its sender is not told.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+
+STATE_TOPIC = 'controller_state'  # beside the controller's joint_trajectory
+LOOKED_BACK = 1.0  # [s] of what was sent and of where the controller went
+# [s] that a controller does not follow before it is told, and that none is heard of.
+PATIENCE = 0.5
+# Share of the way of a joint that moves: nearer to what was sent a controller follows, and one
+# whose reference makes less of the way stands.
+NEAR, STANDS = 0.25, 0.05
+MOVES = 0.1  # joints that make at least that share of the longest way are looked at
+LEAST_WAY = 1e-5  # [m, rad] in LOOKED_BACK; less is standing still
+# [s] from sending to the end of a trajectory: messages were dropped that had been 11.5 ms on the
+# way at the median, and a busy machine takes longer.
+SHORT_END = 0.03
+
+
+class SentPoints(NamedTuple):
+    """A trajectory that was sent.
+
+    Parameters
+    ----------
+    time : float
+        When [s].
+    position : (N, D) array
+    left : float
+        From then to its last point [s].
+    moves_at_end : bool
+    """
+
+    time: float
+    position: Array
+    left: float
+    moves_at_end: bool
+
+
+class ControllerWatch:
+    """Compares the reference of a controller with what was sent to it.
+
+    Parameters
+    ----------
+    joints : sequence of D str
+        That are sent, in order.
+    clock : callable, optional
+        Returns a time that only goes on [s].
+    """
+
+    def __init__(self, joints: Sequence[str], clock: Callable[[], float] = time.monotonic) -> None:
+        self._joints, self._clock = tuple(joints), clock
+        self._sent: deque[SentPoints] = deque()
+        self._went: deque[tuple[float, Array]] = deque()
+        self._heard = -np.inf
+        self._first_sent = np.inf  # of a stream without a pause
+        self._strays_since: float | None = None
+        self._names: tuple[str, ...] = ()
+        self._has_efforts = True
+
+    @property
+    def was_heard(self) -> bool:
+        """Whether a state has ever come."""
+        return bool(np.isfinite(self._heard))
+
+    def sent(self, position: Array, left: float, moves_at_end: bool) -> None:
+        """Take note of a trajectory that goes out; see `SentPoints`."""
+        now = self._clock()
+        if not self._sent or now - self._sent[-1].time > LOOKED_BACK:
+            self._first_sent, self._strays_since = now, None
+        self._sent.append(SentPoints(now, np.array(position), left, moves_at_end))
+        _forget(self._sent, now - LOOKED_BACK)
+
+    def heard(self, state: Any) -> Array | None:
+        """Take note of a controller's state.
+
+        Parameters
+        ----------
+        state : control_msgs/JointTrajectoryControllerState
+
+        Returns
+        -------
+        (D,) array or None
+            Its reference positions, where it was silent before: it has just become active.
+        """
+        now = self._clock()
+        self._names = tuple(state.joint_names)
+        self._has_efforts = bool(len(state.output.effort))
+        was_silent, self._heard = now - self._heard > LOOKED_BACK, now
+        values = dict(zip(state.joint_names, state.reference.positions, strict=False))
+        if any(joint not in values for joint in self._joints):
+            self._went.clear()
+            return None
+        reference = np.array([values[joint] for joint in self._joints])
+        if was_silent:
+            self._went.clear()
+        self._went.append((now, reference))
+        _forget(self._went, now - LOOKED_BACK)
+        if not self._strays(reference):
+            self._strays_since = None
+        elif self._strays_since is None:
+            self._strays_since = now
+        return reference if was_silent else None
+
+    def complaint(self) -> str:
+        """Return that the controller does not follow, and the likely reason; '' where it does."""
+        now = self._clock()
+        _forget(self._sent, now - LOOKED_BACK)
+        if not self._sent or now - self._first_sent < PATIENCE:
+            return ''
+        if now - self._heard > LOOKED_BACK:
+            return ('no controller_state comes' + (' any more' if self.was_heard else '')
+                    + ': is the controller active?')
+        missing = [joint for joint in self._joints if joint not in self._names]
+        if not missing and (self._strays_since is None or now - self._strays_since < PATIENCE):
+            return ''
+        return 'the controller does not follow: ' + next(self._reasons(missing))
+
+    def _strays(self, reference: Array) -> bool:
+        """Return whether a reference is nowhere near what was sent of late, or stands meanwhile."""
+        if not self._sent:
+            return False
+        sent = np.concatenate([each.position for each in self._sent])
+        way = np.ptp(sent, axis=0)
+        if way.max() < LEAST_WAY:
+            return False
+        moving = way >= MOVES * way.max()
+        off = np.abs(sent - reference)[:, moving] / way[moving]
+        gone = np.ptp([each for _, each in self._went], axis=0)
+        full = self._went[-1][0] - self._went[0][0] > PATIENCE
+        stands = full and (gone[moving] < STANDS * way[moving]).all()
+        return bool(stands or off.max(axis=1).min() > NEAR)
+
+    def _reasons(self, missing: Sequence[str]) -> Iterator[str]:
+        """Yield what may be the reason, likeliest first."""
+        more = [name for name in self._names if name not in self._joints]
+        if missing:
+            yield f'it has no joint {missing[0]}'
+        if more:
+            yield (f'it has the joint {more[0]}, too, and takes trajectories without it only with '
+                   'allow_partial_joints_goal: true')
+        if not self._has_efforts:
+            yield 'it has no command interface `effort`, and drops trajectories with efforts'
+        left = float(np.median([each.left for each in self._sent]))
+        if left < SHORT_END:
+            yield (f'trajectories end {1e3 * left:.0f} ms after they are sent on, and are dropped '
+                   'when they arrive later: more points, or stamps further ahead')
+        if self._sent[-1].moves_at_end:
+            yield ('trajectories end in motion, which it takes only with '
+                   'allow_nonzero_velocity_at_trajectory_end: true; or set stop_time here')
+        yield 'its log says why'
+
+
+def _forget(entries: deque[Any], before: float) -> None:
+    """Leave out entries whose first element is an earlier time."""
+    while entries and entries[0][0] < before:
+        entries.popleft()

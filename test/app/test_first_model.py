@@ -1,0 +1,416 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""`pprs init`: what it writes reads the recording as it was, whatever program wrote that.
+
+Truth are the arrays that were written; nothing is told to the command but the files' names.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from scipy.io import savemat
+
+from pprs_dynamics import ModelError, PprsError, UnreadableFileError
+from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.app.front_door.first_model import FirstModelError, first_model
+from pprs_dynamics.measurement.files.guessed_columns import GuessError
+from pprs_dynamics.measurement.files.recording import Recording, read_recording
+from pprs_dynamics.physics.model.model_file import load_model
+
+JOINTS = ('shoulder_pan', 'shoulder_lift', 'elbow')
+N, RATE = 800, 100.0
+EPOCH = 1_700_000_000
+TIME = np.arange(N) / RATE
+WAVES = np.array([1.0, 1.3, 1.7])
+Q = 0.9 * np.sin(TIME[:, None] * WAVES) + [0.3, -0.4, 0.1]
+DQ = 0.9 * np.cos(TIME[:, None] * WAVES) * WAVES
+TAU = 5.0 * np.cos(TIME[:, None] * WAVES[::-1]) + np.random.default_rng(1).normal(size=(N, 3))
+STATE, ARRAY = 'sensor_msgs/msg/JointState', 'std_msgs/msg/Float64MultiArray'
+DYNAMIC = 'control_msgs/msg/DynamicJointState'
+DYNAMIC_TEXT = f'''std_msgs/Header header
+string[] joint_names
+control_msgs/InterfaceValue[] interface_values
+{'=' * 80}
+MSG: control_msgs/InterfaceValue
+string[] interface_names
+float64[] values
+'''
+
+
+def urdf(joints: tuple[str, ...] = JOINTS, before: str = '', more: str = '') -> str:
+    """Return an arm of three joints with a camera and a flange beyond the last."""
+    links = [f'{before}base', *(f'{before}link_{k}' for k in range(1, 4))]
+    body = ('<inertial><mass value="2"/><origin xyz="0.1 0 0.1"/><inertia ixx="0.02" iyy="0.02" '
+            'izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>')
+    text = ''.join(f'<link name="{link}">{body}</link>' for link in links)
+    text += ''.join(
+        f'<joint name="{before}{joint}" type="revolute"><parent link="{links[k]}"/>'
+        f'<child link="{links[k + 1]}"/><origin xyz="0.2 0 0.1"/><axis xyz="0 {k > 0:d} {k == 0:d}"'
+        '/><limit lower="-3" upper="3" velocity="4" effort="100"/></joint>'
+        for k, joint in enumerate(joints))
+    for name in ('camera', 'flange'):
+        text += (f'<link name="{before}{name}"/><joint name="{before}{name}_on" type="fixed">'
+                 f'<parent link="{links[-1]}"/><child link="{before}{name}"/></joint>')
+    return text + more
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Path:
+    path = tmp_path / 'arm.urdf'
+    path.write_text(f'<robot name="arm">{urdf()}</robot>')
+    return path
+
+
+def read(robot: Path, *recordings: Path, **more: Any) -> Recording:
+    """Write the model file that the command writes, and read the recording with it."""
+    first = first_model(robot, recordings, robot.with_name('robot.yaml'), **more)
+    first.path.write_text(first.text)
+    model = load_model(first.path)
+    assert model.drives == JOINTS
+    assert first.has_efforts
+    return read_recording(first.recordings[0], model.recorded)
+
+
+def assert_read(recording: Recording, velocity: bool = True, tolerance: float = 1e-9) -> None:
+    np.testing.assert_allclose(recording.time - recording.time[0], TIME, atol=1e-6)
+    np.testing.assert_allclose(recording.position, Q, atol=tolerance)
+    np.testing.assert_allclose(recording.effort, TAU, atol=tolerance)
+    if velocity:
+        assert recording.velocity is not None
+        np.testing.assert_allclose(recording.velocity, DQ, atol=tolerance)
+
+
+# ------------------------------------------------------------------------------------ tables
+
+
+def frame(names: dict[str, np.ndarray]) -> pd.DataFrame:
+    return pd.DataFrame(names)
+
+
+def columns(pattern: str, values: np.ndarray, start: int = 1) -> dict[str, np.ndarray]:
+    return {pattern.format(joint=joint, k=k + start): values[:, k]
+            for k, joint in enumerate(JOINTS)}
+
+
+def plotjuggler(folder: Path) -> list[Path]:
+    before = '/joint_states/{joint}/'
+    frame({'__time': EPOCH + TIME, '/battery/voltage': np.ones(N),
+           **columns(before + 'position', Q), **columns(before + 'velocity', DQ),
+           **columns(before + 'effort', TAU)}).to_csv(folder / 'run.csv', index=False)
+    return [folder / 'run.csv']
+
+
+def plotjuggler_of_arrays(folder: Path) -> list[Path]:
+    # A row per stamp of any topic: other cells are empty.
+    own = frame({'__time': TIME, **columns('/arm/state/pos[{k}]', Q, 0),
+                 **columns('/arm/state/tau[{k}]', TAU, 0)})
+    other = frame({'__time': TIME + 0.003, '/temperature/data': np.ones(N)})
+    pd.concat([own, other]).sort_values('__time').to_csv(folder / 'run.csv', index=False)
+    return [folder / 'run.csv']
+
+
+def numbered(folder: Path) -> list[Path]:
+    frame({'timestamp_ms': 1e3 * TIME, **columns('q{k}', Q), **columns('dq{k}', DQ),
+           **columns('ddq{k}', Q), **columns('tau{k}', TAU), **columns('tau_cmd{k}', 0 * TAU + 1),
+           **columns('q_des{k}', 0 * Q)}).to_csv(folder / 'run.csv', index=False)
+    return [folder / 'run.csv']
+
+
+def named(folder: Path) -> list[Path]:
+    frame({'stamp': (EPOCH + TIME) * 1e3, **columns('{joint}_pos_deg', np.rad2deg(Q)),
+           **columns('{joint}_vel', DQ), **columns('{joint}_torque', TAU),
+           **columns('{joint}_temperature', Q)}).to_csv(folder / 'run.csv', index=False, sep=';')
+    return [folder / 'run.csv']
+
+
+def real_time(folder: Path) -> list[Path]:
+    # As the real-time interface of an arm names them.
+    frame({'timestamp': TIME, **columns('target_q_{k}', 0 * Q, 0),
+           **columns('actual_q_{k}', Q, 0), **columns('actual_qd_{k}', DQ, 0),
+           **columns('actual_TCP_pose_{k}', 0 * Q, 0), **columns('target_moment_{k}', TAU, 0),
+           }).to_csv(folder / 'run.csv', index=False, sep=' ')
+    return [folder / 'run.csv']
+
+
+def without_header(folder: Path) -> list[Path]:
+    np.savetxt(folder / 'run.csv', np.column_stack([TIME, Q, DQ, TAU]), delimiter=',',
+               fmt='%.17g')
+    return [folder / 'run.csv']
+
+
+def in_degrees(folder: Path) -> list[Path]:
+    np.savetxt(folder / 'run.txt', np.column_stack(
+        [TIME, np.rad2deg(2 * Q), np.rad2deg(2 * DQ), TAU]), fmt='%.17g')
+    return [folder / 'run.txt']
+
+
+def commas(folder: Path) -> list[Path]:
+    text = frame({'t': TIME, **columns('angle_{k}', Q), **columns('torque_{k}', TAU)}).to_csv(
+        index=False, sep=';', decimal=',', float_format='%.12f')
+    (folder / 'run.csv').write_text(text)
+    return [folder / 'run.csv']
+
+
+def structure(folder: Path) -> list[Path]:
+    savemat(folder / 'run.mat', {'rec': {
+        'time': TIME, 'act_pos_mot_deg': np.rad2deg(Q), 'act_vel_mot_deg': np.rad2deg(DQ),
+        'act_trq': TAU, 'temperature': Q}})
+    return [folder / 'run.mat']
+
+
+def one_file_each(folder: Path) -> list[Path]:
+    made = []
+    for name, values in (('q', Q), ('dq', DQ), ('tau', TAU), ('t', TIME[:, None])):
+        np.savetxt(folder / f'{name}.csv', values, delimiter=',', fmt='%.17g')
+        made.append(folder / f'{name}.csv')
+    return made
+
+
+def a_folder_of_files(folder: Path) -> list[Path]:
+    (folder / 'run').mkdir()
+    for name, values in (('joint_positions', Q), ('joint_velocities', DQ), ('torques', TAU)):
+        frame({'time': TIME, **columns('{joint}', values)}).to_csv(
+            folder / 'run' / f'{name}.csv', index=False)
+    return [folder / 'run']
+
+
+def lerobot(folder: Path, labels: bool = True) -> list[Path]:
+    (folder / 'set' / 'meta').mkdir(parents=True)
+    (folder / 'set' / 'data' / 'chunk-000').mkdir(parents=True)
+    names = {'motors': [f'{joint}.pos' for joint in JOINTS] + ['gripper.pos']}
+    lists = {f'observation.{name}': list(np.column_stack([values, np.zeros(N)]))
+             for name, values in (('state', Q), ('velocity', DQ), ('effort', TAU))}
+    (folder / 'set' / 'meta' / 'info.json').write_text(json.dumps({'features': {
+        name: {'dtype': 'float32', 'names': names if labels else None}
+        for name in (*lists, 'action')}}))
+    pd.DataFrame({**lists, 'action': lists['observation.state'], 'timestamp': TIME,
+                  'frame_index': np.arange(N), 'episode_index': np.zeros(N, int),
+                  }).to_parquet(folder / 'set' / 'data' / 'chunk-000' / 'episode_000000.parquet')
+    return [folder / 'set']
+
+
+def lerobot_without_names(folder: Path) -> list[Path]:
+    return lerobot(folder, labels=False)
+
+
+# -------------------------------------------------------------------------------------- bags
+
+
+class Bag:
+    def __init__(self, path: Path) -> None:
+        self.types = get_typestore(Stores.ROS2_KILTED)
+        self.types.register({name: fields for name, fields in get_types_from_msg(
+            DYNAMIC_TEXT, DYNAMIC).items() if name not in self.types.types})
+        self.writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
+        self.writer.open()
+        self.topics: dict[str, Any] = {}
+
+    def write(self, topic: str, kind: str, k: int, message: Any) -> None:
+        if topic not in self.topics:
+            self.topics[topic] = self.writer.add_connection(topic, kind, typestore=self.types)
+        self.writer.write(self.topics[topic], self.stamp(k), self.types.serialize_cdr(
+            message, kind))
+
+    @staticmethod
+    def stamp(k: int) -> int:
+        return EPOCH * 10**9 + round(TIME[k] * 1e9)
+
+    def header(self, k: int) -> Any:
+        time = self.types.types['builtin_interfaces/msg/Time'](*divmod(self.stamp(k), 10**9))
+        return self.types.types['std_msgs/msg/Header'](time, '')
+
+    def array(self, values: np.ndarray) -> Any:
+        return self.types.types[ARRAY](self.types.types['std_msgs/msg/MultiArrayLayout']([], 0),
+                                       values)
+
+
+def bag(folder: Path, names: tuple[str, ...] = JOINTS) -> list[Path]:
+    bag = Bag(folder / 'bag')
+    order = np.argsort(names)  # as joint_state_broadcaster has them
+    for k in range(N):
+        bag.write('/joint_states', STATE, k, bag.types.types[STATE](
+            bag.header(k), [names[j] for j in order], Q[k, order], DQ[k, order], TAU[k, order]))
+    bag.writer.close()
+    return [folder / 'bag']
+
+
+def bag_with_a_prefix(folder: Path) -> list[Path]:
+    return bag(folder, tuple(f'left_{joint}' for joint in JOINTS))
+
+
+def bag_with_other_names(folder: Path) -> list[Path]:
+    return bag(folder, ('ShoulderPan', 'ShoulderLift', 'Elbow'))
+
+
+def currents(folder: Path) -> list[Path]:
+    bag = Bag(folder / 'bag')
+    value = bag.types.types['control_msgs/msg/InterfaceValue']
+    for k in range(N):
+        bag.write('/dynamic_joint_states', DYNAMIC, k, bag.types.types[DYNAMIC](
+            bag.header(k), list(JOINTS), [value(['current', 'position', 'velocity'], np.array(
+                [TAU[k, j], Q[k, j], DQ[k, j]])) for j in range(3)]))
+    bag.writer.close()
+    return [folder / 'bag']
+
+
+def arrays(folder: Path) -> list[Path]:
+    bag = Bag(folder / 'bag')
+    for k in range(N):
+        for topic, values in (('/joint_positions', Q), ('/joint_velocities', DQ),
+                              ('/measured_torques', TAU)):
+            bag.write(topic, ARRAY, k, bag.array(values[k]))
+    bag.writer.close()
+    return [folder / 'bag']
+
+
+WITHOUT_VELOCITY = (plotjuggler_of_arrays, commas)
+
+
+@pytest.mark.parametrize('write', [
+    plotjuggler, plotjuggler_of_arrays, numbered, named, real_time, without_header, in_degrees,
+    commas, structure, one_file_each, a_folder_of_files, lerobot, lerobot_without_names, bag,
+    bag_with_a_prefix, bag_with_other_names, currents, arrays])
+def test_what_init_writes_reads_the_recording_as_it_was(
+    write: Callable[[Path], list[Path]], robot: Path, tmp_path: Path,
+) -> None:
+    recording = read(robot, *write(tmp_path))
+    if write is in_degrees:
+        np.testing.assert_allclose(recording.position, 2 * Q, atol=1e-9)
+        np.testing.assert_allclose(recording.velocity, 2 * DQ, atol=1e-9)
+    else:
+        assert_read(recording, write not in WITHOUT_VELOCITY, 1e-6 if write is commas else 1e-9)
+
+
+def test_the_tool_is_the_flange_and_the_base_what_all_hangs_on(robot: Path) -> None:
+    values = first_model(robot).model.values
+    assert (values['arm.base'], values['arm.tool']) == ('base', 'flange')
+    assert values['arm.joints'] == JOINTS
+    values = first_model(robot, tool='camera', drives=('elbow',)).model.values
+    assert (values['arm.tool'], values['arm.joints']) == ('camera', ('elbow',))
+    with pytest.raises(ModelError, match=r'--tool: unknown link flnge .*flange'):
+        first_model(robot, tool='flnge')
+
+
+def two_arms(path: Path) -> Path:
+    text = '<link name="torso"/>'
+    for side in ('left_', 'right_'):
+        text += urdf(before=side) + (
+            f'<joint name="{side}on" type="fixed"><parent link="torso"/><child '
+            f'link="{side}base"/></joint>')
+    path.write_text(f'<robot name="two">{text}</robot>')
+    return path
+
+
+def test_of_two_arms_the_recorded_one_is_taken_and_without_a_recording_one_is_asked_for(
+    tmp_path: Path,
+) -> None:
+    robot = two_arms(tmp_path / 'two.urdf')
+    asked: list[str] = []
+
+    def ask(question: str, answers: Any) -> int:
+        asked.extend(answers)
+        return 1
+
+    chosen = first_model(robot, ask=ask)
+    assert len(asked) == 2
+    assert chosen.model.values['arm.tool'] in asked[1]
+    assert any('--tool' in note for note in first_model(robot).notes)
+    right = tuple(f'right_{joint}' for joint in JOINTS)
+    first = first_model(robot, bag(tmp_path, right), ask=ask)
+    assert first.model.drives == right
+    assert first.model.values['arm.tool'] == 'right_flange'
+    assert len(asked) == 2
+
+
+def test_what_cannot_be_told_is_refused_with_what_to_write(robot: Path, tmp_path: Path) -> None:
+    np.savetxt(tmp_path / 'a.csv', np.column_stack([TIME, Q, DQ[:, :2]]), delimiter=',')
+    with pytest.raises(GuessError, match='no blocks of 3 joints'):
+        first_model(robot, [tmp_path / 'a.csv'])
+    np.savetxt(tmp_path / 'b.csv', np.column_stack([Q, TAU]), delimiter=',', fmt='%.17g')
+    with pytest.raises(FirstModelError, match='--rate HZ'):
+        first_model(robot, [tmp_path / 'b.csv'])
+    assert_read(read(robot, tmp_path / 'b.csv', rate=RATE), velocity=False)
+    frame({'time': TIME, **columns('lorem{k}', Q), 'ipsum': TIME}).to_csv(tmp_path / 'c.csv')
+    with pytest.raises(GuessError, match='lorem1'):
+        first_model(robot, [tmp_path / 'c.csv'])
+    with pytest.raises(FirstModelError, match='joint_map'):
+        first_model(robot, bag(tmp_path, ('uno', 'due', 'tre')))
+    (tmp_path / 'x.urdf').write_text('<robot name="x"><link name="a"/></robot>')
+    with pytest.raises(FirstModelError, match='no joint of it moves'):
+        first_model(tmp_path / 'x.urdf')
+    for text in ('words', '<sdf/>'):
+        (tmp_path / 'x.urdf').write_text(text)
+        with pytest.raises(UnreadableFileError):
+            first_model(tmp_path / 'x.urdf')
+
+
+MJCF = '''<mujoco><worldbody><body name="crank"><joint name="motor" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 0 0 0.1" size="0.01"/>
+<body name="coupler" pos="0 0 0.1"><joint name="knee" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.01"/></body></body>
+<body name="rocker" pos="0.3 0 0"><joint name="hip" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 0 0 0.1" size="0.01"/></body></worldbody>
+<equality><connect body1="coupler" body2="rocker" anchor="0.3 0 0"/></equality>
+<actuator><motor joint="motor"/></actuator></mujoco>'''
+
+
+def test_loops_and_actuators_of_an_mjcf_are_taken(tmp_path: Path) -> None:
+    (tmp_path / 'four_bar.xml').write_text(MJCF)
+    model = first_model(tmp_path / 'four_bar.xml', output=tmp_path / 'robot.yaml').model
+    assert model.drives == ('motor',)
+    (tmp_path / 'four_bar.xml').write_text(MJCF.replace('<motor joint="motor"/>', ''))
+    with pytest.raises(FirstModelError, match='--drives'):
+        first_model(tmp_path / 'four_bar.xml')
+    frame({'time': TIME, 'motor_pos': Q[:, 0], 'motor_torque': TAU[:, 0]}).to_csv(
+        tmp_path / 'run.csv', index=False)
+    first = first_model(tmp_path / 'four_bar.xml', [tmp_path / 'run.csv'])
+    assert first.model.drives == ('motor',)
+    assert first.has_efforts
+
+
+def test_the_command_writes_says_what_info_says_and_what_comes_next(
+    robot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    without_header(tmp_path)
+    assert main(['init', 'arm.urdf', 'run.csv', '--json', 'x.json']) == 0
+    said = ' '.join(capsys.readouterr().out.split())
+    assert '800 of 800 samples' in said
+    assert 'Next pprs fit run.csv --model robot.yaml --output base.yaml' in said
+    assert json.loads((tmp_path / 'x.json').read_text())['drives'] == list(JOINTS)
+    before = (tmp_path / 'robot.yaml').read_text()
+    assert 'guessed: no header: columns 2 to 4 taken as positions' in before
+    assert main(['info', 'run.csv', '--model', 'robot.yaml']) == 0
+    capsys.readouterr()
+    assert main(['init', 'arm.urdf']) == 2
+    assert 'exists already' in capsys.readouterr().err
+    assert (tmp_path / 'robot.yaml').read_text() == before
+    assert main(['init', 'arm.urdf', '--overwrite']) == 0
+    assert 'Next pprs info RECORDING' in ' '.join(capsys.readouterr().out.split())
+    assert main(['init', 'arm.urdf', 'none.csv', '--output', 'y.yaml']) == 2
+    assert not (tmp_path / 'y.yaml').exists()
+
+
+def test_a_file_that_the_user_goes_on_with_keeps_its_columns(robot: Path, tmp_path: Path) -> None:
+    from pprs_dynamics.physics.model.model_writer import write_model
+
+    first = first_model(robot, numbered(tmp_path), tmp_path / 'robot.yaml')
+    first.path.write_text(first.text)
+    write_model(tmp_path / 'base.yaml', load_model(first.path).values, first.path)
+    assert_read(read_recording(tmp_path / 'run.csv', load_model(tmp_path / 'base.yaml').recorded))
+
+
+def test_an_error_of_init_is_one_of_ours() -> None:
+    assert issubclass(FirstModelError, PprsError)
+    assert issubclass(GuessError, PprsError)

@@ -1,0 +1,98 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What `pprs` says to somebody who does not know it: help, what was meant, completion."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pprs_dynamics.app.commands.pprs import COMMANDS, _module, _parser, main
+from pprs_dynamics.errors import meant
+from pprs_dynamics.physics.effects.catalogue import catalogue
+
+
+def said(capsys: pytest.CaptureFixture[str]) -> str:
+    captured = capsys.readouterr()
+    return ' '.join((captured.out + captured.err).split())
+
+
+def test_alone_it_shows_its_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 0
+    text = said(capsys)
+    assert text.startswith('usage: pprs')
+    assert all(command in text for command in COMMANDS)
+
+
+@pytest.mark.parametrize('command', COMMANDS)
+def test_help_ends_with_an_example_that_the_command_takes(
+    command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    example = shlex.split(_module(command).EXAMPLE)
+    assert example[:2] == ['pprs', command]
+    with pytest.raises(SystemExit) as ended:
+        main([command, '--help'])
+    assert ended.value.code == 0
+    assert said(capsys).endswith(f'example: {" ".join(example)}')
+    assert _parser(example[1:]).parse_args(example[1:]).command == command
+
+
+@pytest.mark.parametrize(('arguments', 'words'), [
+    (['comapre', 'x.csv'], 'did you mean compare?'),
+    (['compare', 'x.csv', '--reprot', 'x.html'], 'did you mean --report?'),
+    (['simulate', '--output', 'x.csv', '--effect', 'stribek'], 'did you mean stribeck_friction?'),
+    (['adopt', 'stribek', 'x.csv', '--output', 'y.yaml'], 'did you mean stribeck_friction?'),
+    (['adopt', 'stribeck_friction:slide1', 'x.csv', '--output', 'y.yaml'],
+     'did you mean slide_1?'),
+    (['compare', 'rum.mcap'], 'did you mean run.mcap?'),
+    (['info', 'run.mcap', '--model', 'robto.yaml'], 'did you mean robot.yaml?'),
+    (['info', 'run.mcap', '--model', 'robot.yaml'], 'did you mean masses.payload?'),
+    (['info', 'run.mcap', '--model', 'arm.urdf'], '`pprs init arm.urdf RECORDING'),
+])
+def test_what_was_meant_is_named(
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / 'run.mcap').write_bytes(b'')
+    (tmp_path / 'arm.urdf').write_text('<robot name="arm"/>')
+    (tmp_path / 'robot.yaml').write_text('/**:\n  ros__parameters:\n    masses: {paylod: 1.0}\n')
+    try:
+        status = main(arguments)
+    except SystemExit as ended:
+        status = int(str(ended.code))
+    assert status == 2
+    assert words in said(capsys)
+
+
+def test_one_word_or_the_beginning_of_a_name_is_enough_and_nothing_is_made_up() -> None:
+    for name, effect in (('stribek', 'stribeck_friction'), ('hysterisis', 'hysteresis'),
+                         ('Payload', 'payload_mass'), ('tilt', 'base_tilt')):
+        assert meant(name, catalogue()) == effect
+    assert meant('zzz', catalogue()) == ''
+    assert meant('', catalogue()) == ''
+    assert meant('x', ()) == ''
+
+
+@pytest.mark.parametrize(('line', 'word'), [
+    ('pprs comp', 'compare'), ('pprs compare --rep', '--report'), ('pprs adopt strib', 'stribeck'),
+    ('pprs simulate --effect payload_m', 'payload_mass')])
+def test_a_shell_completes_commands_options_and_effects(
+    line: str, word: str, tmp_path: Path,
+) -> None:
+    # As the function does that register-python-argcomplete gives to bash, zsh and fish.
+    pytest.importorskip('argcomplete')
+    done = subprocess.run(
+        [sys.executable, '-m', 'pprs_dynamics.app.commands.pprs'], check=False, timeout=60,
+        env={**os.environ, '_ARGCOMPLETE': '1', 'COMP_LINE': line, 'COMP_POINT': str(len(line)),
+             '_ARGCOMPLETE_STDOUT_FILENAME': str(tmp_path / 'found')})
+    assert done.returncode == 0
+    assert word in (tmp_path / 'found').read_text()

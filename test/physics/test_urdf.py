@@ -1,0 +1,230 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What URDFs hold beside a tree: closures, gears, xacro, packages, and bodies that cannot be."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import made_up_arm as arm
+import numpy as np
+import pytest
+import robots_with_loops as robots
+
+from pprs_dynamics import ArmModel, JointMotion, load_model
+from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.physics.mechanism.urdf import read_urdf
+
+INERTIA = '<inertia ixx="{}" iyy="{}" izz="{}" ixy="0" ixz="0" iyz="0"/>'
+
+
+def one_link(folder: Path, inertia: tuple[float, float, float], more: str = '') -> tuple[str, ...]:
+    """Return what is said of a robot of 0.4 m with a body of 5 kg."""
+    path = folder / 'one.urdf'
+    path.write_text(f'''<robot name="one"><link name="base"/><link name="upper"><inertial>
+      <origin xyz="0.2 0 0"/><mass value="5"/>{INERTIA.format(*inertia)}</inertial></link>
+      <joint name="turn" type="revolute"><parent link="base"/><child link="upper"/>
+      <origin xyz="0 0 0.2"/><axis xyz="0 0 1"/></joint>{more}</robot>''')
+    return read_urdf(str(path)).remarks
+
+
+def test_bodies_that_cannot_be_are_told_and_those_that_can_are_not(tmp_path: Path) -> None:
+    assert one_link(tmp_path, (0.01, 0.08, 0.08)) == ()
+    assert one_link(tmp_path, (0.0, 0.08, 0.0801)) == ()  # a thin rod, rounded
+    (triangle,) = one_link(tmp_path, (0.005, 0.03, 0.08))
+    assert 'upper is no body: its principal moments of inertia are 0.005, 0.03, 0.08' in triangle
+    (millimetres,) = one_link(tmp_path, (1e4, 8e4, 8e4))
+    assert 'upper has 8e+04 kg m^2 in 5 kg' in millimetres
+    assert '126 m in a robot that reaches 0.4 m' in millimetres
+    assert '0.08 kg m^2' in millimetres
+
+
+def test_info_tells_what_is_wrong_with_a_description(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:
+    text = arm.urdf().replace('ixx="0.02"', 'ixx="20000"')
+    assert main(['info', '--model', str(arm.write_arm(tmp_path, text))]) == 0
+    assert 'beam is no body' in ' '.join(capsys.readouterr().out.split())
+
+
+def as_constraints(text: robots.RobotText, folder: Path) -> Path:
+    """Write a robot whose loops stand in its URDF."""
+    for name, loop in text.loops.items():
+        sides = ''.join(
+            f'<{side} link="{loop[of]["link"]}"/>'
+            f'<{side}_origin xyz="{robots.words(loop[of]["xyz"])}" '
+            f'rpy="{robots.words(loop[of].get("rpy", (0, 0, 0)))}"/>'
+            f'<{side}_axis xyz="0 0 1"/>' for side, of in (('parent', 'a'), ('child', 'b')))
+        text.parts.append(f'<constraint name="{name}" type="{loop["type"]}">{sides}</constraint>')
+    text.loops = {}
+    return text.write(folder)
+
+
+@pytest.mark.parametrize('kind', ['five_bar', 'hexapod'])
+def test_loops_are_read_from_constraints(tmp_path: Path, kind: str) -> None:
+    make = getattr(robots, kind)
+    expected = ArmModel.load(make().write(tmp_path))
+    s = expected.robot.structure
+    home = s.home[s.tables.drives]
+    q, v, a = np.random.default_rng(0).uniform(-0.02, 0.02, size=(3, 5, len(home)))
+    motion = JointMotion(home + q, v, a)
+    forces = expected.drive_forces(motion).total
+    (tmp_path / 'other').mkdir()
+    found = load_model(as_constraints(make(), tmp_path / 'other'))
+    assert found.drive_forces(motion).total == pytest.approx(forces, abs=1e-9)
+
+
+def test_axes_of_constraints_are_those_of_their_joint(tmp_path: Path) -> None:
+    """A hinge's axis is z of both frames; of a universal joint one axis is x, the other y."""
+    path = tmp_path / 'robot.urdf'
+    path.write_text('''<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="fixed">
+      <parent link="a"/><child link="b"/></joint>
+      <constraint name="hinge" type="continuous"><parent link="a"/>
+        <parent_origin xyz="1 2 3" rpy="0 0 1.5707963267948966"/><parent_axis xyz="2 0 0"/>
+        <child link="b"/><child_axis xyz="0 1 0"/></constraint>
+      <constraint name="cross" type="universal"><parent link="a"/><parent_axis xyz="0 0 1"/>
+        <child link="b"/><child_axis xyz="1 0 0"/></constraint></robot>''')
+    hinge, cross = read_urdf(str(path)).loops
+    assert hinge.kind == 'revolute'
+    assert hinge.frame_a.p == pytest.approx([1, 2, 3])
+    assert hinge.frame_a.R[:, 2] == pytest.approx([0, 1, 0])
+    assert hinge.frame_b.R[:, 2] == pytest.approx([0, 1, 0])
+    assert cross.frame_a.R[:, 0] == pytest.approx([0, 0, 1])
+    assert cross.frame_b.R[:, 1] == pytest.approx([1, 0, 0])
+    for frame in (hinge.frame_a, hinge.frame_b, cross.frame_a, cross.frame_b):
+        assert np.linalg.det(frame.R) == pytest.approx(1)
+        assert pytest.approx(np.eye(3), abs=1e-12) == frame.R.T @ frame.R
+
+
+@pytest.mark.parametrize(('of', 'more', 'words'), [
+    ('arm', '', r'<constraint> tip closes one.*block `robot`'),
+    ('robot', 'screw', r'constraint tip: its type is "screw", must be one of fixed, revolute'),
+    ('robot', 'nowhere', r'constraint tip is on nowhere, which is no link')])
+def test_constraints_that_cannot_be_are_refused_by_name(
+    tmp_path: Path, of: str, more: str, words: str,
+) -> None:
+    path = as_constraints(robots.five_bar(), tmp_path)
+    urdf = tmp_path / 'five_bar.urdf'
+    if more == 'screw':
+        urdf.write_text(urdf.read_text().replace('name="tip" type="revolute"',
+                                                 'name="tip" type="screw"'))
+    if more == 'nowhere':
+        head, tail = urdf.read_text().split('<constraint')
+        urdf.write_text(f'{head}<constraint{tail.replace("left_rod", "nowhere")}')
+    if of == 'arm':
+        lines = path.read_text().replace('robot:', 'arm:').replace('drives:', 'joints:')
+        path.write_text('\n'.join(line for line in lines.split('\n') if 'home' not in line
+                                  and 'elbow' not in line and 'left: ' not in line
+                                  and 'right: ' not in line))
+    with pytest.raises(PprsError, match=words) as error:
+        load_model(path)
+    assert '\n' not in str(error.value)
+
+
+XACRO = '''<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:property name="m" value="3"/><link name="x"><inertial><mass value="${2*m}"/></inertial>
+</link></robot>'''
+
+
+def test_xacro_is_run_where_its_package_is_and_told_where_it_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = tmp_path / 'robot.urdf.xacro'
+    path.write_text(XACRO)
+    monkeypatch.setitem(sys.modules, 'xacro', None)
+    with pytest.raises(PprsError, match=r'holds xacro.*xacro robot\.urdf\.xacro > robot\.urdf'):
+        read_urdf(str(path))
+    ran = '<robot name="a"><link name="x"><inertial><mass value="6"/></inertial></link></robot>'
+    monkeypatch.setitem(sys.modules, 'xacro', SimpleNamespace(
+        process_file=lambda name: SimpleNamespace(toxml=lambda: ran)))
+    assert read_urdf(str(path)).links['x'][0] == 6
+
+    def fails(name: str) -> None:
+        raise RuntimeError('No such file or directory:\nother.xacro')
+
+    monkeypatch.setitem(sys.modules, 'xacro', SimpleNamespace(process_file=fails))
+    with pytest.raises(PprsError, match=r'cannot be run: No such file or directory: other\.xacro'):
+        read_urdf(str(path))
+    # What was run once keeps the declaration of the name, and is a URDF.
+    path.write_text(XACRO.replace('${2*m}', '6').replace(
+        '<xacro:property name="m" value="3"/>', ''))
+    assert read_urdf(str(path)).links['x'][0] == 6
+
+
+def test_the_real_xacro_is_run_as_such(tmp_path: Path) -> None:
+    pytest.importorskip('xacro')
+    path = tmp_path / 'robot.urdf.xacro'
+    path.write_text(XACRO)
+    assert read_urdf(str(path)).links['x'][0] == 6
+
+
+def gear(tag: str, kind: str, side: str, number: str) -> str:
+    inside = f'<{tag}>{number}</{tag}>'
+    return (f'<transmission name="t"><{kind}>transmission_interface/SimpleTransmission</{kind}>'
+            f'<joint name="swing">{inside if side == "joint" else ""}</joint>'
+            f'<actuator name="m">{inside if side == "actuator" else ""}</actuator></transmission>')
+
+
+@pytest.mark.parametrize(('tag', 'kind', 'side'), [
+    ('mechanicalReduction', 'type', 'actuator'), ('mechanical_reduction', 'plugin', 'joint')])
+def test_reductions_are_gear_ratios_unless_the_model_file_has_some(
+    tmp_path: Path, tag: str, kind: str, side: str,
+) -> None:
+    text = arm.urdf(more=gear(tag, kind, side, '-50'))
+    model = load_model(arm.write_arm(tmp_path, text))
+    assert model.gear_ratios[model.drives.index('swing')] == 50
+    assert sorted(model.gear_ratios) == [1, 1, 50]
+    path = arm.write_arm(tmp_path, text)
+    path.write_text(path.read_text() + '      gear_ratio: [2.0, 3.0, 4.0]\n')
+    assert load_model(path).gear_ratios == (2.0, 3.0, 4.0)
+
+
+def test_gears_that_are_none_are_told(tmp_path: Path) -> None:
+    with pytest.raises(PprsError, match='reduction of transmission t is "fifty"'):
+        load_model(arm.write_arm(tmp_path, arm.urdf(
+            more=gear('mechanicalReduction', 'type', 'actuator', 'fifty'))))
+    other = gear('mechanicalReduction', 'type', 'actuator', '50').replace('Simple', 'FourBarish')
+    (remark,) = one_link(tmp_path, (0.01, 0.08, 0.08), other)
+    assert '<transmission> t is not used' in remark
+
+
+def test_what_has_a_shape_and_no_mass_and_dynamics_are_told(tmp_path: Path) -> None:
+    cover = ('<link name="cover"><collision/></link><joint name="lid" type="fixed">'
+             '<parent link="upper"/><child link="cover"/><dynamics damping="2"/></joint>')
+    hollow, rubbing = one_link(tmp_path, (0.01, 0.08, 0.08), cover)
+    assert hollow.startswith('cover have a shape and no <inertial>')
+    assert '<dynamics> of lid is not used' in rubbing
+
+
+def test_a_description_is_found_in_its_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def place(folder: Path) -> None:
+        (folder / 'urdf').mkdir(parents=True)
+        (folder / 'urdf' / 'arm.urdf').write_text(arm.urdf())
+
+    for variable in ('AMENT_PREFIX_PATH', 'ROS_PACKAGE_PATH'):
+        monkeypatch.delenv(variable, raising=False)
+    path = arm.write_arm(tmp_path)
+    path.write_text(path.read_text().replace('made_up.urdf', 'package://my_arm/urdf/arm.urdf'))
+    with pytest.raises(PprsError, match=r'package my_arm is in none of AMENT_PREFIX_PATH'):
+        load_model(path)
+    install = tmp_path / 'ws' / 'install'
+    place(install / 'share' / 'my_arm')
+    (install / 'share/ament_index/resource_index/packages').mkdir(parents=True)
+    (install / 'share/ament_index/resource_index/packages/my_arm').touch()
+    monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{install}')
+    assert load_model(path).values['arm.urdf'] == str(install / 'share/my_arm/urdf/arm.urdf')
+    monkeypatch.delenv('AMENT_PREFIX_PATH')
+    source = tmp_path / 'src' / 'arms' / 'another_name'
+    place(source)
+    (source / 'package.xml').write_text('<package><name>my_arm</name></package>')
+    monkeypatch.setenv('ROS_PACKAGE_PATH', str(source))
+    assert load_model(path).values['arm.urdf'] == str(source / 'urdf/arm.urdf')
+    monkeypatch.delenv('ROS_PACKAGE_PATH')
+    place(tmp_path / 'my_arm')
+    assert load_model(path).values['arm.urdf'] == str(tmp_path / 'my_arm/urdf/arm.urdf')

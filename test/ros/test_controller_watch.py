@@ -1,0 +1,112 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Whether a controller follows, by states as joint_trajectory_controller publishes them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pprs_dynamics.ros.node.controller_watch import ControllerWatch
+
+JOINTS = ('a', 'b')
+STEP = 0.01  # [s] between messages
+LATENCY = 0.012  # [s]
+
+
+class Cell:
+    """A stream to a controller, and the controller's states, on one clock."""
+
+    def __init__(self) -> None:
+        self.now = 50.0
+        self.watch = ControllerWatch(JOINTS, lambda: self.now)
+        self.said: list[str] = []
+
+    def path(self, time: float) -> np.ndarray:
+        """A slow circle in one joint and a shorter way in the other."""
+        return np.array([0.1 * np.sin(2 * time), 0.02 * np.cos(2 * time)])
+
+    def run(self, seconds: float, reference: Callable[[float], Any], left: float = 0.1,
+            moves_at_end: bool = False, joints: tuple[str, ...] = JOINTS, efforts: bool = True,
+            sends: bool = True) -> list[str]:
+        """Return what was complained of, at each state."""
+        said = []
+        for _ in range(round(seconds / STEP)):
+            self.now += STEP
+            if sends:
+                ahead = self.now + STEP * np.arange(10)
+                self.watch.sent(np.stack([self.path(t) for t in ahead]), left, moves_at_end)
+            if (position := reference(self.now)) is not None:
+                self.watch.heard(state(position, joints, efforts))
+            said.append(self.watch.complaint())
+        return said
+
+
+def state(position: Any, joints: tuple[str, ...], efforts: bool) -> Any:
+    return SimpleNamespace(
+        joint_names=list(joints),
+        reference=SimpleNamespace(positions=list(position)),
+        output=SimpleNamespace(effort=[0.0] * len(joints) if efforts else []))
+
+
+def test_one_that_follows_late_and_coarsely_is_not_complained_of() -> None:
+    cell = Cell()
+    late = cell.run(8.0, lambda t: cell.path(t - LATENCY) * 1.002)
+    assert set(late) == {''}
+    assert set(cell.run(4.0, lambda t: cell.path(t - 0.08))) == {''}
+
+
+def test_one_that_stands_is_told_within_two_seconds_and_recovers() -> None:
+    cell = Cell()
+    where = cell.path(50.0)
+    said = cell.run(6.0, lambda t: where)
+    assert 'does not follow' in said[200]
+    assert all(said[200:])  # also where the path comes back to where it stands
+    assert cell.run(2.0, cell.path)[-1] == ''
+
+
+@pytest.mark.parametrize(('given', 'reason'), [
+    ({'left': 0.01}, 'end 10 ms after they are sent'),
+    ({'moves_at_end': True}, 'allow_nonzero_velocity_at_trajectory_end'),
+    ({'efforts': False}, 'no command interface `effort`'),
+    ({'joints': ('a', 'b', 'gripper')}, 'joint gripper, too'),
+    ({}, 'its log says why')])
+def test_the_likely_reason_is_told(given: dict[str, Any], reason: str) -> None:
+    cell = Cell()
+    count = len(given.get('joints', JOINTS))
+    assert reason in cell.run(3.0, lambda t: [0.3] * count, **given)[-1]
+
+
+def test_a_controller_without_one_of_the_joints_is_told_which() -> None:
+    assert 'it has no joint b' in Cell().run(2.0, lambda t: [0.0], joints=('a',))[-1]
+
+
+def test_a_controller_that_falls_silent_is_not_active() -> None:
+    cell = Cell()
+    assert set(cell.run(2.0, cell.path)) == {''}
+    assert 'any more: is the controller active?' in cell.run(3.0, lambda t: None)[-1]
+    # Nothing is sent, nothing is missed.
+    assert cell.run(2.0, lambda t: None, sends=False)[-1] == ''
+
+
+def test_a_stream_that_stands_says_nothing_of_the_controller() -> None:
+    cell = Cell()
+    cell.path = lambda time: np.array([0.2, 0.1])  # type: ignore[method-assign]
+    assert set(cell.run(4.0, lambda t: [0.2, 0.1])) == {''}
+
+
+def test_the_reference_is_told_when_a_controller_appears_and_only_then() -> None:
+    cell = Cell()
+    found = []
+    for k in range(300):
+        cell.now += 0.02
+        if not 100 <= k < 200:  # silent for two seconds in between
+            found.append(cell.watch.heard(state([0.3, 0.4], JOINTS, True)))
+    told = [k for k, each in enumerate(found) if each is not None]
+    assert told == [0, 100]
+    assert found[0].tolist() == [0.3, 0.4]

@@ -1,0 +1,142 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What goes out around a change, at an end, and at rest: without ROS, by direct calls."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.physics.mechanism.paths import HelicalPath
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.ros.force_command import Feedforward
+from pprs_dynamics.ros.messages.trajectory_request import TrajectoryRequest
+
+OWN = {'feedforward_scale': 1.0, 'effort_limits': (), 'limit_policy': 'reject',
+       'missing_derivatives': 'reject', 'ramp_time': 0.0}
+MODEL = DriveModel.load()
+HEAVY = build_model({**MODEL.values, 'masses.payload': 3.0})
+STEP = 10_000_000  # [ns]
+
+
+class Clock:
+    now = 7.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def request(first: float = 1.0, points: int = 1) -> TrajectoryRequest:
+    motion = HelicalPath().motion(first + 0.01 * np.arange(points))
+    return TrajectoryRequest(motion, 0, STEP * np.arange(points))
+
+
+def test_a_change_of_model_and_scale_is_gone_over_to_in_its_time() -> None:
+    clock = Clock()
+    own: dict[str, Any] = {**OWN, 'ramp_time': 2.0}
+    node = Feedforward(MODEL, own, clock)
+    asked = request()
+    before = node.answer(asked).effort[0]
+    np.testing.assert_array_equal(before, MODEL.drive_forces(asked.motion).total[0])
+    after = 0.5 * HEAVY.drive_forces(asked.motion).total[0]
+    node.use(HEAVY, {**own, 'feedforward_scale': 0.5})
+    for passed in (0.0, 0.5, 1.0, 1.9, 2.0, 30.0):
+        clock.now = 7.0 + passed
+        share = min(passed / 2.0, 1.0)
+        np.testing.assert_allclose(
+            node.answer(asked).effort[0], (1 - share) * before + share * after, atol=1e-12)
+
+
+def test_no_step_of_a_ramp_is_larger_than_its_share() -> None:
+    """Along a path, efforts with a ramp differ from those without one by what is left of it."""
+    clock = Clock()
+    own = {**OWN, 'ramp_time': 1.0}
+    node = Feedforward(MODEL, own, clock)
+    node.answer(request(0.0))
+    node.use(HEAVY, own)
+    for k in range(1, 101):
+        clock.now = 7.0 + 0.01 * k
+        asked = request(0.01 * k, 5)
+        found = node.answer(asked).effort
+        old, new = (model.drive_forces(asked.motion).total for model in (MODEL, HEAVY))
+        # The points of a trajectory are due later, when more of the way is gone.
+        share = np.minimum(0.01 * (k + np.arange(5)), 1.0)[:, None]
+        np.testing.assert_allclose(found, old + share * (new - old), atol=1e-12)
+
+
+def test_without_a_ramp_and_before_the_first_command_a_change_is_at_once() -> None:
+    asked = request()
+    expected = HEAVY.drive_forces(asked.motion).total
+    for ramp, has_answered in ((0.0, True), (2.0, False)):
+        own = {**OWN, 'ramp_time': ramp}
+        node = Feedforward(MODEL, own, Clock())
+        if has_answered:
+            node.answer(asked)
+        node.use(HEAVY, own)
+        np.testing.assert_array_equal(node.answer(asked).effort, expected)
+
+
+def test_what_is_gone_over_stays_within_the_limits() -> None:
+    asked = request()
+    forces = MODEL.drive_forces(asked.motion).total[0]
+    limit = (np.abs(forces) * 1.01).tolist()
+    own = {**OWN, 'ramp_time': 2.0, 'limit_policy': 'clamp'}
+    clock = Clock()
+    node = Feedforward(MODEL, own, clock)
+    node.answer(asked)
+    node.use(HEAVY, {**own, 'effort_limits': limit})
+    clock.now += 1.0
+    assert (np.abs(node.answer(asked).effort[0]) <= limit).all()
+
+
+def test_a_piece_of_a_path_comes_to_rest_if_nothing_follows() -> None:
+    node = Feedforward(MODEL, OWN)
+    answer = node.answer(request(1.0, 4))
+    duration = 0.1
+    found = node.ending_at_rest(answer, duration)
+    q, v, a = found.drive_motion
+    assert np.diff(found.offsets).tolist() == [STEP, STEP, STEP, round(1e9 * duration)]
+    assert np.abs(v[-2]).max() > 0.01
+    assert not v[-1].any()
+    assert not a[-1].any()
+    # A constant deceleration takes half the way that the last speed would have gone.
+    np.testing.assert_allclose(q[-1] - q[-2], v[-2] * duration / 2, atol=1e-15)
+    gravity = MODEL.drive_forces(answer.request.motion.held()).parts['rigid_body']
+    np.testing.assert_allclose(found.effort[-1], gravity[0], atol=1e-12)
+    # What comes before is as it was.
+    for given, kept in zip(answer.forces.drive_motion, found.drive_motion, strict=True):
+        np.testing.assert_array_equal(given, kept[:-1])
+
+
+def test_a_path_that_ends_at_rest_and_a_time_of_0_get_no_point_more() -> None:
+    node = Feedforward(MODEL, OWN)
+    moving = node.answer(request(1.0, 3))
+    assert len(node.ending_at_rest(moving, 0.0).offsets) == 3
+    still = node.answer(TrajectoryRequest(HelicalPath().motion([1.0]).held(), 0, np.array([0])))
+    assert len(node.ending_at_rest(still, 0.1).offsets) == 1
+
+
+def test_a_stop_never_leads_beyond_a_stroke() -> None:
+    asked = request(1.0, 2)
+    lifts = MODEL.drive_forces(asked.motion).mechanism.position[-1, 3:]
+    narrow = build_model({**MODEL.values, 'limits.lift_stroke': [
+        float(lifts.min() - 1e-4), float(lifts.max() + 1e-4)]})
+    node = Feedforward(narrow, OWN)
+    node.answer(request(1.0, 1))
+    answer = node.answer(TrajectoryRequest(HelicalPath().motion([1.01]), 0, np.array([0])))
+    q = node.ending_at_rest(answer, 2.0).drive_motion[0]
+    lower, upper = narrow.limits.strokes
+    assert ((q[-1] >= lower) & (q[-1] <= upper)).all()
+
+
+@pytest.mark.parametrize('moment', [0.0, 1.3, 3.0])
+def test_drives_are_held_where_they_are_with_their_gravity(moment: float) -> None:
+    motion = HelicalPath().motion([moment])
+    pose = MODEL.drive_forces(motion.held())
+    found = Feedforward(MODEL, OWN).hold_at(pose.mechanism.position[0])
+    np.testing.assert_allclose(found.effort[0], pose.total[0], atol=1e-8)
+    np.testing.assert_allclose(found.forces.mechanism.position, pose.mechanism.position, atol=1e-9)
