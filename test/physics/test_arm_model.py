@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Callable
@@ -28,7 +29,9 @@ from pprs_dynamics.physics.effects.drive_effect import DriveRange
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.physics.effects.laws.external_wrench import ExternalWrench
 from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
+from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
+from pprs_dynamics.physics.effects.laws.stribeck_friction import StribeckFriction
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
 
@@ -317,3 +320,34 @@ def test_six_joints_are_no_slides_and_lifts() -> None:
     found = list(readings(joints, (DriveUnits(True),) * 6))
     assert not any(word in one.what for one in found for word in ('slide', 'lift', 'metres'))
     assert {one.kind for one in found} == {'reversed_time', 'position_unit', 'position_sign'}
+
+
+@pytest.mark.parametrize(('effect', 'parameter', 'turning', 'pushing'), [
+    ('homing_error', 'zero', 1.2, 0.12), ('hysteresis', 'distance', 0.4, 0.12),
+    ('stribeck_friction', 'velocity', 40.0, 12.0)])
+def test_bounds_of_parameters_are_in_the_unit_of_the_drive(
+    tmp_path: Path, effect: str, parameter: str, turning: float, pushing: float,
+) -> None:
+    """A zero may be off by any angle, and by a decimetre."""
+    values = ArmModel.load(arm.write_arm(tmp_path)).values
+    force = {} if effect == 'homing_error' else {'force': 1.0}
+
+    def with_one(drive: str, value: float) -> ArmModel:
+        block = {**force, parameter: value}
+        return ArmModel.from_parameters({**values, 'effects.active': [effect], **{
+            f'effects.{effect}.{drive}.{key}': number for key, number in block.items()}})
+
+    assert with_one('turn', turning).effects[-1].to_file()['turn'][parameter] == turning
+    with pytest.raises(ModelError, match=rf'effects\.{effect}\.reach\.{parameter}'):
+        with_one('reach', pushing)
+
+
+def test_what_is_tried_is_in_the_unit_of_the_drive() -> None:
+    """Gears give over tenths of a degree, and Stribeck's fall is above where friction turns."""
+    turns, pushes = (DriveRange(20.0, 0.01, 2.0, 2.0, turns=each) for each in (True, False))
+    give = [[one['distance'] for one in Hysteresis.trials(each)] for each in (turns, pushes)]
+    assert math.radians(2) < max(give[0]) < math.radians(5)
+    assert max(give[1]) == pytest.approx(0.005)
+    slowest = [min(one['velocity'] for one in StribeckFriction.trials(each))
+               for each in (turns, pushes)]
+    assert slowest == pytest.approx([0.01, 0.001])

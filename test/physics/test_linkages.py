@@ -479,3 +479,31 @@ def test_the_file_refuses_two_descriptions_and_none(tmp_path: Path) -> None:
     path.write_text(text.replace('base: base', 'base: base\n      mjcf: bar.xml'))
     with pytest.raises(ModelError, match='not stand beside'):
         load_model(path)
+
+
+def test_friction_of_passive_hinges_and_slides_turns_over_in_widths_of_their_own(
+    tmp_path: Path,
+) -> None:
+    """A hinge at 0.02 rad/s and a slide at 2 mm/s, both driven by one crank of 0.1 m."""
+    text = robots.RobotText('scotch_yoke', tool='yoke')
+    text.link('base')
+    text.link('crank', 1.0, (0.05, 0, 0), (0.001, 0.001, 0.001))
+    text.link('block', 0.2, (0, 0, 0), (0.001, 0.001, 0.001))
+    text.link('yoke', 1.0, (0, 0, 0), (0.01, 0.01, 0.01))
+    text.joint('turn', 'revolute', 'base', 'crank', axis=(0, 0, 1))
+    text.joint('pin', 'continuous', 'crank', 'block', (0.1, 0, 0), axis=(0, 0, 1))
+    text.joint('guide', 'prismatic', 'base', 'yoke', (0.1, 0, 0), axis=(1, 0, 0))
+    text.drives = ['turn']
+    text.home = {'turn': 0.5}
+    text.loop('slot', 'prismatic', 'yoke', (0, 0, 0), 'block', (0, 0, 0),
+              rpy_a=(-np.pi / 2, 0, 0), rpy_b=(-np.pi / 2, 0, 0))
+    path = text.write(tmp_path, {
+        'reversal_rate': 0.02, 'reversal_slide': 0.002,
+        'joints': {'pin': {'torque': 3.0}, 'guide': {'torque': 5.0}}})
+    model = ArmModel.load(path)
+    q, v = np.array([[0.8]]), np.array([[0.02]])
+    found = model.drive_forces(JointMotion(q, v, 0 * v)).parts['passive_friction'][0, 0]
+    # The block does not turn: the pin turns back as fast as the crank; x = 0.1 cos q.
+    slide = -0.1 * np.sin(0.8)
+    assert found == pytest.approx(3.0 * np.tanh(0.02 / 0.02) + 5.0 * slide * np.tanh(
+        slide * 0.02 / 0.002), abs=1e-9)

@@ -45,7 +45,8 @@ def run(options: argparse.Namespace) -> int:
         content['robot'] = describe_mechanism(model)
         for line in mechanism_lines(model):
             screen.print(shown(line))
-        for remark in model.robot.structure.description.remarks:
+        description = model.robot.structure.description
+        for remark in (*description.faults, *description.remarks):
             screen.print(f'[yellow]![/] {shown(remark)}')
         if options.report:
             write_mechanism_page(options.report, model, Path(options.model).stem)

@@ -16,11 +16,14 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.comparison import compare as compare_residuals
 from pprs_dynamics.inference.diagnosis.localisation import localise
+from pprs_dynamics.inference.diagnosis.next_step import first_step
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.comparison_bag import write_comparison
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.paired_errors import rms, rms_by_drive
 from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.search.explained_effort import little_explained
+from pprs_dynamics.inference.search.noise_floors import measure_columns, noise_floors
 from pprs_dynamics.measurement.files.recording import read_recording
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.system.output_files import write_text
@@ -134,7 +137,8 @@ class ComparisonResult(Result):
         drives = self.comparison.drives
         figure = plot_errors(
             {'error': {name: one.rms for name, one in drives.items()},
-             'noise': {name: one.noise_floor for name, one in drives.items()}},
+             'noise': {name: one.noise_floor for name, one in drives.items()
+                       if one.noise_floor is not None}},
             self.comparison.unit, rows=2)
         worst = max(drives, key=lambda name: drives[name].unexplained)
         d, residuals = self.residuals.drives.index(worst), self.residuals
@@ -145,8 +149,11 @@ class ComparisonResult(Result):
         return figure
 
     @property
-    def _next(self) -> str:
-        return self.inputs.files.command('diagnose', '--report', 'why.html')
+    def _next(self) -> tuple[str, str]:
+        if self.comparison.little:
+            return first_step(self.inputs.model, self.inputs.files)
+        return ('Find out which physical effect is missing',
+                self.inputs.files.command('diagnose', '--report', 'why.html'))
 
 
 def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
@@ -182,12 +189,14 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
     """
     inputs = Inputs.of(model, recordings, (), topic, progress, whole=True).require_recordings()
     measuring = stage(progress, 'motion and model')
-    residuals, notes = measure_residuals(
-        inputs.model, inputs.fitted,
-        lambda done, total: measuring(done / total if total else 0.0))
+    columns, residuals, notes = measure_columns(inputs.model, inputs.fitted, measuring)
     where = localise(residuals, progress=stage(progress, 'where it fails'))
+    comparison = compare_residuals(
+        residuals, where,
+        noise_floors(columns, where.patterns, period=residuals.period) if columns else {},
+        little_explained(inputs.model, residuals))
     return ComparisonResult(
-        inputs, residuals, compare_residuals(residuals, where), tuple(notes),
+        inputs, residuals, comparison, tuple(notes),
         None if beside is None else _beside(inputs, Path(beside), topic))
 
 

@@ -232,11 +232,13 @@ def _parameters(view: ViewState, effect: type[CatalogueEffect], model: ForceMode
     shapes = {parameter.name for parameter in effect.shape}
     rows = []
     for key, one in view.estimates.get(effect.name, {}).items():
-        parameter = known[effect.place_and_parameter(key)[1]]
+        drive, name = effect.place_and_parameter(key)
+        unit = units.get(drive, DriveUnits())
+        parameter = known[name].of(unit.turns)
         rows.append({
             'key': key, 'symbol': parameter.symbol, 'value': finite(one.value),
             'std': finite(one.std), 'description': parameter.description,
-            'unit': units.get(effect.place_and_parameter(key)[0], DriveUnits()).of(parameter.unit),
+            'unit': unit.of(parameter.unit),
             'lower': parameter.lower, 'upper': parameter.upper, 'scale': parameter.scale,
             'is_shape': parameter.name in shapes, 'is_relative': parameter.is_relative,
             'is_chosen': key in chosen})

@@ -36,6 +36,10 @@ from pprs_dynamics.inference.search.estimates import (
     calibrations,
     estimate,
 )
+from pprs_dynamics.inference.search.explained_effort import (
+    explained_shares,
+    little_explained,
+)
 from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,
@@ -45,11 +49,13 @@ from pprs_dynamics.inference.search.fitted_model import (
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder
 from pprs_dynamics.inference.search.held_out import hold_out
+from pprs_dynamics.inference.search.noise_floors import noise_floors
 from pprs_dynamics.inference.search.ranking import Ranking, select
 from pprs_dynamics.inference.search.relinearisation import settled
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.system.numbers import finite
 
 MOST_SETS = 8  # that are told with their costs
 MOST_AVERAGED = 5  # sets that estimates are averaged over
@@ -93,6 +99,11 @@ class Diagnosis:
         The same over drives [N].
     above_noise : mapping of str to float
         How many times its noise a drive keeps, where that is more than what was found may leave.
+    little : mapping of str to float
+        Drives of whose effort little is explained with what was found, with the shares.
+    unseen_noise : tuple of str
+        Drives whose noise cannot be told apart from what may be missing: their floor is an upper
+        bound, what the best set leaves.
     held_out_on : {'blocks', 'validation'}
     selection : Ranking, optional
         All that was tried, for looking closer.
@@ -120,6 +131,8 @@ class Diagnosis:
     noise_floors: dict[str, float]
     noise_floor: float
     above_noise: Mapping[str, float] = field(default_factory=dict)
+    little: Mapping[str, float] = field(default_factory=dict)
+    unseen_noise: tuple[str, ...] = ()
     held_out_on: str = 'blocks'
     selection: Ranking | None = field(default=None, repr=False, compare=False)
     decisions: Decisions = DECISIONS
@@ -141,6 +154,9 @@ class Diagnosis:
             'sets': [one.to_dict() for one in self.sets],
             'calibrated': [one.to_dict() for one in self.calibrated],
             'held_out_on': self.held_out_on, 'above_noise': dict(self.above_noise),
+            'explained': _for_json(explained_shares(self.residuals)),
+            'little_explained': dict(self.little),
+            'explained_after': _for_json(explained_shares(self.residuals, self.remaining)),
             'noise_floor': self.noise_floor,
             'noise_floors': dict(self.noise_floors), 'warnings': list(self.warnings)}
 
@@ -202,14 +218,16 @@ class _Answer:
         first, final, effects = self.ranking.first.design, self.final, self.effects
         regression = self.fits.regression
         noise = {self.drives[d]: one for d, one in regression.noise(self.best.fit).items()}
-        floors = {self.drives[d]: regression.noise_floor(self.best.fit, d)
-                  for d in regression.drives}
+        seen = noise_floors(self.fits, blocks=self.best.fit.blocks)
+        # Where the noise cannot be told it is at most what the best set leaves.
+        floors = {self.drives[d]: seen.get(self.drives[d], regression.noise_floor(
+            self.best.fit, d)) for d in regression.drives}
         rivals = self._rivals()
         depends = self._depends_on(noise)
         sets = tuple((name, *others) for name, others in rivals.items() if others)
-        # Where nothing was found, what is left is the noise.
-        above = self._above_noise(floors) if effects or unconfirmed else {}
-        verdict = ('unknown' if depends or above else 'ambiguous' if sets
+        above = self._above_noise(floors)
+        little = little_explained(final.model, first.residuals, self.remaining, self.decisions)
+        verdict = ('unknown' if depends or above or little else 'ambiguous' if sets
                    else 'effect' if effects else 'adequate')
         moved = [one for one in calibrations(final.fits, final.found, final.widths)
                  if abs(one.after - one.before) > self.decisions.sure * one.std]
@@ -219,7 +237,8 @@ class _Answer:
                                                  self.ranking.remainders)), self._sets(),
             tuple(moved), find_cautions(self.fits, self.best, effects), first.notes,
             first.given, final.model, first.residuals, self.remaining, noise, floors,
-            root_mean_square(list(floors.values())), above,
+            root_mean_square(list(floors.values())), above, little,
+            tuple(name for name in floors if name not in seen),
             'validation' if self.validate else 'blocks', self.ranking, self.decisions)
 
     def _effects(self) -> list[FoundEffect]:
@@ -300,9 +319,17 @@ class _Answer:
 
     def _above_noise(self, floors: Mapping[str, float]) -> dict[str, float]:
         """Return the drives that keep an error above their noise, as multiples of it."""
-        kept = {self.drives[d]: root_mean_square(self.remaining[:, d]) / max(
+        # A constant that slow noise would show as well is none of it.
+        kept = {self.drives[d]: float(np.nanstd(self.remaining[:, d])) / max(
             floors[self.drives[d]], 1e-300) for d in self.fits.regression.drives}
-        return {name: ratio for name, ratio in kept.items() if ratio > self.decisions.left_ratio}
+        return {name: ratio for name, ratio in kept.items() if ratio > self.decisions.left_ratio
+                and self._is_worth_a_word(self.drives.index(name))}
+
+    def _is_worth_a_word(self, d: int) -> bool:
+        """Return whether what is left on a drive is more than a negligible share of its effort."""
+        effort = self.ranking.first.design.residuals.measured[:, d]
+        return float(np.nanstd(self.remaining[:, d])) > (
+            self.decisions.negligible * float(np.nanstd(effort)))
 
     def _evidence(self, candidate: Candidate) -> float:
         return self.ranking.without[candidate].total - self.kept.total
@@ -368,6 +395,10 @@ class _Answer:
         return WithinModelError(
             remainder.candidate.name, self.design.named(remainder.candidate.drives),
             float(np.sqrt(np.mean(force ** 2, axis=0)).max()), remainder.of)
+
+
+def _for_json(shares: Mapping[str, float]) -> dict[str, float | None]:
+    return {name: finite(share) for name, share in shares.items()}
 
 
 def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),

@@ -29,6 +29,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     sentence,
     with_drives,
     with_uncertainty,
+    word_little,
 )
 from pprs_dynamics.inference.diagnosis.statements import (
     Statement,
@@ -43,6 +44,8 @@ from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFri
 
 MOST_CHANGED = 4  # values of an effect of the model that a sentence sets against the recordings'
 MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
+# Times the size that matters, an uncertainty beyond which, and beyond the value, nothing is known.
+ANYTHING = 100.0
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
 
 
@@ -87,7 +90,10 @@ class FittedValue:
 
     @property
     def text(self) -> str:
-        """Value with uncertainty and unit as people read it."""
+        """Value with uncertainty and unit as people read it; none where it may be anything."""
+        known = max(self.size, ANYTHING * self.parameter.scale)
+        if INTERVAL * self.estimate.std > known:
+            return 'not determined by this motion'
         return with_uncertainty(self.estimate.value, self.estimate.std, self.estimate.unit,
                                 self.size)
 
@@ -196,6 +202,11 @@ def _headline(diagnosis: Diagnosis) -> str:
         f' With {"it" if len(held) == 1 else "them"} the error '
         f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')
     noise = in_unit(diagnosis.noise_floor, unit)
+    if diagnosis.little:
+        little = word_little(diagnosis.little, ' with what was found' if held else '')
+        beside = f' What was found: {_claims(diagnosis)}.{fall}.' if held else ''
+        return (f'{little[:1].upper()}{little[1:]}, and no effect of the catalogue the rest.'
+                f'{beside}{doubt}')
     if not held and not diagnosis.depends_on and diagnosis.unconfirmed:
         left = root_mean_square(diagnosis.remaining)
         lacks = 'Something is missing. ' if diagnosis.verdict == 'unknown' else ''
@@ -212,11 +223,16 @@ def _headline(diagnosis: Diagnosis) -> str:
         beside = f' Beside it, {_claims(diagnosis)}.{fall}, not to the noise.' if held else ''
         return ('Something is missing that no effect of the catalogue explains: '
                 f'{places}.{beside}{doubt}')
+    unseen = (f'How much of the error of {listed(diagnosis.unseen_noise)} is noise cannot be told '
+              'from this recording.') if diagnosis.unseen_noise else ''
     if diagnosis.verdict == 'adequate':
+        if unseen:
+            return f'Nothing stands out. {unseen}'
         return (f'Nothing is missing beyond noise, which is {noise} rms. Effects much weaker than '
                 'that could still hide in it.')
     left = held[-1].error_after
-    level = (', which is the noise.' if left <= AT_NOISE * diagnosis.noise_floor
+    level = (f'. {unseen}' if unseen
+             else ', which is the noise.' if left <= AT_NOISE * diagnosis.noise_floor
              else f'. The noise is {noise}; the rest is within the model error of what was found.'
              if diagnosis.within_model_error
              # Only the widths of reversals are fitted and yet not part of the model.

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.inference.regression.sensitivities import Number
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
@@ -95,9 +96,17 @@ def rounded(value: float) -> float:
     return float(f'{value:.{DIGITS}g}')
 
 
-def within(parameter: Parameter, value: float) -> float:
-    """Return a fitted value, rounded, within the bounds of its parameter."""
-    return float(min(max(rounded(value), parameter.lower), parameter.upper))
+def within(parameter: Parameter, value: float, units: DriveUnits) -> float:
+    """Return a fitted value, rounded, within the bounds of its parameter in a drive."""
+    bounded = parameter.of(units.turns)
+    return float(min(max(rounded(value), bounded.lower), bounded.upper))
+
+
+def units_of(model: ForceModel, drive: str | int | None) -> DriveUnits:
+    """Return the units of a drive by name or number; those that push for the structure."""
+    if drive is None:
+        return DriveUnits()
+    return model.units[model.drives.index(drive) if isinstance(drive, str) else drive]
 
 
 def move_numbers(values: dict[str, Any], base: Sequence[BaseColumn], coefficients: Array) -> None:
@@ -132,7 +141,8 @@ def move_present(values: dict[str, Any], given: ForceModel, base: Sequence[BaseC
             every = {**kind.from_coefficients(linear), **shape}
             prefix = f'effects.{kind.name}.' + (f'{drive}.' if drive else '')
             for parameter in kind.parameters:
-                values[prefix + parameter.name] = within(parameter, every[parameter.name])
+                values[prefix + parameter.name] = within(parameter, every[parameter.name],
+                                                           units_of(given, drive))
 
 
 def present_values(effect: CatalogueEffect, drive: str | None) -> Mapping[str, float]:

@@ -334,5 +334,6 @@ def passive_reversal_columns(friction: Effect, state: Any) -> Array:
     """
     before = friction.force(state)
     return np.stack([friction.force(state.turning_over(replace(
-        state.reversal, rate=factor * state.reversal.rate))) - before
+        state.reversal, rate=factor * state.reversal.rate,
+        slide=factor * state.reversal.slide))) - before
         for factor in PASSIVE_WIDTHS])

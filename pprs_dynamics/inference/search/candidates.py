@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.decisions import Decisions
@@ -58,10 +59,11 @@ class Component:
         """Return an effect on a drive or in the structure, of one shape."""
         return cls(effect, drive, names, tuple(sorted(shape.items())))
 
-    def is_within(self, coefficients: Array) -> bool:
-        """Return whether all linear parameters are within the bounds of the catalogue."""
+    def is_within(self, coefficients: Array, units: DriveUnits) -> bool:
+        """Return whether all linear parameters are within their bounds in a drive of such units."""
         values = self.values(coefficients)
-        return all(p.lower <= values[p.name] <= p.upper for p in self.effect.linear)
+        return all(p.lower <= values[p.name] <= p.upper
+                   for p in (one.of(units.turns) for one in self.effect.linear))
 
     @property
     def signed(self) -> tuple[str, ...]:

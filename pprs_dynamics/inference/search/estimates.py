@@ -17,6 +17,7 @@ from pprs_dynamics.inference.regression.base_columns import (
     PresentCoefficient,
     PresentShape,
     present_values,
+    units_of,
     within,
 )
 from pprs_dynamics.inference.regression.design import Design
@@ -260,6 +261,7 @@ def _of_component(
                 component.given, effect.coefficients, strict=True)))
     prefix = '' if component.drive is None else f'{fits.design.drives[component.drive]}.'
     unit_of = _units(fits.design, component.drive)
+    units = units_of(fits.design.given, component.drive)
     values = component.values(c)
     size = len(c)
     found = {}
@@ -276,13 +278,13 @@ def _of_component(
             slope[k] = (component.values(beside)[parameter.name] - values[parameter.name]) / step
         variance = float(slope @ covariance[:size, :size] @ slope)
         found[prefix + parameter.name] = Estimate(
-            within(parameter, values[parameter.name]), max(variance, 0.0) ** 0.5,
+            within(parameter, values[parameter.name], units), max(variance, 0.0) ** 0.5,
             unit_of(parameter.unit))
     for k, parameter in enumerate(effect.shape if with_shape else ()):
         value = float(shape[parameter.name])
         amount = float(np.sqrt(max(covariance[size + k, size + k], 0.0)))
         found[prefix + parameter.name] = Estimate(
-            within(parameter, value), parameter.spread(amount, value),
+            within(parameter, value, units), parameter.spread(amount, value),
             unit_of(parameter.unit))
     return found, [prefix + name for name in fits.library.at_edge(
         component, fits.decisions.edge_share)]

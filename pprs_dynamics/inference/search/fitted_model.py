@@ -16,6 +16,7 @@ from pprs_dynamics.inference.regression.base_columns import (
     ReversalShape,
     move_numbers,
     move_present,
+    units_of,
     within,
 )
 from pprs_dynamics.inference.regression.design import Design
@@ -71,7 +72,7 @@ def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> Fo
             if kind.is_of_one_place and every[parameter.name] == parameter.default:
                 continue  # of all the links or joints that it is not on
             values[f'effects.{kind.name}.{drive}{parameter.name}'] = within(
-                parameter, every[parameter.name])
+                parameter, every[parameter.name], units_of(design.given, one.drive))
     if names:
         values['effects.active'] = names
     return replace(build_model(values), source=design.given.source)

@@ -13,6 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.base_columns import units_of
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
@@ -142,7 +143,8 @@ class FittedSets:
         A value beyond its bounds may not; a pattern has to be more than the lack of fit of the
         effects beside it.
         """
-        if not all(one.is_within(found.coefficients(one)) for one in found.blocks):
+        if not all(one.is_within(found.coefficients(one), units_of(self.design.given, one.drive))
+                   for one in found.blocks):
             return False
         return all(discrepancy_ratio(self.design, self.regression, self.decisions, found,
                                      candidate)[0] >= 1 for candidate in found.unknowns)
@@ -235,7 +237,8 @@ class FittedSets:
             for parameter, step in zip(effect.shape, fit.of(block), strict=True):
                 limit = longest * reach[parameter.name]
                 value = parameter.moved(shape[parameter.name], float(np.clip(step, -limit, limit)))
-                shape[parameter.name] = float(np.clip(value, parameter.lower, parameter.upper))
+                bounded = parameter.of(units_of(self.design.given, component.drive).turns)
+                shape[parameter.name] = float(np.clip(value, bounded.lower, bounded.upper))
             moved[component] = replace(component, shape=tuple(sorted(shape.items())))
         return tuple(
             EffectCandidate.of(moved.get(one, one) for one in c.components)

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -21,7 +21,11 @@ from pprs_dynamics.physics.three_pprs.state import DriveStates
 
 @dataclass(frozen=True)
 class DriveSamples:
-    """Samples of one drive: all (N,); `time` is None where unknown, `direction` is sgn."""
+    """Samples of one drive: all (N,); `time` is None where unknown, `direction` is sgn.
+
+    `guide_load` is what its guide carries, without a sign; `transmitted` what its gear or screw
+    passes on to the mechanism, without friction, with the sign of the effort [N, N m].
+    """
 
     time: Array | None
     position: Array
@@ -29,6 +33,7 @@ class DriveSamples:
     acceleration: Array
     direction: Array
     guide_load: Array
+    transmitted: Array
     memory: Any = None
 
     @classmethod
@@ -36,7 +41,7 @@ class DriveSamples:
         """Return the samples of one drive of a state."""
         return cls(state.time, state.position[:, drive], state.velocity[:, drive],
                    state.acceleration[:, drive], state.direction[:, drive],
-                   state.guide_load[:, drive], memory)
+                   state.guide_load[:, drive], state.transmitted[:, drive], memory)
 
 
 @dataclass(frozen=True)
@@ -48,13 +53,15 @@ class DriveRange:
     duration, step : float
         Of the recording, and between samples [s].
     stroke : float
-        Between the lowest and the highest position [m].
+        Between the lowest and the highest position [m, rad].
     top_speed : float
-        [m/s]
+        [m/s, rad/s]
     gear_ratio : float
         Turns of the motor per turn of the drive; 1 where no gear is known.
     delay : float
         By which the measured effort is most like the model's [s].
+    turns : bool
+        Whether the drive is revolute.
     """
 
     duration: float
@@ -63,6 +70,7 @@ class DriveRange:
     top_speed: float
     gear_ratio: float = 1.0
     delay: float = 0.0
+    turns: bool = False
 
 
 class DriveEffect(CatalogueEffect):
@@ -147,6 +155,23 @@ class DriveEffect(CatalogueEffect):
         if memory is not None and set(memory) != set(self.drives):
             raise ModelError('state', sorted(memory), f'come from a model with this very '
                              f'{self.name}')
+
+    @classmethod
+    def check_bounds(cls, values: Any, turning: Collection[str]) -> None:
+        """Raise ModelError where a parameter is beyond what it may be in a drive of its kind.
+
+        Parameters
+        ----------
+        values : mapping
+            See `from_file`.
+        turning : collection of str
+            Drives that turn.
+        """
+        for drive, block in values.items() if isinstance(values, Mapping) else ():
+            for p in cls.parameters if isinstance(block, Mapping) else ():
+                if p.turning is not None and p.name in block:
+                    p.of(drive in turning).check(f'effects.{cls.name}.{drive}.{p.name}',
+                                                 block[p.name])
 
     def force(self, state: DriveStates, memory: Any = None) -> Array:
         """Return the effect's drive forces [N], (N, D)."""

@@ -9,7 +9,7 @@ import copyreg
 import math
 from abc import ABC, ABCMeta, abstractmethod
 from collections.abc import Hashable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 from pprs_dynamics.arrays import Array
@@ -28,13 +28,15 @@ class Parameter:
     ----------
     name, symbol, unit, description : str
     lower, upper : float
-        Bounds, both allowed.
+        Bounds, both allowed; in a drive that pushes, where one that turns has others.
     default : float, optional
         Value where a model file is silent; required in the file without one.
     scale : float
         A size at which it matters, for numerical derivatives.
     is_angle : bool
         True for a phase: its size says nothing about how strong the effect is.
+    turning : (float, float), optional
+        Bounds in a drive that turns: radians for metres.
     expected : (float, float), optional
         How large it usually is, as a standard deviation, in a drive that pushes and in one that
         turns, the same in the structure; without it any size is as likely as another.
@@ -50,6 +52,19 @@ class Parameter:
     scale: float = 1.0
     is_angle: bool = False
     expected: tuple[float, float] | None = None
+    turning: tuple[float, float] | None = None
+
+    def of(self, turns: bool) -> Parameter:
+        """Return the parameter with the bounds that it has in a drive that turns, or pushes."""
+        if not turns or self.turning is None:
+            return self
+        return replace(self, lower=self.turning[0], upper=self.turning[1])
+
+    @property
+    def widest(self) -> Parameter:
+        """The parameter with bounds that hold for drives of either kind."""
+        lower, upper = self.turning or (self.lower, self.upper)
+        return replace(self, lower=min(lower, self.lower), upper=max(upper, self.upper))
 
     @property
     def is_relative(self) -> bool:
@@ -216,6 +231,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     is_of_one_place : bool
         True where each variant is at a place of its own, a link or a joint: that a motion does
         not show every one of them is not worth telling.
+    at_one_load : str
+        Name of the effect that does the same where the load of a drive does not vary.
     alike : tuple of tuple of str
         Groups of places at which the effect does the same in every motion.
     """
@@ -236,6 +253,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     idealised: ClassVar[bool] = True
     shows_at_reversals: ClassVar[bool] = False
     is_of_one_place: ClassVar[bool] = False
+    at_one_load: ClassVar[str] = ''
     alike: ClassVar[tuple[tuple[str, ...], ...]] = ()
 
     def __init_subclass__(cls) -> None:
@@ -346,7 +364,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
                 raise ModelError(f'{prefix}.{name}', MISSING,
                                  f'be given ({parameter.description} [{parameter.unit}])')
             value = values.get(name, parameter.default)
-            checked[name] = parameter.check(f'{prefix}.{name}', value)
+            checked[name] = parameter.widest.check(f'{prefix}.{name}', value)
         return checked
 
 

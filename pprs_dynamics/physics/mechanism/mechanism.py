@@ -332,13 +332,19 @@ class LinkageState(JointMotion):
         efforts: Array = self.reactions.efforts + self.robot.armature * self.acceleration
         return efforts
 
-    @lazy
-    def guide_load(self) -> Array:
-        """What a drive's gear carries [N m, N]: the size of its effort without friction.
+    @property
+    def transmitted(self) -> Array:
+        """Efforts that the drives' gears pass on, without friction [N m, N].
 
         The motor accelerates its rotor on its own side of the gear.
         """
-        load: Array = np.abs(self.reactions.efforts)
+        efforts: Array = self.reactions.efforts
+        return efforts
+
+    @lazy
+    def guide_load(self) -> Array:
+        """What a drive's gear carries [N m, N]: the size of what it passes on."""
+        load: Array = np.abs(self.transmitted)
         return load
 
     @lazy

@@ -28,11 +28,14 @@ class Reversal:
     velocity : float or sequence of 6 floats
         Of all drives, or of each [m/s].
     rate : float
-        Of the passive joints [rad/s].
+        Of the passive joints that turn [rad/s].
+    slide : float
+        Of passive slides [m/s].
     """
 
     velocity: float | tuple[float, ...] = 0.001
     rate: float = 0.001
+    slide: float = 0.001
 
     def widths(self, drives: int) -> Array:
         """Return the width of each drive [m/s], (D,)."""

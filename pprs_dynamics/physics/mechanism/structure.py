@@ -23,6 +23,7 @@ from pprs_dynamics.physics.mechanism.description import (
     FLOATING,
     PARAMETERS,
     PRISMATIC,
+    REVOLUTE,
     TURNING,
     Description,
     Frame,
@@ -128,6 +129,12 @@ class Structure:
         lower, upper = np.maximum(self.lower, -widest), np.minimum(self.upper, widest)
         middle = self.home[self.tables.drives] if self.loops else (lower + upper) / 2
         return middle, np.maximum(np.minimum(upper - middle, middle - lower), 0.0)
+
+    @property
+    def turning(self) -> tuple[str, ...]:
+        """Drives that turn."""
+        return tuple(name for name, kind in zip(self.drives, self.kinds, strict=True)
+                     if kind == REVOLUTE)
 
     @property
     def held(self) -> tuple[str, ...]:

@@ -115,6 +115,11 @@ class ArmModel(ForceModel):
         return self.limits.efforts
 
     @property
+    def faults(self) -> tuple[str, ...]:
+        """Sentences on bodies that cannot be, unless the file has other inertia than the URDF."""
+        return () if self.values['links.inertia'] else self.robot.structure.description.faults
+
+    @property
     def efforts_in_amperes(self) -> bool:
         """Whether efforts of recordings are currents."""
         return bool(self.values[f'{self.block}.effort_unit'] == 'A')
@@ -169,7 +174,8 @@ class ArmModel(ForceModel):
             common = values['friction.reversal_velocity']
             width = tuple(own or common for own in values['friction.reversal_velocities'])
             return cls(robot=robot, effects=effects,
-                       reversal=Reversal(width, values.get('friction.reversal_rate', common)),
+                       reversal=Reversal(width, values.get('friction.reversal_rate', common),
+                                         values.get('friction.reversal_slide', common)),
                        values=values, source=source)
 
     @cached_property

@@ -65,8 +65,13 @@ class AxisState(JointMotion):
 
     @property
     def guide_load(self) -> Array:
-        """Unknown, and constant: dry friction is a force here, not a coefficient; (N, 1) [N]."""
-        return np.zeros_like(self.velocity)
+        """What gear or screw carry, (N, 1) [N]; the weight on the guide is constant and unknown."""
+        return np.abs(self.transmitted)
+
+    @property
+    def transmitted(self) -> Array:
+        """Force that gear or screw pass on, without friction, (N, 1) [N]."""
+        return self.rigid_force
 
 
 @dataclass(frozen=True, kw_only=True)

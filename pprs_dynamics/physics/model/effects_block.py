@@ -45,6 +45,8 @@ def added_effects(
         _check_place(name, block, found, kind, drives, title_of(parameters))
         found = found.bound(robot)
         # A block that is not active is checked all the same, but may still be incomplete.
+        if issubclass(found, DriveEffect):
+            found.check_bounds(block, [] if robot is None else robot.structure.turning)
         effect = found.from_file(block, complete=name in active)
         if name in active:
             if name in of_sensors:

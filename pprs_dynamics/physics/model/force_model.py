@@ -250,6 +250,11 @@ class ForceModel(ABC):
         return np.full(len(self.drives), np.inf)
 
     @property
+    def faults(self) -> tuple[str, ...]:
+        """Sentences on bodies of the model that cannot be."""
+        return ()
+
+    @property
     def efforts_in_amperes(self) -> bool:
         """Whether efforts of recordings are currents."""
         return False

@@ -240,8 +240,10 @@ def mechanism_keys(block: str, count: int) -> dict[str, Key]:
             may_be_empty=True, default=''),
         Key('robot.mjcf', "path of the robot's MJCF instead", is_text=True, may_be_empty=True,
             default=''),
-        Key('friction.reversal_rate', 'width in which sgn turns over in passive joints',
-            'rad/s, m/s', positive=True, default=0.01))
+        Key('friction.reversal_rate', 'width in which sgn turns over in passive joints that turn',
+            'rad/s', positive=True, default=0.01),
+        Key('friction.reversal_slide', 'width in which sgn turns over in passive slides', 'm/s',
+            positive=True, default=0.001))
     return {key.name: key for key in (
         *files,
         Key(f'{block}.base', 'link that stands', is_text=True),

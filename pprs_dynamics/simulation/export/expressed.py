@@ -186,7 +186,7 @@ def express(model: ForceModel, kind: str) -> Expressed:
         _under_standard_gravity(model, sorting)
         sorting.left += ['ball_2', 'ball_3'] if isinstance(model, DriveModel) else sorting.loops
     reduced: Any = replace(build_model(sorting.values, model.source),
-                           reversal=Reversal(AT_ONCE, AT_ONCE))
+                           reversal=Reversal(AT_ONCE, AT_ONCE, AT_ONCE))
     return Expressed(reduced, {name: {key: value for key, value in numbers.items() if value}
                                for name, numbers in sorting.joints.items()},
                      tuple(sorting.left))

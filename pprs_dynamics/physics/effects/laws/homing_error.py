@@ -29,9 +29,11 @@ class HomingError(MeasurementEffect):
     acts_in = frozenset({PLATFORM, ARM})
     idealised: ClassVar[bool] = False
     bends_columns: ClassVar[bool] = True
-    # A homing switch or a mark is good for a millimetre or a degree.
+    # A homing switch or a mark is good for a millimetre or a degree; a joint that was put together
+    # or counted wrongly may be off by any angle.
     linear = (Parameter('zero', 'z', 'm', 'by which positions are measured too large', -0.1, 0.1,
-                        scale=0.001, expected=(0.001, math.radians(1.0))),)
+                        scale=0.001, expected=(0.001, math.radians(1.0)),
+                        turning=(-math.pi, math.pi)),)
     card = Card(
         'measured position = q + z',
         'a slowly changing error on several drives at once, largest where the rods lean most: '

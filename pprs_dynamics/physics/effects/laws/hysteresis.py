@@ -21,6 +21,9 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 
+# Distances that are tried: give of guides, nuts and seals; of gears and their bearings.
+PUSHED, TURNED = (3e-5, 5e-3), (2e-4, 5e-2)  # [m], [rad]
+
 
 class Hysteresis(DriveEffect):
     """Elastic give of the contacts before they slide: preloaded ball guides, seals, belts."""
@@ -33,7 +36,7 @@ class Hysteresis(DriveEffect):
                         1e3, 0.0, 0.05))
     variants = (('force',), ('coefficient',), ('force', 'coefficient'))
     shape = (Parameter('distance', 'x_d', 'm', 'distance over which it builds up', 1e-7, 0.1,
-                       scale=1e-4),)
+                       scale=1e-4, turning=(1e-6, 1.0)),)
     unphysical_below: ClassVar[Mapping[str, float]] = {'force': 0.0, 'coefficient': 0.0}
     card = Card(
         '(F + mu N) (z - sgn q_dot), dz/dq = (1 - z sgn q_dot) / x_d',
@@ -57,8 +60,9 @@ class Hysteresis(DriveEffect):
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
-        """Return distances from 0.03 to 5 mm."""
-        return [{'distance': float(x_d)} for x_d in np.geomspace(3e-5, 5e-3, 12)]
+        """Return distances from 0.03 to 5 mm, of a drive that turns from 0.01 to 3 degrees."""
+        shortest, longest = TURNED if covered.turns else PUSHED
+        return [{'distance': float(x_d)} for x_d in np.geomspace(shortest, longest, 12)]
 
     @classmethod
     def drive_memory(cls) -> Any:

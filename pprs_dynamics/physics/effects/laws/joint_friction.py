@@ -54,7 +54,7 @@ def friction_table(structure: Structure, blocks: Mapping[str, Mapping[str, float
         `viscous`, `torque`, `coulomb` and `radius` by joint; 0 where one is left out, but the
         radius of a slide, which is 1.
     reversal : Reversal
-        In drives by their velocity, in all others by their rate.
+        In drives by their velocity, in all others by their rate, or that of slides.
     """
     widths = dict(zip(structure.drives, reversal.widths(len(structure.drives)).tolist(),
                       strict=True))
@@ -68,7 +68,8 @@ def friction_table(structure: Structure, blocks: Mapping[str, Mapping[str, float
     radius = np.array([1.0 if slide else float(block.get('radius', 0.0))
                        for slide, block in zip(slides, blocks.values(), strict=True)])
     return JointFriction(joint, loop, viscous, torque, coulomb * radius,
-                         np.array([widths.get(name, reversal.rate) for name in blocks]))
+                         np.array([widths.get(name, reversal.slide if slide else reversal.rate)
+                                   for name, slide in zip(blocks, slides, strict=True)]))
 
 
 class JointFrictionEffect(PassiveJointEffect):

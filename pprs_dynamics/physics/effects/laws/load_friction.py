@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
 # Standard deviation of the load's exponent about 1: friction of a Hertzian contact grows with the
@@ -21,9 +21,8 @@ class LoadFriction(DriveEffect):
     """Force against the motion in proportion to the guide's load: mu is not what was assumed."""
 
     name: ClassVar[str] = 'load_friction'
-    # The load of an axis's guide is constant, so that this is coulomb_friction there.
-    acts_in = frozenset({PLATFORM, ARM})
     is_friction: ClassVar[bool] = True
+    at_one_load: ClassVar[str] = 'coulomb_friction'
     linear = (Parameter('coefficient', 'dmu', '1', "friction coefficient beyond the model's",
                         -100.0, 100.0, scale=0.02),)
     unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}

@@ -14,7 +14,9 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 
-SLOWEST = 1e-3  # [m/s], tried; below it friction turns over, and Stribeck's fall cannot be told
+# Tried; below it friction turns over, and Stribeck's fall cannot be told.
+SLOWEST, SLOWEST_TURN = 1e-3, 1e-2  # [m/s], [rad/s]
+FASTEST, FASTEST_TURN = 10.0, 100.0
 EXPONENTS = (2.0, 1.0)
 
 
@@ -25,7 +27,8 @@ class StribeckFriction(DriveEffect):
     is_friction: ClassVar[bool] = True
     linear = (Parameter('force', 'F_s', 'N', 'breakaway force beyond Coulomb friction', -1e6, 1e6,
                         scale=0.5),)
-    shape = (Parameter('velocity', 'v_s', 'm/s', 'Stribeck velocity', 1e-6, 10.0, scale=0.01),
+    shape = (Parameter('velocity', 'v_s', 'm/s', 'Stribeck velocity', 1e-6, FASTEST, scale=0.01,
+                       turning=(1e-6, FASTEST_TURN)),
              Parameter('exponent', 'd', '1', 'steepness: 2 Gaussian, 1 exponential', 0.5, 4.0,
                        default=2.0))
     unphysical_below: ClassVar[Mapping[str, float]] = {'force': 0.0}
@@ -49,8 +52,12 @@ class StribeckFriction(DriveEffect):
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
-        """Return velocities from 1 mm/s to half the top speed, with either exponent."""
-        fastest = np.clip(covered.top_speed / 2, 1e-5, 10.0)
-        velocities = np.geomspace(min(SLOWEST, fastest / 10), fastest, 8)
+        """Return velocities from 1 mm/s, or 0.01 rad/s, to half the top speed.
+
+        With either exponent.
+        """
+        slowest, limit = ((SLOWEST_TURN, FASTEST_TURN) if covered.turns else (SLOWEST, FASTEST))
+        fastest = np.clip(covered.top_speed / 2, 1e-5, limit)
+        velocities = np.geomspace(min(slowest, fastest / 10), fastest, 8)
         return [{'velocity': float(velocity), 'exponent': exponent}
                 for exponent in EXPONENTS for velocity in velocities]
