@@ -313,7 +313,7 @@ def test_what_is_within_model_error_stands_by_name_in_the_short_view() -> None:
         return as_text(diagnosis_view(diagnosis, word_diagnosis(diagnosis), **options), 80)
 
     name = within_model_error().name
-    line = next(one for one in said().splitlines() if one.startswith('Within the model error'))
+    line = next(one for one in said().splitlines() if one.startswith('May be left by the forms'))
     assert name in line
     assert 'pprs adopt' in said()
     assert 'pprs adopt' not in said(next_step=False)

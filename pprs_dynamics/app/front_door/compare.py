@@ -20,6 +20,7 @@ from pprs_dynamics.inference.diagnosis.next_step import first_step
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.comparison_bag import write_comparison
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.mistakes import effort_looks_like
 from pprs_dynamics.inference.residuals.paired_errors import rms, rms_by_drive
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.explained_effort import little_explained
@@ -74,7 +75,9 @@ class ComparisonResult(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `pprs compare --json` writes."""
-        content = {**self.comparison.to_dict(), 'verdict': self.verdict}
+        content = {**self.comparison.to_dict(), 'verdict': self.verdict,
+                   'effort_looks_like': effort_looks_like(
+                       one.findings for one in self.inputs.fitted)}
         return content if self.beside is None else {**content, 'beside': self.beside.to_dict()}
 
     def view(self, details: bool = False) -> Any:
@@ -158,7 +161,7 @@ class ComparisonResult(Result):
 
 def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
             beside: str | PathLike[str] | None = None, progress: Progress | None = None,
-            ) -> ComparisonResult:
+            as_it_is: bool = False) -> ComparisonResult:
     """Hold a model against recordings: how wrong it is, on which drive, in which situations.
 
     Parameters
@@ -173,6 +176,8 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
         held against the same model: before and after side by side.
     progress : callable, optional
         Called with what is being done and the share of it that is done.
+    as_it_is : bool
+        Whether files are taken as their names and units say, whatever they look like.
 
     Returns
     -------
@@ -181,13 +186,16 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
     Raises
     ------
     PprsError
-        For files that cannot be read, and a motion that the model cannot follow.
+        For files that cannot be read, or that look as if they were in other units or signs than
+        they say, and a motion that the model cannot follow.
 
     Examples
     --------
     >>> print(compare('config/paper.yaml', 'run.mcap'))  # doctest: +SKIP
     """
-    inputs = Inputs.of(model, recordings, (), topic, progress, whole=True).require_recordings()
+    inputs = Inputs.of(
+        model, recordings, (), topic, progress, whole=True,
+        as_it_is=as_it_is).require_recordings()
     measuring = stage(progress, 'motion and model')
     columns, residuals, notes = measure_columns(inputs.model, inputs.fitted, measuring)
     where = localise(residuals, progress=stage(progress, 'where it fails'))

@@ -47,6 +47,7 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.physics.mechanism.urdf import expanded, read_urdf
 from pprs_dynamics.physics.model.model_file import Model, build_model
 from pprs_dynamics.physics.model.parameter_file import parse_parameters
+from pprs_dynamics.physics.model.recorded_names import EFFORT_KINDS
 from pprs_dynamics.physics.model.robot_block import coupled
 from pprs_dynamics.system.plain_yaml import scalar
 
@@ -467,7 +468,10 @@ def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, ba
     ]
     lines += [f'      # loop {loop.name}: {loop.kind}, {loop.a} to {loop.b}, from the '
               'description' for loop in description.loops]
-    lines.append('    # Friction is not known yet: `pprs fit` finds it and writes it here.')
+    lines += [
+        f'    effort_kind: {"current" if currents else "measured"}  # not known from the files: '
+        f'what efforts are, one of {", ".join(EFFORT_KINDS)}',
+        '    # Friction is not known yet: `pprs fit` finds it and writes it here.']
     if names.prefix:
         lines.append(f'    joint_prefix: {scalar(names.prefix)}  # recordings call {drives[0]} '
                      f'{names.prefix}{drives[0]}')

@@ -8,6 +8,7 @@ The terminal is readable from 80 columns on.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
 from typing import Any
@@ -90,7 +91,8 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     if second := runner_up(diagnosis):
         yield f'[bold]Runner-up[/] {escape(second)}'
     if words.within_model_error:
-        yield f'Within the model error of what was found: {escape(_within_model_error(diagnosis))}'
+        yield ('May be left by the forms of what was found, no finding: '
+               f'{escape(_within_model_error(diagnosis))}')
     if words.warnings:
         yield f'[yellow]![/] {escape(words.warnings[0].partition(";")[0])}'
 
@@ -236,6 +238,7 @@ def diagnosis_page(
         _errors(page, diagnosis, steps)
         _first_picture(page, diagnosis)
     page.command(words.following, words.command)
+    page.copy('Copy as Markdown', diagnosis_markdown(diagnosis, words))
     page.folded_list('Warnings', words.warnings, is_open=True)
     if system is not None:
         add_what_if(page, system, diagnosis.residuals)
@@ -250,6 +253,25 @@ def diagnosis_page(
         if diagnosis.notes:
             page.bullets(diagnosis.notes)
     return page
+
+
+def diagnosis_markdown(diagnosis: Diagnosis, words: Sentences) -> str:
+    """Return the answer as Markdown, for an issue or a log book."""
+    rows = [f'**{diagnosis.verdict}**: {words.headline}']
+    if diagnosis.effects:
+        heads = _headings(diagnosis)
+        cells = [[re.sub(r'\[/?\w+\]', '', cell) for cell in row]
+                 for row in _effect_rows(diagnosis)]
+        table = (heads, ['---'] * len(heads), *cells)
+        rows.append('\n'.join(f'| {" | ".join(cell.replace("|", "/") for cell in row)} |'
+                              for row in table))
+        rows.append('\n'.join(f'- {f"{effect} on {drive}" if drive else effect}: {text}'
+                              for effect, drive, text in _joined(fitted_values(diagnosis))))
+    if words.warnings:
+        rows.append('\n'.join(f'- {text}' for text in words.warnings))
+    rows.append(f'Next: {words.following}' + (
+        f':\n\n```sh\n{words.command}\n```' if words.command else ''))
+    return '\n\n'.join(rows) + '\n'
 
 
 def _errors(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> None:
@@ -298,7 +320,8 @@ def _findings(page: Page, diagnosis: Diagnosis, words: Sentences,
                 page.card(finding.title, finding_lines(finding),
                           [(figure, text) for figure, text in pictures if figure is not None])
     page.folded_list('Suspects: effects that slow noise would explain as well', words.suspects)
-    page.folded_list('Within the model error of what was found', words.within_model_error)
+    page.folded_list('What the forms of the effects that were found may leave: no findings',
+                     words.within_model_error)
 
 
 def _lines(finding: Finding, equation: str) -> list[tuple[str, str]]:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,8 +22,12 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
+from pprs_dynamics.inference.diagnosis.possible import why_impossible, why_nothing
+from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
+from pprs_dynamics.inference.residuals.measured_effort import kinds_of, looks_like
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import certainty, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -50,7 +54,7 @@ from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder
 from pprs_dynamics.inference.search.held_out import hold_out
 from pprs_dynamics.inference.search.noise_floors import noise_floors
-from pprs_dynamics.inference.search.ranking import Ranking, select
+from pprs_dynamics.inference.search.ranking import Ranking, select, without_search
 from pprs_dynamics.inference.search.relinearisation import settled
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
@@ -73,7 +77,8 @@ class Diagnosis:
     indistinguishable : tuple of tuple of str
         Each an adopted effect and its rivals.
     unconfirmed : tuple of FoundEffect
-        Fitted as well, but the error does not fall with them, or not on held-out data.
+        Fitted as well, but no machine can have them, or the error does not fall with them, or not
+        on held-out data.
     candidates, suspects : tuple of RankedEffect
     depends_on : tuple of Statement
         What no effect explains.
@@ -105,6 +110,8 @@ class Diagnosis:
         Drives whose noise cannot be told apart from what may be missing: their floor is an upper
         bound, what the best set leaves.
     held_out_on : {'blocks', 'validation'}
+    effort_looks_like : mapping of str to NoMeasurement
+        Drives whose efforts are no measurement: then nothing is claimed.
     selection : Ranking, optional
         All that was tried, for looking closer.
     decisions : Decisions
@@ -134,6 +141,7 @@ class Diagnosis:
     little: Mapping[str, float] = field(default_factory=dict)
     unseen_noise: tuple[str, ...] = ()
     held_out_on: str = 'blocks'
+    effort_looks_like: Mapping[str, NoMeasurement] = field(default_factory=dict)
     selection: Ranking | None = field(default=None, repr=False, compare=False)
     decisions: Decisions = DECISIONS
 
@@ -154,6 +162,7 @@ class Diagnosis:
             'sets': [one.to_dict() for one in self.sets],
             'calibrated': [one.to_dict() for one in self.calibrated],
             'held_out_on': self.held_out_on, 'above_noise': dict(self.above_noise),
+            'effort_looks_like': kinds_of(self.effort_looks_like),
             'explained': _for_json(explained_shares(self.residuals)),
             'little_explained': dict(self.little),
             'explained_after': _for_json(explained_shares(self.residuals, self.remaining)),
@@ -164,6 +173,7 @@ class Diagnosis:
 def diagnose(
     model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
     progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
+    as_it_is: bool = False,
 ) -> Diagnosis:
     """Return which physical effect a model lacks, as far as recordings can tell.
 
@@ -177,6 +187,8 @@ def diagnose(
     progress : callable, optional
         Called with the share of the work that is done.
     decisions : Decisions, optional
+    as_it_is : bool
+        Whether efforts that look like no measurement are taken for one all the same.
 
     Raises
     ------
@@ -188,16 +200,35 @@ def diagnose(
         raise MotionError('position', 'no drive moves by more than its measured position resolves '
                           f'in {", ".join(one.name for one in recordings)}', 'move: a robot that '
                           'stands tells nothing of friction, masses or delays', 'shape')
+    other = {} if as_it_is else looks_like(model, recordings)
+    if other:
+        answer = _Answer(without_search(model, recordings, decisions, report), validate, decisions)
+        return replace(answer.diagnosis(()), verdict='unknown', depends_on=(), warnings=(),
+                       effort_looks_like=other)
     answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share)),
                      validate, decisions)
     unconfirmed: list[FoundEffect] = []
-    while weak := [one for one in answer.effects if not one.is_confirmed]:
+    if any(one.is_impossible for one in answer.effects):
+        # Whatever stands for what cannot be, or beside it, would be as wrong.
+        found = _all_objected(answer.effects)
+        answer = _Answer(answer.ranking.claiming_nothing(), validate, decisions)
+        report(1.0)
+        return replace(answer.diagnosis(found), verdict='unknown')
+    while weak := [one for one in answer.effects if one.objection or not one.is_confirmed]:
         unconfirmed.append(min(weak, key=lambda one: one.evidence))
         gone = answer.ranking.order[answer.effects.index(unconfirmed[-1])]
         answer = _Answer(answer.ranking.less(gone), validate, decisions)
     diagnosis = answer.diagnosis(tuple(unconfirmed))
     report(1.0)
     return diagnosis
+
+
+def _all_objected(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
+    """Return effects of which one cannot be: that first, and the others as found beside it."""
+    impossible = [one for one in effects if one.is_impossible]
+    beside = listed([one.name for one in impossible])
+    return (*impossible, *(replace(one, objection=f'it was found beside {beside}, which cannot be')
+                           for one in effects if not one.is_impossible))
 
 
 class _Answer:
@@ -239,7 +270,8 @@ class _Answer:
             first.given, final.model, first.residuals, self.remaining, noise, floors,
             root_mean_square(list(floors.values())), above, little,
             tuple(name for name in floors if name not in seen),
-            'validation' if self.validate else 'blocks', self.ranking, self.decisions)
+            'validation' if self.validate else 'blocks', selection=self.ranking,
+            decisions=self.decisions)
 
     def _effects(self) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""
@@ -261,6 +293,9 @@ class _Answer:
         for k, candidate in enumerate(ordered):
             last = next(c for c in final.found.effects if c.effect is candidate.effect)
             said = averaged(estimate(final.fits, final.found, last), self._nearly(candidate))
+            in_model = self._in_model(candidate, said.parameters)
+            impossible = why_impossible(
+                candidate.effect, said.parameters, self.design, self.decisions)
             found.append(FoundEffect(
                 candidate.effect, self.design.named(candidate.drives), said.parameters,
                 final.fits.library.force(final.found, last, self.remaining.shape),
@@ -270,7 +305,9 @@ class _Answer:
                     held_out[k + 1] < held_out[k]
                     or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
                 or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1]),
-                self._in_model(candidate, said.parameters)))
+                impossible or why_nothing(candidate.effect, {
+                    key: replace(one, value=one.value - in_model.get(key, 0.0))
+                    for key, one in said.parameters.items()}), bool(impossible), in_model))
         return found
 
     def _in_model(self, candidate: EffectCandidate, keys: Iterable[str]) -> dict[str, float]:

@@ -65,6 +65,10 @@ class FoundEffect(FittedEffect):
         Whether the error falls with it, and that on held-out data: either their rms, or for
         certain that of each frequency in units of its noise. In the former slow noise and the
         model's own numbers have a share.
+    objection : str
+        Why it is no finding whatever the error does, as a clause; '' where nothing speaks against.
+    is_impossible : bool
+        Whether that is that no machine can have it.
     in_model : mapping of str to float
         What the given model says of the parameters, where it has the effect: then the recordings
         say something else. Empty for an effect that it lacks.
@@ -78,6 +82,8 @@ class FoundEffect(FittedEffect):
     at_bound: tuple[str, ...] = ()
     share: float = 0.0
     is_confirmed: bool = True
+    objection: str = ''
+    is_impossible: bool = False
     in_model: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:

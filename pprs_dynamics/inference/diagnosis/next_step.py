@@ -83,6 +83,12 @@ def first_step(model: ForceModel, files: GivenFiles) -> tuple[str, str]:
 
 def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     """Return what to do next, and the command for it."""
+    if diagnosis.effort_looks_like:
+        lines = dict.fromkeys(one.line for one in diagnosis.effort_looks_like.values() if one.line)
+        say = ('; where it is what it looks like, write '
+               f'{listed(tuple(lines), "or")} into the model file' if lines else '')
+        return (f'Record the effort that is measured{say}. Where it is measured all the same',
+                files.command('diagnose', '--as-it-is'))
     if diagnosis.little:
         return first_step(diagnosis.model, files)
     repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')

@@ -198,6 +198,9 @@ def runner_up(diagnosis: Diagnosis) -> str:
 def _headline(diagnosis: Diagnosis) -> str:
     held, unit = diagnosis.effects, diagnosis.residuals.unit
     doubt = _doubt(diagnosis)
+    if diagnosis.effort_looks_like:
+        told = dict.fromkeys(one.what for one in diagnosis.effort_looks_like.values())
+        return f'{" ".join(map(sentence, told))} No effect is claimed.'
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
         f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')
@@ -276,6 +279,9 @@ def _doubt(diagnosis: Diagnosis) -> str:
     told = []
     for one in diagnosis.unconfirmed:
         title = _title(diagnosis, one)
+        if one.objection:
+            told.append(f' {title} was fitted as well and is no finding: {one.objection}.')
+            continue
         on, before, after = (
             'the error', one.error_before, one.error_after) if (
             one.error_after >= one.error_before) else (

@@ -94,6 +94,12 @@ class Decisions:
     poor: float = _number(
         0.2, '1', 'unexplained error over the effort, above which a model is poor',
         'a fifth is more than friction in most robots')
+    most_gain: float = _number(
+        1.5, '1', 'factor of a gain beyond which it is no effect of a drive',
+        'constants of drives are known to 10 %; beyond half as much it is another unit or motor')
+    most_tilt: float = _number(
+        0.35, 'rad', 'lean of a base beyond which it is no effect of how the machine was put up',
+        'a base is levelled to a degree; what leans by 20 stands on a slope or a wall on purpose')
     sure: float = _number(
         2.0, 'deviations', 'by how much a number must have moved to be told as calibrated',
         '95 %')

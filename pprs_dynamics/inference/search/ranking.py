@@ -129,6 +129,11 @@ class Ranking:
         return replace(self._keeping(self.first, self.last, self.patterns, self.best, kept,
                                      self.remainders, refuted), exact=self.exact)
 
+    def claiming_nothing(self) -> Ranking:
+        """Return the ranking with nothing kept, under the noise that the best set leaves."""
+        return self._keeping(self.first, self.last, self.patterns, self.best,
+                             self.last.evaluate(()), (), self.refuted)
+
     @cached_property
     def shares(self) -> tuple[float, ...]:
         """Return the part of the error that each effect of `order` takes away.
@@ -272,6 +277,20 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     report = progress or (lambda share: None)
     design = Design.of(model, recordings, lambda share: report(0.25 * share))
     return _searched(FittedSets(design, decisions), frozenset(), report)
+
+
+def without_search(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
+                   progress: Callable[[float], None] | None = None) -> Ranking:
+    """Return the ranking of the empty set alone: what the model as given leaves, and its noise.
+
+    Raises
+    ------
+    PprsError
+        As `measure_residuals`.
+    """
+    fits = FittedSets(Design.of(model, recordings, progress), decisions)
+    nothing = fits.evaluate(())
+    return Ranking._keeping(fits, fits, (), nothing, nothing, (), frozenset())
 
 
 def _searched(first: FittedSets, refuted: frozenset[Place],
