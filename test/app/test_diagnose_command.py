@@ -91,13 +91,15 @@ def test_the_hidden_effect_is_named_with_its_drives_and_its_size(
 
 def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> None:
     promised = {'verdict', 'effects', 'indistinguishable', 'candidates', 'depends_on', 'suspects'}
-    added = {'above_noise', 'calibrated', 'effort_looks_like', 'explained', 'explained_after',
-             'held_out_on', 'little_explained', 'noise_floor', 'noise_floors', 'sets',
-             'unconfirmed', 'warnings'}
+    added = {'above_noise', 'barred', 'calibrated', 'effort_looks_like', 'explained',
+             'explained_after', 'held_out_on', 'little_explained', 'noise_floor',
+             'noise_floors', 'sets', 'unconfirmed', 'warnings'}
     assert set(result) == promised | added
     for effect in result['effects']:
         assert set(effect) == {'name', 'drives', 'alike', 'parameters', 'error_before',
-                               'error_after', 'held_out_before', 'held_out_after', 'evidence'}
+                               'error_after', 'held_out_before', 'held_out_after', 'evidence',
+                               'without'}
+        assert effect['without']['cost'] == pytest.approx(effect['evidence'])
         assert set(effect['drives']) <= set(DRIVES)
         for parameter in effect['parameters'].values():
             assert set(parameter) == {'value', 'std', 'unit'}
@@ -107,6 +109,8 @@ def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> No
     assert result['sets'][0]['cost'] == 0.0
     assert [one['name'] for one in result['sets'][0]['effects']] == [HIDDEN]
     assert all(one['cost'] > 0 for one in result['sets'][1:])
+    for one in result['sets']:
+        assert sum(one['terms'].values()) == pytest.approx(one['cost'])
     assert result['held_out_on'] == 'validation'
     assert all(isinstance(one, str) for one in result['warnings'])
 

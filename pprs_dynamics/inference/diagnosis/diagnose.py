@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -61,7 +61,7 @@ from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.system.numbers import finite
 
-MOST_SETS = 8  # that are told with their costs
+MOST_SETS, MOST_BARRED = 8, 3  # that are told with their costs, and those that may not be
 MOST_AVERAGED = 5  # sets that estimates are averaged over
 
 
@@ -85,6 +85,8 @@ class Diagnosis:
     within_model_error : tuple of WithinModelError
     sets : tuple of RankedSet
         The best sets of the search, the best first.
+    barred : tuple of RankedSet
+        Those that would cost less than a rival and may not be.
     calibrated : tuple of Calibration
         Numbers that moved within their tolerances.
     warnings, notes : tuple of str
@@ -127,6 +129,7 @@ class Diagnosis:
     depends_on: tuple[Statement, ...]
     within_model_error: tuple[WithinModelError, ...]
     sets: tuple[RankedSet, ...]
+    barred: tuple[RankedSet, ...]
     calibrated: tuple[Calibration, ...]
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
@@ -160,6 +163,7 @@ class Diagnosis:
             'suspects': [{key: value for key, value in s.to_dict().items() if key != 'error_after'}
                          for s in self.suspects],
             'sets': [one.to_dict() for one in self.sets],
+            'barred': [one.to_dict() for one in self.barred],
             'calibrated': [one.to_dict() for one in self.calibrated],
             'held_out_on': self.held_out_on, 'above_noise': dict(self.above_noise),
             'effort_looks_like': kinds_of(self.effort_looks_like),
@@ -266,7 +270,7 @@ class _Answer:
             verdict, tuple(effects), sets, unconfirmed, self._candidates(),
             self._suspects(), depends, tuple(map(self._within_model_error,
                                                  self.ranking.remainders)), self._sets(),
-            tuple(moved), find_cautions(self.fits, self.best, effects), first.notes,
+            self._barred(), tuple(moved), find_cautions(self.fits, self.best, effects), first.notes,
             first.given, final.model, first.residuals, self.remaining, noise, floors,
             root_mean_square(list(floors.values())), above, little,
             tuple(name for name in floors if name not in seen),
@@ -293,18 +297,21 @@ class _Answer:
         for k, candidate in enumerate(ordered):
             last = next(c for c in final.found.effects if c.effect is candidate.effect)
             said = averaged(estimate(final.fits, final.found, last), self._nearly(candidate))
+            without = self._told(self.ranking.best_without(candidate),
+                                 self.ranking.best_with(candidate))
             impossible = why_impossible(
                 candidate.effect, said.parameters, self.design, self.decisions)
             found.append(FoundEffect(
                 candidate.effect, self.design.named(candidate.drives), said.parameters,
                 final.fits.library.force(final.found, last, self.remaining.shape),
-                self._evidence(candidate), errors[k], errors[k + 1], held_out[k], held_out[k + 1],
+                without.cost, errors[k], errors[k + 1], held_out[k], held_out[k + 1],
                 said.at_bound, self.ranking.shares[k],
                 (errors[k + 1] < errors[k] and (
                     held_out[k + 1] < held_out[k]
                     or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
                 or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1]),
-                impossible or why_nothing(candidate.effect, said.parameters), bool(impossible)))
+                impossible or why_nothing(candidate.effect, said.parameters), bool(impossible),
+                without))
         return found
 
     def _error_held_out(self, model: ForceModel) -> float:
@@ -396,16 +403,28 @@ class _Answer:
                             linear_error(fits, found))
 
     def _sets(self) -> tuple[RankedSet, ...]:
+        # Of a set that bends nothing the cost is that in the first design.
+        best, *others = self._of_each_name(self.ranking.sets, MOST_SETS)
+        return (best, *sorted(others, key=lambda one: one.cost))
+
+    def _barred(self) -> tuple[RankedSet, ...]:
+        """Return the sets that would be rivals, or better, and may not be."""
+        return self._of_each_name(self.ranking.barred(self.decisions.rival_margin), MOST_BARRED)
+
+    def _of_each_name(self, sets: Iterable[CandidateSet], most: int) -> tuple[RankedSet, ...]:
+        """Return the first set of every choice of names."""
         found: dict[frozenset[str], RankedSet] = {}
-        for one in self.ranking.sets:
-            names = tuple((c.name, self.design.named(c.drives)) for c in one.candidates)
-            key = frozenset(name for name, _ in names)
-            if key not in found:
-                # Of a set that bends nothing the cost is that in the first design.
-                found[key] = RankedSet(names, max(one.cost - self.best.cost, 0.0))
-            if len(found) == MOST_SETS:
+        for one in sets:
+            told = self._told(one, self.best)
+            found.setdefault(frozenset(name for name, _ in told.names), told)
+            if len(found) == most:
                 break
         return tuple(found.values())
+
+    def _told(self, found: CandidateSet, best: CandidateSet) -> RankedSet:
+        """Return a set against another one."""
+        names = tuple((c.name, self.design.named(c.drives)) for c in found.candidates)
+        return RankedSet(names, self.ranking.difference(found, best), found.barred)
 
     def _within_model_error(self, remainder: Remainder) -> WithinModelError:
         force = self.fits.library.force(remainder.found, remainder.candidate,

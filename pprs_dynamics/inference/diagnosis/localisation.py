@@ -240,7 +240,8 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str]) -> Statem
         members = family.columns > 0.5
         inside = family.weights @ members.sum(axis=1)
         totals = family.weights @ (members @ scores)
-        gains = totals ** 2 / np.maximum(inside * (1 - inside / n), 1e-9) - library.price(family)
+        gains = (totals ** 2 / np.maximum(inside * (1 - inside / n), 1e-9)
+                 - library.price(family).total)
         for at in np.argsort(-gains):
             pattern, gain = family.patterns[at], float(gains[at])
             if gain <= max(0.0, best[0] if best else 0.0):
@@ -263,7 +264,7 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str]) -> Statem
         centred[part] -= centred[part].mean()
     lags = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2)[:200]
     worth = 1 / max(1 + 2 * float(np.maximum(lags[1:] / lags[0], 0.0)[:20].sum()), 1.0)
-    price = library.prices.of_pattern(1, 1, 1)
+    price = library.prices.of_pattern(1, 1, 1).total
     score = worth * (gain + price) - price
     return word_scatter(library, variable, pattern, column, score) if score > 0 else None
 

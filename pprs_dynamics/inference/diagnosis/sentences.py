@@ -15,6 +15,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     FittedEffect,
     FoundEffect,
     RankedEffect,
+    RankedSet,
     RivalEffect,
     WithinModelError,
 )
@@ -37,12 +38,14 @@ from pprs_dynamics.inference.diagnosis.statements import (
     place_of,
     place_on,
 )
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
 
 MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
+TOLD_COST = 0.05  # of a term of a cost, that one digit shows
 # Times the size that matters, an uncertainty beyond which, and beyond the value, nothing is known.
 ANYTHING = 100.0
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
@@ -104,7 +107,7 @@ class Sentences:
         In the order of those given to `word_diagnosis`.
     unexplained : tuple of Finding
         In the order of `unexplained_groups`.
-    suspects, within_model_error, calibrated, warnings : tuple of str
+    suspects, within_model_error, barred, calibrated, warnings : tuple of str
     following, command : str
         What to do next, in words and for a shell.
     """
@@ -115,6 +118,7 @@ class Sentences:
     unexplained: tuple[Finding, ...]
     suspects: tuple[str, ...]
     within_model_error: tuple[str, ...]
+    barred: tuple[str, ...]
     calibrated: tuple[str, ...]
     warnings: tuple[str, ...]
     following: str
@@ -142,6 +146,8 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
               for group in unexplained_groups(diagnosis)),
         tuple(_suspect(diagnosis, one) for one in diagnosis.suspects),
         tuple(_within_model_error(diagnosis, one) for one in diagnosis.within_model_error),
+        tuple(f'{_set(diagnosis, one)} may not be, whatever it costs: {one.barred}. It '
+              f'{_cost(one)}' for one in diagnosis.barred),
         tuple(_calibrated(diagnosis, one) for one in diagnosis.calibrated),
         diagnosis.warnings, following, command)
 
@@ -159,17 +165,32 @@ def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
     return [one for effect in diagnosis.effects for one in _fitted(diagnosis, effect)]
 
 
-def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
-    """Return the best sets of effects in words, each with its cost above the best."""
-    every = diagnosis.residuals.drives
-    return [(' and '.join(with_drives(_plain_name(name), drives, every)
-                          for name, drives in one.names) or 'nothing missing',
-             f'+{plain(one.cost, 2)}' if number else 'the best')
-            for number, one in enumerate(diagnosis.sets)]
+def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
+    """Return the best sets of effects in words, each with its cost above the best, and of what."""
+    return [(_set(diagnosis, one), f'{one.cost:+.1f}' if number else 'the best',
+             word_terms(one.terms)) for number, one in enumerate(diagnosis.sets)]
+
+
+def _set(diagnosis: Diagnosis, found: RankedSet) -> str:
+    return ' and '.join(with_drives(_plain_name(name), drives, diagnosis.residuals.drives)
+                        for name, drives in found.names) or 'nothing missing'
+
+
+def word_terms(terms: CostTerms) -> str:
+    """Return the terms of a difference of costs, those that can be seen."""
+    return ', '.join(f'{name} {"-" if value < 0 else "+"} {abs(value):.1f}'
+                     for name, value in terms.to_dict().items() if abs(value) >= TOLD_COST)
+
+
+def _cost(found: RankedSet) -> str:
+    """Return how much more a set costs, and of what."""
+    why = word_terms(found.terms)
+    return (f'costs {abs(found.cost):.1f} {"less" if found.cost < 0 else "more"}'
+            + (f': {why}' if why else ''))
 
 
 def runner_up(diagnosis: Diagnosis) -> str:
-    """Return how the second best set differs from the best, with its cost; '' for none."""
+    """Return how the second best set differs from the best, and its costs; '' for none."""
     if len(diagnosis.sets) < 2:
         return ''
     best, second = (set(one.names) for one in diagnosis.sets[:2])
@@ -184,7 +205,7 @@ def runner_up(diagnosis: Diagnosis) -> str:
     words = [f'{put} instead of {left}' if put and left else f'{put} as well' if put
              else f'without {left}' if left else '',
              f'{listed(sorted(moved))} on other drives' if moved else '']
-    return ', '.join([*filter(None, words), f'cost +{plain(diagnosis.sets[1].cost, 2)}'])
+    return f'{", ".join(filter(None, words))}: {_cost(diagnosis.sets[1])}'
 
 
 def _headline(diagnosis: Diagnosis) -> str:
@@ -342,7 +363,10 @@ def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
                      '--validate is the stronger' if is_first else ' (the weaker evidence)')
     return (f'It takes away {percent(found.share)} of the error, each drive in units of its noise. '
             f'With it the error {change(found.error_before, found.error_after, unit)}. '
-            f'{held_out}. Evidence {found.evidence:.0f}, where 0 is the threshold.')
+            f'{held_out}. Evidence {found.evidence:.0f}, where 0 is the threshold'
+            + ('.' if found.without is None else
+               f': the best set without it, {_set(diagnosis, found.without)}, '
+               f'{_cost(found.without)}.'))
 
 
 def _remarks(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:

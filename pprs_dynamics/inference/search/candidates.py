@@ -17,6 +17,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.patterns import Family, Pattern
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE, catalogue
@@ -158,7 +159,8 @@ class UnknownCandidate:
     rows : mapping of drive to (1 or 2, M) array
         In time [1].
     parts : mapping of drive to Block
-    price : float
+    terms : CostTerms
+        Of its price.
     """
 
     components: ClassVar[tuple[Component, ...]] = ()  # none of the catalogue's
@@ -167,7 +169,12 @@ class UnknownCandidate:
     pattern: Pattern
     rows: Mapping[int, Array] = field(repr=False)
     parts: Mapping[int, Block] = field(repr=False)
-    price: float
+    terms: CostTerms
+
+    @property
+    def price(self) -> float:
+        """Of everything that was chosen."""
+        return self.terms.total
 
     @property
     def name(self) -> str:
@@ -206,23 +213,33 @@ class CandidateSet:
     ----------
     candidates : tuple of Candidate
     fit : JointFit
-    total : float
-        Penalised deviance with all prices.
+    terms : CostTerms
+        Of the penalised deviance with all prices.
     blocks : mapping of Component to Block
         Columns of the components.
     nuisance : mapping of Component to tuple of Block
         Columns for what the components leave open, fitted with them.
-    is_admissible : bool
-        False where a body cannot be, a value is beyond its bounds, or a pattern may be the lack
-        of fit of the effects beside it.
+    barred : str
+        Why it may not be: a body cannot be, a value is beyond its bounds, or a pattern may be the
+        lack of fit of the effects beside it; '' where it may.
     """
 
     candidates: tuple[Candidate, ...]
     fit: JointFit
-    total: float
+    terms: CostTerms
     blocks: Mapping[Component, Block] = field(default_factory=dict, repr=False)
     nuisance: Mapping[Component, tuple[Block, ...]] = field(default_factory=dict, repr=False)
-    is_admissible: bool = True
+    barred: str = ''
+
+    @cached_property
+    def total(self) -> float:
+        """What its terms add up to, whether it may be or not."""
+        return self.terms.total
+
+    @property
+    def is_admissible(self) -> bool:
+        """Whether it may be."""
+        return not self.barred
 
     @property
     def cost(self) -> float:
@@ -318,14 +335,14 @@ class Prices:
         return 2 * log(min(D, 3)) + 2 * log(some) + 2 * log(comb(D, count))
 
     def of_candidate(self, candidate: Candidate,
-                     component_price: Callable[[Component], float]) -> float:
+                     of_component: Callable[[Component], CostTerms]) -> CostTerms:
         """Return the price of what was chosen: hypotheses, drives, and each component."""
         if isinstance(candidate, UnknownCandidate):
-            return candidate.price
-        price = len(candidate.hypotheses) * self.of_name()
-        if candidate.drives is not None:
-            price += self.of_drives(len(candidate.components))
-        return price + sum(component_price(one) for one in candidate.components)
+            return candidate.terms
+        terms = CostTerms(
+            names=len(candidate.hypotheses) * self.of_name(),
+            drives=0.0 if candidate.drives is None else self.of_drives(len(candidate.components)))
+        return sum((of_component(one) for one in candidate.components), terms)
 
     def of_component(self, effect: type[CatalogueEffect], tried: int) -> float:
         """Return the price of a variant and of a shape among those tried.
@@ -342,10 +359,11 @@ class Prices:
         return (2 * log(self.drives) - 2 * log(self.decisions.effect_odds)
                 + max(log(self.samples), 2 * log(tried)))
 
-    def of_pattern(self, families: int, patterns: int, drives: int) -> float:
+    def of_pattern(self, families: int, patterns: int, drives: int) -> CostTerms:
         """Return the price of an unknown pattern among those tried on each drive."""
-        return (self.of_name() + self.of_drives(drives) + 2 * log(families) + 2 * log(patterns)
-                - 2 * log(self.decisions.unknown_odds))
+        return CostTerms(names=self.of_name() - 2 * log(self.decisions.unknown_odds),
+                         drives=self.of_drives(drives),
+                         shapes=2 * log(families) + 2 * log(patterns))
 
     def of_right_signs(self, component: Component) -> float:
         """Return the price of physical signs: less than nothing.

@@ -22,6 +22,7 @@ from pprs_dynamics.inference.search.candidates import (
     EffectCandidate,
     bends,
 )
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_model import linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
@@ -161,6 +162,13 @@ class Ranking:
         return (self.best, *_by_cost([one for one in found
                                       if one is not self.best and one.is_admissible]))
 
+    def barred(self, margin: float) -> tuple[CandidateSet, ...]:
+        """Return the sets that would cost less than a margin more than the best, and may not be."""
+        found = [one for one in (*self.of_last, *(
+            self.of_first if self.first is not self.last else ())) if one.barred
+            and one.total < self.best.total + margin]
+        return tuple(sorted(found, key=lambda one: one.total))
+
     @property
     def nothing(self) -> CandidateSet:
         """The empty set around the model as given."""
@@ -178,6 +186,40 @@ class Ranking:
     def fits_of(self, found: CandidateSet) -> FittedSets:
         """Return the fitted sets that a set is of."""
         return self.last if any(one is found for one in self.of_last) else self.first
+
+    def best_with(self, candidate: EffectCandidate) -> CandidateSet:
+        """Return the set of lowest cost with an effect of the kept set."""
+        return min((self.kept, *(one for one in self._judged if _has(one, candidate))),
+                   key=lambda one: self.difference(one, self.best).total)
+
+    def best_without(self, candidate: EffectCandidate) -> CandidateSet:
+        """Return the set of lowest cost without an effect of the kept set, whatever stands in it.
+
+        An effect on other drives or in another shape is the same one; a body on another link is
+        another.
+        """
+        return min((self.without[candidate],
+                    *(one for one in self._judged if not _has(one, candidate))),
+                   key=lambda one: self.difference(one, self.best).total)
+
+    def difference(self, found: CandidateSet, other: CandidateSet) -> CostTerms:
+        """Return the terms of what a set costs more than another, exactly where both are known."""
+        exact = [self._beyond_linear(one) for one in (found, other)]
+        more = [0.0 if None in exact else one or 0.0 for one in exact]
+        return found.terms - other.terms + CostTerms(linearisation=more[0] - more[1])
+
+    def _beyond_linear(self, found: CandidateSet) -> float | None:
+        """Return what a set of the shortlist costs more by its exact forces; None for others."""
+        claims = _claims(found)
+        first = next((one for one in self.sets if _claims(one) == claims), None)
+        return self.exact[claims] - found.total if claims in self.exact and found is first else None
+
+    @property
+    def _judged(self) -> list[CandidateSet]:
+        """Sets without what is within the model error of others, which pays but is not kept."""
+        ignored = {one.candidate.name for one in self.remainders}
+        return [one for one in self.sets
+                if not ignored & {candidate.name for candidate in one.candidates}]
 
     def near(self, margin: float) -> tuple[CandidateSet, ...]:
         """Return the sets of the last search within a margin of the best."""
@@ -308,6 +350,10 @@ def _searched(first: FittedSets, refuted: frozenset[Place],
     found = _by_exact_forces(Ranking.of(first, last, best, refuted), search)
     report(1.0)
     return found
+
+
+def _has(found: CandidateSet, candidate: EffectCandidate) -> bool:
+    return any(one.claim == candidate.claim for one in found.effects)
 
 
 def _by_exact_forces(found: Ranking, first: Search) -> Ranking:

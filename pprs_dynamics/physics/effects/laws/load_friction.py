@@ -37,7 +37,7 @@ class LoadFriction(DriveEffect):
         'Hamon, Gautier, Garrec, Dynamic identification of robots with a dry friction model '
         'depending on load and velocity, IROS, 2010')
     arm_card = Card(
-        'dmu |tau| sgn(q_dot), tau the torque of the joint without friction',
+        'dmu |tau| sgn(q_dot), tau what the gear transmits: without friction and the rotor',
         'a step at each reversal that is higher where the joint carries more weight or accelerates '
         'more',
         'every gear has it: teeth and bearings of a harmonic or planetary gear rub in proportion '
