@@ -225,9 +225,9 @@ def diagnose(
     if sticking and not as_it_is:
         # No law of the drive's own motion describes what its controller and its elasticity do.
         answer = _Answer(without_search(model, recordings, decisions, report), validate, decisions)
-        found = answer.diagnosis(())
-        return replace(found, verdict='unknown', warnings=(), stick_slip=sticking, depends_on=tuple(
-            word_stick_slip(drive, one, found.residuals) for drive, one in sticking.items()))
+        plain = answer.diagnosis(())
+        return replace(plain, verdict='unknown', warnings=(), stick_slip=sticking, depends_on=tuple(
+            word_stick_slip(drive, one, plain.residuals) for drive, one in sticking.items()))
     answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share)),
                      validate, decisions)
     unconfirmed: list[FoundEffect] = []

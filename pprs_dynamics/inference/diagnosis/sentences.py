@@ -216,9 +216,10 @@ def _headline(diagnosis: Diagnosis) -> str:
         told = dict.fromkeys(one.what for one in diagnosis.effort_looks_like.values())
         return f'{" ".join(map(sentence, told))} No effect is claimed.'
     if diagnosis.stick_slip:
-        told = [f'{drive} at {one.frequency:.3g} Hz' for drive, one in diagnosis.stick_slip.items()]
-        return (f'Stick-slip: {listed(told)} stand, are loaded until they break away, and slip. '
-                'What else may be missing cannot be seen in such a motion: no effect is claimed.')
+        sticking = [f'{drive} at {one.frequency:.3g} Hz'
+                    for drive, one in diagnosis.stick_slip.items()]
+        return (f'Stick-slip: {listed(sticking)} stand, are loaded until they break away, and '
+                'slip. What else may be missing cannot be seen in such a motion: no effect is claimed.')
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
         f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')
