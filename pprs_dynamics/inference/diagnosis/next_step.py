@@ -97,6 +97,10 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     """Return what to do next, and the command for it."""
     if diagnosis.effort_looks_like:
         return measure_first(list(diagnosis.effort_looks_like.values()), files)
+    if diagnosis.stick_slip:
+        return ('Record a motion that is faster than the stick-slip, and diagnose that; as long as '
+                'the machine has to move so slowly, its cause comes first (grease, gains, a soft '
+                'transmission)', replace(files, recordings=(SECOND,)).command('diagnose'))
     if diagnosis.little:
         return first_step(diagnosis.model, files)
     repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')

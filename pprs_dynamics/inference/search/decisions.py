@@ -70,6 +70,9 @@ class Decisions:
         0.05, '1', 'standard deviation of the load of a drive in motion over its mean, up to which '
         'friction by load and friction that no load changes are told as one',
         'dry friction varies by as much along a guide')
+    stick_slip: float = _number(
+        0.2, '1', 'share of the time in stick-slip, from which no other effect is claimed',
+        'a fifth of the samples decides about any friction')
     reversal_share: float = _number(
         0.12, '1', 'share of the samples, the slowest, that a pattern of friction may leave out',
         'friction turns over there, in a width that nobody knows')
