@@ -219,7 +219,8 @@ def _headline(diagnosis: Diagnosis) -> str:
         sticking = [f'{drive} at {one.frequency:.3g} Hz'
                     for drive, one in diagnosis.stick_slip.items()]
         return (f'Stick-slip: {listed(sticking)} stand, are loaded until they break away, and '
-                'slip. What else may be missing cannot be seen in such a motion: no effect is claimed.')
+                'slip. What else may be missing cannot be seen in such a motion: no effect is '
+                'claimed.')
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
         f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')
