@@ -226,7 +226,9 @@ def test_commands_stop_or_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[s
         assert main([command, *given, '--json', str(tmp_path / 'said.json')]) == 0
         said = json.loads((tmp_path / 'said.json').read_text())
         assert said['effort_looks_like'] == WITHOUT_GRAVITY
-        assert 'as if gravity was taken out' in ' '.join(capsys.readouterr().out.split())
+        told = ' '.join(capsys.readouterr().out.split())
+        assert 'as if gravity was taken out' in told
+    assert 'Next Record the effort that is measured' in told
     for command in (('adopt', 'payload_mass'), ('fit',)):
         assert main([*command, *given, '--output', str(tmp_path / 'x.yaml')]) == 1
         assert 'effort_kind: without_gravity' in capsys.readouterr().err

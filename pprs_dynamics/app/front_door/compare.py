@@ -16,11 +16,11 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.comparison import compare as compare_residuals
 from pprs_dynamics.inference.diagnosis.localisation import localise
-from pprs_dynamics.inference.diagnosis.next_step import first_step
+from pprs_dynamics.inference.diagnosis.next_step import first_step, measure_first
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.comparison_bag import write_comparison
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.mistakes import effort_looks_like
+from pprs_dynamics.inference.residuals.mistakes import effort_looks_like, no_measurements
 from pprs_dynamics.inference.residuals.paired_errors import rms, rms_by_drive
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.explained_effort import little_explained
@@ -153,6 +153,9 @@ class ComparisonResult(Result):
 
     @property
     def _next(self) -> tuple[str, str]:
+        other = no_measurements(one.findings for one in self.inputs.fitted)
+        if other and not self.inputs.as_it_is:
+            return measure_first(other, self.inputs.files)
         if self.comparison.little:
             return first_step(self.inputs.model, self.inputs.files)
         return ('Find out which physical effect is missing',

@@ -15,9 +15,9 @@ from pprs_dynamics.errors import MisreadError, PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.conventions import find_mistakes
 from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
 from pprs_dynamics.inference.residuals.mistakes import (
-    NoMeasurement,
     OtherReading,
     columns_line,
+    no_measurements,
 )
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
@@ -175,8 +175,7 @@ class Inputs:
         Not so with `as_it_is`. For what would write them into a model.
         """
         for name in () if self.as_it_is else self.recordings:
-            found = [one for one in self.recordings[name].findings
-                     if isinstance(one, NoMeasurement)]
+            found = no_measurements([self.recordings[name].findings])
             if found:
                 raise MisreadError(displayed(name), [one.what for one in found],
                                    [one.line for one in found])

@@ -18,7 +18,10 @@ from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredC
 from pprs_dynamics.physics.model.arm_model import ArmModel
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
+    from collections.abc import Sequence
+
     from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+    from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
     from pprs_dynamics.physics.model.force_model import ForceModel
 
 OWN_FRICTION = ('friction.viscous', 'friction.coulomb')  # of an arm's model file
@@ -81,14 +84,19 @@ def first_step(model: ForceModel, files: GivenFiles) -> tuple[str, str]:
             'recorded', files.command('info'))
 
 
+def measure_first(findings: Sequence[NoMeasurement], files: GivenFiles) -> tuple[str, str]:
+    """Return what to do where efforts are no measurement, and the command that goes on."""
+    lines = dict.fromkeys(one.line for one in findings if one.line)
+    say = ('; where it is what it looks like, write '
+           f'{listed(tuple(lines), "or")} into the model file' if lines else '')
+    return (f'Record the effort that is measured{say}. Where it is measured all the same',
+            files.command('diagnose', '--as-it-is'))
+
+
 def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     """Return what to do next, and the command for it."""
     if diagnosis.effort_looks_like:
-        lines = dict.fromkeys(one.line for one in diagnosis.effort_looks_like.values() if one.line)
-        say = ('; where it is what it looks like, write '
-               f'{listed(tuple(lines), "or")} into the model file' if lines else '')
-        return (f'Record the effort that is measured{say}. Where it is measured all the same',
-                files.command('diagnose', '--as-it-is'))
+        return measure_first(list(diagnosis.effort_looks_like.values()), files)
     if diagnosis.little:
         return first_step(diagnosis.model, files)
     repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')

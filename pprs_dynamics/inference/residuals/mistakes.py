@@ -55,8 +55,12 @@ class NoMeasurement(Mistake):
 
 def effort_looks_like(findings: Iterable[Iterable[Defect]]) -> dict[str, str] | None:
     """Return the kind of each drive's effort that findings call no measurement; None for none."""
-    return {drive: one.kind for each in findings for one in each
-            if isinstance(one, NoMeasurement) for drive in one.drives} or None
+    return {drive: one.kind for one in no_measurements(findings) for drive in one.drives} or None
+
+
+def no_measurements(findings: Iterable[Iterable[Defect]]) -> list[NoMeasurement]:
+    """Return what of the findings of recordings says that efforts are no measurement."""
+    return [one for each in findings for one in each if isinstance(one, NoMeasurement)]
 
 
 @dataclass(frozen=True)
