@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,12 +22,20 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
+from pprs_dynamics.inference.diagnosis.quantities import plain
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import certainty, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.candidates import (
+    DURING,
+    SINCE,
+    Candidate,
+    CandidateSet,
+    EffectCandidate,
+)
+from pprs_dynamics.inference.search.courses import with_courses
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import (
     Calibration,
@@ -41,6 +49,8 @@ from pprs_dynamics.inference.search.fitted_model import (
     fitted_model,
     linear_error,
     linear_residual,
+    model_at,
+    parts_of,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder
@@ -196,7 +206,12 @@ class _Answer:
         self.final = settled(self.fits, self.kept)
         self.remaining = ranking.first.design.residuals.measured - exact_forces(
             self.design, self.final.model)
-        self.effects = self._effects()
+        # Before a constant form is believed.
+        self.dated_fits, self.dated = with_courses(self.fits, self.kept, ranking.alone.values())
+        self.is_dated = self.dated is not self.kept
+        if self.is_dated:
+            self.remaining = linear_residual(self.dated_fits, self.dated)
+        self.effects = self._dated_effects() if self.is_dated else self._effects()
 
     def diagnosis(self, unconfirmed: tuple[FoundEffect, ...]) -> Diagnosis:
         first, final, effects = self.ranking.first.design, self.final, self.effects
@@ -205,20 +220,29 @@ class _Answer:
         floors = {self.drives[d]: regression.noise_floor(self.best.fit, d)
                   for d in regression.drives}
         rivals = self._rivals()
+        if self.is_dated:
+            # What imitates a constant form is no rival of one that changes.
+            rivals = {}
+            noise, floors = self._noise_beside_courses()
         depends = self._depends_on(noise)
+        if self.is_dated:
+            depends = (*self._passing(), *depends)
         sets = tuple((name, *others) for name, others in rivals.items() if others)
         # Where nothing was found, what is left is the noise.
         above = self._above_noise(floors) if effects or unconfirmed else {}
-        verdict = ('unknown' if depends or above else 'ambiguous' if sets
+        passing = any(one.course is not None and one.course.kind != SINCE for one in effects)
+        verdict = ('unknown' if depends or above or passing else 'ambiguous' if sets
                    else 'effect' if effects else 'adequate')
         moved = [one for one in calibrations(final.fits, final.found, final.widths)
                  if abs(one.after - one.before) > self.decisions.sure * one.std]
+        remainders = () if self.is_dated else self.ranking.remainders
         return Diagnosis(
             verdict, tuple(effects), sets, unconfirmed, self._candidates(),
-            self._suspects(), depends, tuple(map(self._within_model_error,
-                                                 self.ranking.remainders)), self._sets(),
+            self._suspects(), depends, tuple(map(self._within_model_error, remainders)),
+            self._sets(),
             tuple(moved), find_cautions(self.fits, self.best, effects), first.notes,
-            first.given, final.model, first.residuals, self.remaining, noise, floors,
+            first.given, self._dated_model() if self.is_dated else final.model,
+            first.residuals, self.remaining, noise, floors,
             root_mean_square(list(floors.values())), above,
             'validation' if self.validate else 'blocks', self.ranking, self.decisions)
 
@@ -252,6 +276,68 @@ class _Answer:
                     or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
                 or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1])))
         return found
+
+    def _dated_effects(self) -> list[FoundEffect]:
+        """Return the effects where some begin, end or grow within the recordings."""
+        fits, found = self.dated_fits, self.dated
+        begun = self.ranking.first.design.reconstructions[0].start
+        given = self.ranking.first.design.residuals.error
+        steps = [fits.evaluate(found.effects[:k]) for k in range(1, len(found.effects))] + [found]
+        errors = [root_mean_square(given), *(linear_error(fits, step) for step in steps)]
+        held_out = [errors[0], *(hold_out(fits, step).error for step in steps)]
+        effects = []
+        for k, candidate in enumerate(found.effects):
+            course = candidate.course
+            if course is not None and course.kind == DURING:
+                continue  # what passes is no property of the machine
+            said = estimate(fits, found, candidate, are_drives_known=True)
+            effects.append(FoundEffect(
+                candidate.effect, self.design.named(candidate.drives), said.parameters,
+                fits.library.force(found, candidate, self.remaining.shape),
+                fits.evaluate(found.without(candidate)).total - found.total, errors[k],
+                errors[k + 1], held_out[k], held_out[k + 1], said.at_bound,
+                (errors[k] - errors[k + 1]) / errors[0], True, None if course is None else replace(
+                    course, begin=course.begin - begun, end=course.end - begun)))
+        return effects
+
+    def _passing(self) -> list[Statement]:
+        """Return what was there for a stretch alone, drive by drive."""
+        residuals = self.ranking.first.design.residuals
+        begun = self.ranking.first.design.reconstructions[0].start
+        found, fits = self.dated, self.dated_fits
+        statements = []
+        for candidate in found.effects:
+            course = candidate.course
+            if course is None or course.kind != DURING:
+                continue
+            force = fits.library.force(found, candidate, self.remaining.shape)
+            span = (course.begin - begun, course.end - begun)
+            inside = (residuals.time >= course.begin) & (residuals.time < course.end)
+            evidence = fits.evaluate(found.without(candidate)).total - found.total
+            for d in np.flatnonzero(np.any(force, axis=0)):
+                squares = np.square(residuals.error[:, d])
+                share = float(np.nansum(squares[inside]) / np.nansum(squares))
+                size = root_mean_square(force[inside, d])
+                statements.append(Statement(
+                    self.drives[d], 'time', span, share, float(np.mean(inside)),
+                    f'{self.drives[d]}: from {span[0]:.4g} s to {span[1]:.4g} s alone its error is '
+                    f'another, {plain(size)} {residuals.units_of(self.drives[d]).effort} rms, as '
+                    f'of a contact, a stop or a hand ({candidate.name} would explain it): what '
+                    'passes is no property of the machine',
+                    evidence, 'range', size, float(np.mean(force[:, d] ** 2))))
+        return statements
+
+    def _dated_model(self) -> ForceModel:
+        """Return the model with what is there at the end, and stays."""
+        base, placed = parts_of(self.dated_fits, self.dated)
+        there = [one for one, component in zip(placed, self.dated.blocks, strict=True)
+                 if component.course is None or component.course.kind == SINCE]
+        return model_at(self.design, base, there)
+
+    def _noise_beside_courses(self) -> tuple[dict[str, NoiseSpectrum], dict[str, float]]:
+        regression, fit = self.dated_fits.regression, self.dated.fit
+        return ({self.drives[d]: one for d, one in regression.noise(fit).items()},
+                {self.drives[d]: regression.noise_floor(fit, d) for d in regression.drives})
 
     def _error_held_out(self, model: ForceModel) -> float:
         """Return the error of a model on the recordings that are not fitted [N]."""
@@ -301,10 +387,12 @@ class _Answer:
     def _depends_on(self, noise: dict[str, NoiseSpectrum]) -> tuple[Statement, ...]:
         statements = []
         libraries = {library.d: library for library in self.ranking.patterns}
-        for candidate in self.kept.unknowns:
+        for candidate in self.dated.unknowns:
+            evidence = (self.dated_fits.evaluate(self.dated.without(candidate)).total
+                        - self.dated.total if self.is_dated else self._evidence(candidate))
             for d, block in candidate.parts.items():
                 statements.append(word_statement(
-                    libraries[d], candidate, self.kept.fit.of(block), self._evidence(candidate)))
+                    libraries[d], candidate, self.dated.fit.of(block), evidence))
         drifting = levels(self.fits.regression.residuals, dict(noise), self.decisions)
         statements += [one for name, one in drifting.items()
                        if one.amplitude > self._lack_of_fit(self.drives.index(name))]
@@ -312,8 +400,9 @@ class _Answer:
 
     def _lack_of_fit(self, d: int) -> float:
         """Return what the forms of the adopted effects may leave on a drive, rms [N]."""
-        forces = [self.fits.library.force(self.kept, one, self.design.residuals.measured.shape)
-                  for one in self.kept.effects if one.effect.idealised]
+        forces = [self.dated_fits.library.force(
+            self.dated, one, self.design.residuals.measured.shape)
+            for one in self.dated.effects if one.effect.idealised]
         return self.decisions.form_share * float(np.sqrt(sum(
             np.mean(np.square(force[:, d])) for force in forces)))
 
@@ -334,6 +423,10 @@ class _Answer:
                             linear_error(fits, found))
 
     def _sets(self) -> tuple[RankedSet, ...]:
+        if self.is_dated:
+            # Those of the search are of constant forms.
+            return (RankedSet(tuple((c.name, self.design.named(c.drives))
+                                    for c in self.dated.candidates), 0.0),)
         found: dict[frozenset[str], RankedSet] = {}
         for one in self.ranking.sets:
             names = tuple((c.name, self.design.named(c.drives)) for c in one.candidates)

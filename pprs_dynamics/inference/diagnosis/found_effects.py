@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.search.candidates import SINCE, Course
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
@@ -40,6 +41,11 @@ class FittedEffect:
         return self.effect.name
 
     @property
+    def when(self) -> str:
+        """When it is there, as the end of a clause; '' where that is all the time."""
+        return ''
+
+    @property
     def places(self) -> tuple[tuple[str, ...], ...]:
         """Links or joints that it is on, each with those that no motion tells it from."""
         return self.effect.places_of(self.parameters)
@@ -64,6 +70,8 @@ class FoundEffect(FittedEffect):
         Whether the error falls with it, and that on held-out data: either their rms, or for
         certain that of each frequency in units of its noise. In the former slow noise and the
         model's own numbers have a share.
+    course : Course or None
+        When it is there, from the start of the first recording [s]; None: all the time.
     """
 
     evidence: float
@@ -74,11 +82,23 @@ class FoundEffect(FittedEffect):
     at_bound: tuple[str, ...] = ()
     share: float = 0.0
     is_confirmed: bool = True
+    course: Course | None = None
+
+    @property
+    def when(self) -> str:
+        """When it is there, as the end of a clause; '' where that is all the time."""
+        if self.course is None:
+            return ''
+        if self.course.kind == SINCE:
+            return f' since {self.course.begin:.4g} s'
+        return f', growing from nothing at the start to this at {self.course.end:.4g} s'
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'name': self.name, 'drives': listed(self.drives),
                 'alike': [list(names) for names in self.places if len(names) > 1],
+                'since': self.course.begin if self.course and self.course.kind == SINCE else None,
+                'course': self.course.kind if self.course else None,
                 'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
                 'evidence': self.evidence,
                 'error_before': self.error_before, 'error_after': self.error_after,

@@ -23,6 +23,36 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE, catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 
+COURSE_TIMES = 200  # beginnings that are tried, evenly over the recordings
+SINCE, DURING, DRIFT = 'since', 'during', 'drift'  # kinds of courses
+
+
+@dataclass(frozen=True)
+class Course:
+    """When an effect is there, of the time of all recordings together [s].
+
+    Parameters
+    ----------
+    kind : {'since', 'during', 'drift'}
+        From `begin` on; from `begin` to `end`; or growing in proportion to the time from nothing
+        at `begin`.
+    begin, end : float
+    """
+
+    kind: str
+    begin: float
+    end: float
+
+    def weight(self, time: Array, period: float) -> Array:
+        """Return which share of the effect is there, (M,), in means over a period about times."""
+        if self.kind == DRIFT:
+            share: Array = (time - self.begin) / max(self.end - self.begin, 1e-300)
+            return share
+        share = np.clip((time - self.begin) / period + 0.5, 0.0, 1.0)
+        if self.kind == DURING:
+            share = share * np.clip((self.end - time) / period + 0.5, 0.0, 1.0)
+        return share
+
 
 @dataclass(frozen=True)
 class Component:
@@ -41,6 +71,8 @@ class Component:
         Parameters of the shape, by name.
     centre : tuple of float
         Of an added body with a first moment: about where it is, from its place's centre [m].
+    course : Course or None
+        None: all the time.
     """
 
     effect: type[CatalogueEffect]
@@ -48,6 +80,7 @@ class Component:
     names: tuple[str, ...]
     shape: tuple[tuple[str, float], ...] = ()
     centre: tuple[float, ...] = ()
+    course: Course | None = None
 
     @classmethod
     def of(cls, effect: type[CatalogueEffect], drive: int | None, shape: Mapping[str, float],
@@ -111,6 +144,11 @@ class EffectCandidate:
     def name(self) -> str:
         """Of the effect."""
         return self.effect.name
+
+    @property
+    def course(self) -> Course | None:
+        """When it is there; None: all the time."""
+        return self.components[0].course
 
     @property
     def claim(self) -> str:
@@ -325,6 +363,8 @@ class Prices:
         price = len(candidate.hypotheses) * self.of_name()
         if candidate.drives is not None:
             price += self.of_drives(len(candidate.components))
+        if candidate.course is not None:
+            price += self.of_course()
         return price + sum(component_price(one) for one in candidate.components)
 
     def of_component(self, effect: type[CatalogueEffect], tried: int) -> float:
@@ -336,6 +376,10 @@ class Prices:
         if effect.shape:
             price += max(len(effect.shape) * log(self.samples), 2 * log(max(tried, 1)))
         return price
+
+    def of_course(self) -> float:
+        """Return the price of a change within the recordings: that there is one, and when."""
+        return 2 * log(COURSE_TIMES) - 2 * log(self.decisions.effect_odds)
 
     def of_width(self, tried: int) -> float:
         """Return the price of a width of reversal that is another than the model's, on a drive."""
