@@ -43,10 +43,11 @@ def main() -> int:
         log = Path(folder)
         console.print('Starting [b]feedforward[/] and [b]play_trajectory[/] as two processes; '
                       f"the paper's helical path at {RATE:g} Hz goes in ...")
-        # Without a model file it is the paper's robot; what it is asked a while ago counts, too:
+        # Without a model file it is the paper's robot. Every message is answered, however late:
         # this is a drawing of forces, and no machine hangs on it.
         command = [executable('feedforward'), '--ros-args', '-p', 'demo:=true',
-                   '-p', 'max_age:=0.0']
+                   '-p', 'max_age:=0.0', '-p',
+                   'qos_overrides./feedforward/trajectory.subscription.depth:=1000']
         with node_process(command, domain, log / 'feedforward.log'):
             time_s, total, parts = _listen(domain, log, console)
         if len(time_s) < MESSAGES:

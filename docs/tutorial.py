@@ -46,7 +46,7 @@ COMMANDS = {
              '--report adopt.html --json adopt.json',
     'again': 'compare run.mcap --model adopted.yaml --report after.html --json after.json',
     'wrong': 'adopt drive_spring run.mcap --validate other.mcap --output wrong.yaml',
-    'history': 'history adopted.yaml --report history.png',
+    'history': 'history adopted.yaml --picture history.png',
 }
 
 # Of what a command says: from the first line that begins so to the next that begins so.

@@ -9,7 +9,7 @@ import difflib
 import errno
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import islice
 from typing import Any
 
@@ -155,6 +155,27 @@ class UnreadableFileError(PprsError, OSError):
 
     def __str__(self) -> str:
         return f'{self.path}: {self.reason}'
+
+
+class MisreadError(PprsError, ValueError):
+    """A recording that can be read, but looks as if its numbers meant something else.
+
+    Parameters
+    ----------
+    recording : str
+        Its name.
+    looks : sequence of str
+        What it looks like, as clauses.
+    lines : sequence of str
+        Of a model file, that say so; '' where none can.
+    """
+
+    def __init__(self, recording: str, looks: Sequence[str], lines: Sequence[str]) -> None:
+        self.recording, self.looks = recording, tuple(looks)
+        self.lines = tuple(dict.fromkeys(filter(None, lines)))
+        way = (f'if so, write into the model file  {"; ".join(self.lines)}' if self.lines
+               else 'if so, record it anew')
+        super().__init__(f'{recording}: {"; ".join(looks)}: {way}; if not, go on with --as-it-is')
 
 
 class MotionError(PprsError, ValueError):

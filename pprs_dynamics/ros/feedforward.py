@@ -77,6 +77,8 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         parameters = parameters_for(drive_count(self))
         self._settings = ModelParameters(self, parameters, self._use_settings)
         own = self._settings.own
+        for name, assumed in self._settings.model.assumed_at_start.items():
+            self.get_logger().info(f'{name} begins anew: {assumed}')
         self._preparation = prepare_beside(self, self._settings.model)
         # Which drives there are, and by which message they are asked for, stays.
         names = RobotNames.of(self._settings.model, own['frame_id'])

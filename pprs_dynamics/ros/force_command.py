@@ -128,6 +128,8 @@ class _Leaving(NamedTuple):
     scale : float
     since, duration : float
         [s]
+    earlier : _Leaving, optional
+        That was still going over at the change.
     """
 
     model: Any
@@ -135,6 +137,11 @@ class _Leaving(NamedTuple):
     scale: float
     since: float
     duration: float
+    earlier: _Leaving | None
+
+    def is_over(self, now: float) -> bool:
+        """Return whether all has gone over to what is in force now."""
+        return now >= self.since + self.duration
 
     def blended(self, motion: Motion, offsets: Indices, effort: Array, now: float) -> Array:
         """Return efforts (N, D) on the way from those of before to those of now.
@@ -152,6 +159,8 @@ class _Leaving(NamedTuple):
         moments = now - self.since + (offsets - offsets[0]) / NANOSECONDS
         share = np.minimum(moments / self.duration, 1.0)[:, None]
         before = self.scale * self.model.drive_forces(motion, self.memory.copy()).total
+        if self.earlier is not None and not self.earlier.is_over(now):
+            before = self.earlier.blended(motion, offsets, before, now)
         return np.asarray(before + share * (effort - before))
 
 
@@ -186,10 +195,12 @@ class Feedforward:
 
         Efforts go over to those of the other one in `ramp_time`.
         """
-        self._leaving, ramp_time = None, own.get('ramp_time', 0.0)
-        if ramp_time and self._last is not None and self._memory is not None:
-            self._leaving = _Leaving(self._model, self._memory, self._scale, self._clock(),
-                                     ramp_time)
+        ramp_time, scale = own.get('ramp_time', 0.0), own['feedforward_scale']
+        if self._last is not None and self._memory is not None and (
+                scale != self._scale or model.fingerprint != self._model.fingerprint):
+            self._leaving = _Leaving(
+                self._model, self._memory, self._scale, self._clock(), ramp_time,
+                self._leaving) if ramp_time else None
         if self._memory is not None:
             self._before = self._model, self._memory
         # Made with the next answer, which is refused where an effect fails at it.
@@ -335,7 +346,7 @@ class Feedforward:
     def _gone_over(self, request: TrajectoryRequest, effort: Array) -> Array:
         """Return efforts (N, D) on the way from those before a change."""
         leaving, now = self._leaving, self._clock()
-        if leaving is None or now >= leaving.since + leaving.duration:
+        if leaving is None or leaving.is_over(now):
             self._leaving = None
             return effort
         try:

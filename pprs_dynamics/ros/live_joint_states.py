@@ -13,8 +13,9 @@ import json
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,6 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
@@ -37,6 +37,15 @@ from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.measured_states import MeasuredStates
 from pprs_dynamics.ros.messages.status_codes import Rejection
+from pprs_dynamics.ros.model_transaction import (
+    ACTIVE,
+    PATIENCE,
+    RAMP,
+    RAMP_TIME,
+    restored,
+    running,
+    set_on_all,
+)
 from pprs_dynamics.ros.node.qos import LATCHED, MEASURED
 from pprs_dynamics.system.numbers import finite
 
@@ -44,8 +53,19 @@ NAME = 'workbench'
 JUDGED = 0.05  # [s] between looks at what came in
 MOST_SAMPLES = 300_000  # in the ring: ten minutes at 500 Hz
 SHOWN = 20.0  # [s] of residuals that are kept to be drawn
-PATIENCE = 5.0  # [s] for a running node's answer
-ACTIVE = 'effects.active'
+COMMANDS = {'std_msgs/msg/Float64MultiArray', 'sensor_msgs/msg/JointState',
+            'trajectory_msgs/msg/JointTrajectory'}  # what drives take
+
+
+class UnconfirmedError(PprsError):
+    """A person has confirmed another machine than the one that would be set, or none."""
+
+
+class NothingToRestoreError(PprsError):
+    """No model was set that could be taken back."""
+
+    def __init__(self) -> None:
+        super().__init__('nothing to restore: no model was set on the running nodes from here')
 
 
 class LiveJointStates(Node):
@@ -85,9 +105,49 @@ class LiveJointStates(Node):
                                  raw=True)
         self.create_subscription(String, f'{monitor}/diagnosis', self._on_diagnosis, LATCHED,
                                  raw=True)
+        self._statuses: dict[str, dict[str, Any]] = {}
+        for name in (monitor, feedforward):
+            self.create_subscription(String, f'{name}/status', partial(self._on_status, name),
+                                     LATCHED, raw=True)
         self.create_timer(JUDGED, self._judge)
         self.clients_of = {name: AsyncParameterClient(self, name)
                            for name in (monitor, feedforward)}
+
+    def full_name(self, name: str) -> str:
+        """Return a node's name with its namespace."""
+        return name if name.startswith('/') else f'{self.get_namespace().rstrip("/")}/{name}'
+
+    def machines(self, names: Iterable[str]) -> list[str]:
+        """Return which robot each node has a model of, and which nodes take its commands."""
+        found = dict[str, None]()
+        for name in names:
+            status = self._statuses.get(name, {})
+            files = ', '.join(Path(each['file']).name for each in status.get(
+                'model', {}).get('files', ()))
+            if robot := status.get('robot'):
+                found[f'robot {robot}' + (f' of {files}' if files else '')] = None
+            if takers := self._takers(self.full_name(name)):
+                found[f'commands of {name} go to {", ".join(takers)}'] = None
+        return list(found)
+
+    def _takers(self, full_name: str) -> list[str]:
+        """Return the nodes that listen to what a node tells drives."""
+        namespace, _, name = full_name.rpartition('/')
+        try:
+            topics = self.get_publisher_names_and_types_by_node(name, namespace or '/')
+        except RuntimeError:  # the public base of rclpy's own: it is not known any more
+            return []
+        return sorted({
+            f'{taker.node_namespace.rstrip("/")}/{taker.node_name}'
+            for topic, kinds in topics if COMMANDS & set(kinds) and not topic.endswith('/error')
+            for taker in self.get_subscriptions_info_by_topic(topic)} - {
+                self.get_fully_qualified_name()})
+
+    def _on_status(self, name: str, data: bytes) -> None:
+        with suppress(Rejection, ValueError):
+            found = json.loads(message_in(data, String).data, parse_constant=lambda _: None)
+            if isinstance(found, dict):
+                self._statuses[name] = found
 
     def use_model(self, model: ForceModel) -> None:
         """Compare with another model from now on."""
@@ -199,6 +259,7 @@ class LiveNodes:
                                      context=self._context)
         self._base: Mapping[str, Any] = model.values
         self._set_before: set[str] = set()
+        self._steps: list[tuple[ForceModel, dict[str, dict[str, Any]]]] = []
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name='live', daemon=True)
@@ -218,46 +279,69 @@ class LiveNodes:
 
     def to_dict(self) -> dict[str, Any]:
         """Return state and running errors."""
-        return self._node.to_dict()
+        return {**self._node.to_dict(), 'can_restore': self.can_restore}
 
     def take(self, path: Path) -> None:
         """Write what the ring holds as a recording."""
         write_recording(path, self._node.taken())
 
-    def set_model(self, model: ForceModel) -> dict[str, str]:
-        """Set a model's effects on the running nodes, and compare with it here.
+    def machine(self) -> str:
+        """Return what would be set, in words: nodes, robot, and who takes the commands."""
+        there = running(self._node.clients_of)
+        if not there:
+            return ''
+        return '; '.join((f'nodes {", ".join(self._node.full_name(name) for name in there)}',
+                          *self._node.machines(there)))
+
+    def set_model(self, model: ForceModel, confirmed: str) -> dict[str, Any]:
+        """Set a model's effects on the running nodes, all or none, and compare with it here.
 
         Parameters
         ----------
         model : ForceModel
+        confirmed : str
+            `machine` as a person has read it.
 
         Returns
         -------
-        dict of str to str
-            What each node said; '' where it took everything.
+        dict
+            `is_set`, and `nodes`: what each said; '' where it took everything.
         """
         # What was set once is set again: a number that is as it was given is so on the nodes, too.
-        self._set_before |= {key for key, value in model.values.items()
-                             if key != ACTIVE and not key.startswith('history.')
-                             and self._base.get(key) != value}
-        changes = {key: value for key, value in model.values.items() if key in self._set_before}
-        answers = {name: self._set(name, changes, list(model.values.get(ACTIVE, ())))
-                   for name in self._node.clients_of}
-        if any(not answer for answer in answers.values()):
+        keys = self._set_before | {
+            key for key, value in model.values.items()
+            if key != ACTIVE and not key.startswith('history.') and self._base.get(key) != value}
+        changes = {key: value for key, value in model.values.items() if key in keys}
+        changes |= {ACTIVE: list(model.values.get(ACTIVE, ())), RAMP_TIME: RAMP}
+        names = self._confirmed(confirmed)
+        answer = set_on_all(self._node.clients_of, names, dict.fromkeys(names, changes))
+        if answer.is_done:
+            self._set_before = keys
+            self._steps.append((self._node.model, answer.before))
             self._node.use_model(model)
-        return answers
+        return {'is_set': answer.is_done, 'nodes': answer.said}
 
-    def _set(self, name: str, changes: Mapping[str, Any], active: list[str]) -> str:
-        client = self._node.clients_of[name]
-        if not client.services_are_ready():
-            return 'does not run'
-        done = threading.Event()
-        # At once: never half an effect.
-        future = client.set_parameters_atomically([
-            *(Parameter(key, value=value) for key, value in changes.items()),
-            Parameter(ACTIVE, Parameter.Type.STRING_ARRAY, active)])
-        future.add_done_callback(lambda _: done.set())
-        if not done.wait(PATIENCE):
-            return f'has not answered within {PATIENCE:g} s'
-        result = future.result().result
-        return '' if result.successful else str(result.reason)
+    def restore(self, confirmed: str) -> dict[str, Any]:
+        """Set the nodes back to what they had before the last model; see `set_model`."""
+        if not self._steps:
+            raise NothingToRestoreError
+        model, before = self._steps[-1]
+        names = [name for name in self._confirmed(confirmed) if name in before]
+        answer = set_on_all(self._node.clients_of, names, restored(before))
+        if answer.is_done:
+            self._steps.pop()
+            self._node.use_model(model)
+        return {'is_set': answer.is_done, 'nodes': answer.said}
+
+    @property
+    def can_restore(self) -> bool:
+        """Whether a model was set that can be taken back."""
+        return bool(self._steps)
+
+    def _confirmed(self, confirmed: str) -> list[str]:
+        """Return the names of the running nodes, where a person has confirmed just these."""
+        if not (now := self.machine()):
+            raise UnconfirmedError('no node runs that could be set')
+        if confirmed != now:
+            raise UnconfirmedError(f'not confirmed: what would be set is {now}')
+        return running(self._node.clients_of)

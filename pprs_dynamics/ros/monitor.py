@@ -54,6 +54,9 @@ PARAMETERS = (
                   upper=3600.0, stays=True),
 )
 
+# Of the samples of a second: from fewer compared ones on the stream is called broken.
+FEW = 0.5
+ENOUGH = 20  # samples in a second, whose share says anything
 LOOK = 0.2  # [s] between looks for an answer of the diagnosis
 
 
@@ -75,10 +78,12 @@ class MonitorNode(ExplainsRefusals):
         self._names = RobotNames.of(self._settings.model, own['frame_id'])
         self._states = MeasuredStates(self._names.joints)
         self._begins_anew = self._cannot_begin = False
-        self._counters = {'received': 0, 'compared': 0, 'gaps': 0, **dict.fromkeys(REJECTIONS, 0)}
+        self._counters = {'received': 0, 'samples': 0, 'compared': 0, 'gaps': 0, 'bridged': 0,
+                          **dict.fromkeys(REJECTIONS, 0)}
+        self._share, self._counted = 1.0, (0, 0)
         self._origin: int | None = None
         self._status = StatusReporter(
-            self, {}, self._counters, hardware_of(self._settings.model))
+            self, {}, self._counters, hardware_of(self._settings.model), self._refresh)
         self._model_effort = publisher(self, JointState, '~/model_effort')
         self._residual = publisher(self, JointState, '~/residual')
         self._error = publisher(self, Float64MultiArray, '~/error')
@@ -104,6 +109,7 @@ class MonitorNode(ExplainsRefusals):
         except Rejection as rejection:
             self._reject(rejection)
             return
+        self._counters['samples'] += len(samples)
         for stamp, position, effort in samples:
             self._latest = stamp, position
             if self._cannot_begin:
@@ -142,6 +148,7 @@ class MonitorNode(ExplainsRefusals):
             self._reject(Rejection.of(error))
             return
         self._counters['gaps'] = self._comparison.gaps
+        self._counters['bridged'] = self._comparison.bridged
         if compared is None:
             return
         self._counters['compared'] += len(compared.time)
@@ -154,10 +161,29 @@ class MonitorNode(ExplainsRefusals):
         text = (f'largest running error {np.nanmax(running):.4g} {unit}'
                 if np.isfinite(running).any() else
                 'no running error: efforts are not measured, or all joints stand')
-        if self._changed:
+        text += f'; {self._share:.0%} of the samples are compared'
+        if drives := self._comparison.unexplained():
+            self._status.report(
+                'WARN', 'UNEXPLAINED', f'the error of {", ".join(drives)} is as large as the '
+                f'effort: this is another machine, or its efforts are no measurement; {text}')
+        elif self._share < FEW:
+            self._status.report(
+                'WARN', 'GAPS', f'joint states are missing, {self._counters["gaps"]} times more '
+                f'than two in a row; {text}')
+        elif self._changed:
             self._status.report('WARN', 'CHANGED', f'{self._changed}; {text}')
         else:
             self._status.report('OK', 'OK', text)
+
+    def _refresh(self) -> None:
+        """Bring the share of samples that are compared up to date."""
+        samples, compared = self._counters['samples'], self._counters['compared']
+        came, were = samples - self._counted[0], compared - self._counted[1]
+        self._counted = samples, compared
+        # The first window, and what is still on its way, is none that is missing.
+        if came >= ENOUGH and compared > came:
+            self._share = min(1.0, were / came)
+        self._status.facts['compared_share'] = round(self._share, 3)
 
     def _diagnose(self) -> None:
         """Pass on what the worker has found, and give it the next window."""

@@ -28,6 +28,7 @@ class JointMoment:
     Parameters
     ----------
     time, position, velocity, acceleration, load : (N,) arrays
+        `load` is the effort without friction, with its sign.
     effort, speed : float
         Largest effort and speed of the motion.
     gear_ratio : float
@@ -57,6 +58,12 @@ class JointMoment:
         """Direction v / sqrt(v^2 + w^2): another way to turn over than the model's tanh."""
         width = STEEPNESS * self.speed
         return self.velocity / np.sqrt(self.velocity ** 2 + width ** 2)
+
+    @property
+    def driving(self) -> Array:
+        """1 where the motor drives the load, 0 where the load drives the motor."""
+        power = self.load * self.velocity
+        return (1 + power / np.hypot(power, 0.01 * self.effort * self.speed)) / 2
 
 
 @dataclass(frozen=True)
@@ -118,6 +125,13 @@ FORMS: dict[str, JointForm] = {
         'dmu |tau|^(2/3) tau_0^(1/3) v / sqrt(v^2 + w^2)',
         lambda rng, m: {'coefficient': 2 * SIZE(rng), 'reference': m.effort},
         lambda p, m: p['coefficient'] * np.cbrt(m.load ** 2 * p['reference']) * m.sign),
+    'gear_efficiency': JointForm(
+        'mu tau_0 (|tau| / tau_0)^0.9 v / sqrt(v^2 + w^2), mu_b in the place of mu_d by the share '
+        '(1 - tau v / sqrt((tau v)^2 + (0.01 tau_0 v_0)^2)) / 2',
+        lambda rng, m: {'driving': 4 * SIZE(rng), 'driven_back': float(rng.uniform(0.0, 0.1)),
+                        'reference': m.effort},
+        lambda p, m: p['reference'] * (np.abs(m.load) / p['reference']) ** 0.9 * m.sign * (
+            p['driven_back'] + (p['driving'] - p['driven_back']) * m.driving)),
     'hysteresis': JointForm(
         'three springs that slip one after the other, F / 3 each, in the place of F sgn(v)',
         lambda rng, m: {'force': SIZE(rng) * m.effort, 'stroke': 0.02 * float(

@@ -360,7 +360,7 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
     largest = np.abs(efforts).max(axis=0)
     for name in chosen:
         if name in FORMS:
-            hidden.append(_add(name, model, motion, np.abs(bodies), largest, efforts, random,
+            hidden.append(_add(name, model, motion, bodies, largest, efforts, random,
                                scale))
     if 'effort_gain' in chosen:
         joint = int(random.integers(len(model.drives)))

@@ -135,7 +135,7 @@ class LinkagePlant:
         if name == 'base_tilt':
             return self.engine.hide_tilt(random, scale)
         j = int(random.integers(len(model.drives)))
-        moment = JointMoment.along(motion, j, np.abs(efforts[:, j]), self.largest[j],
+        moment = JointMoment.along(motion, j, efforts[:, j], self.largest[j],
                                    model.gear_ratios[j])
         drawn = draw_form(name, random, moment, scale)
         self._pushes.append((j, name, drawn, moment))

@@ -5,8 +5,12 @@
 
 from __future__ import annotations
 
+import hashlib
+import html
 import json
+import re
 import subprocess
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +22,7 @@ from ros_processes import executable
 
 from benchmarks.hidden.driven_motion import DrivenMotion
 from benchmarks.hidden.prescribed import PrescribedPlant
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, __version__
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
@@ -57,7 +61,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     record(folder / '<b>other<b>.mcap', 2, 8.0)
     (folder / 'truth.json').write_text(json.dumps(truth))
     done = pprs('diagnose', 'run.csv', '--validate', '<b>other<b>.mcap', '--json', 'result.json',
-                '--report', 'page.html', cwd=folder)
+                '--report', 'page.html', '--picture', 'picture.png', cwd=folder)
     assert done.returncode == 0, done.stderr
     (folder / 'stdout.txt').write_text(done.stdout)
     return folder
@@ -87,12 +91,15 @@ def test_the_hidden_effect_is_named_with_its_drives_and_its_size(
 
 def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> None:
     promised = {'verdict', 'effects', 'indistinguishable', 'candidates', 'depends_on', 'suspects'}
-    added = {'above_noise', 'calibrated', 'held_out_on', 'noise_floor', 'noise_floors', 'sets',
-             'unconfirmed', 'warnings'}
+    added = {'above_noise', 'barred', 'calibrated', 'effort_looks_like', 'explained',
+             'explained_after', 'held_out_on', 'little_explained', 'noise_floor',
+             'noise_floors', 'sets', 'unconfirmed', 'warnings'}
     assert set(result) == promised | added
     for effect in result['effects']:
         assert set(effect) == {'name', 'drives', 'alike', 'parameters', 'error_before',
-                               'error_after', 'held_out_before', 'held_out_after', 'evidence'}
+                               'error_after', 'held_out_before', 'held_out_after', 'evidence',
+                               'without'}
+        assert effect['without']['cost'] == pytest.approx(effect['evidence'])
         assert set(effect['drives']) <= set(DRIVES)
         for parameter in effect['parameters'].values():
             assert set(parameter) == {'value', 'std', 'unit'}
@@ -102,6 +109,8 @@ def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> No
     assert result['sets'][0]['cost'] == 0.0
     assert [one['name'] for one in result['sets'][0]['effects']] == [HIDDEN]
     assert all(one['cost'] > 0 for one in result['sets'][1:])
+    for one in result['sets']:
+        assert sum(one['terms'].values()) == pytest.approx(one['cost'])
     assert result['held_out_on'] == 'validation'
     assert all(isinstance(one, str) for one in result['warnings'])
 
@@ -114,6 +123,30 @@ def test_the_terminal_says_verdict_fall_and_the_next_command_in_25_lines(folder:
                  f"pprs adopt {HIDDEN} run.csv --validate '<b>other<b>.mcap' --output "
                  f'with_{HIDDEN}.yaml', 'page: page.html'):
         assert part in shown
+
+
+def test_the_page_is_a_record_that_can_be_filed(folder: Path) -> None:
+    page = html.unescape((folder / 'page.html').read_text())
+    for name in ('run.csv', '<b>other<b>.mcap'):
+        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() in page
+    assert DriveModel.load().fingerprint in page
+    assert ("pprs diagnose run.csv --validate '<b>other<b>.mcap' --json result.json "
+            '--report page.html --picture picture.png') in page
+    assert '3500 samples, 14.00 s at 250 Hz' in page
+    assert f'pprs_dynamics {__version__}' in page
+    assert datetime.now(UTC).date().isoformat()[:7] in page
+
+
+def test_the_answer_is_there_as_markdown_and_as_a_picture(folder: Path) -> None:
+    page = html.unescape((folder / 'page.html').read_text())
+    text = re.search(r'<code style="display:none">(.*?)</code><button type="button">Copy as '
+                     'Markdown', page, re.DOTALL)
+    assert text is not None
+    assert text[1].startswith('**effect**: ')
+    assert f'\n| {HIDDEN} | ' in text[1]
+    assert '\n```sh\npprs adopt coulomb_friction run.csv' in text[1]
+    assert '[green]' not in text[1]
+    assert min(matplotlib.image.imread(folder / 'picture.png').shape[:2]) > 200
 
 
 def test_the_effect_that_is_named_is_adopted(folder: Path) -> None:

@@ -148,6 +148,15 @@ def without_header(folder: Path) -> list[Path]:
     return [folder / 'run.csv']
 
 
+def with_what_was_asked_for(folder: Path) -> list[Path]:
+    # Of an arm's log: measured, then accelerations, then what was asked for; rows end in commas.
+    ddq = -(Q - [0.3, -0.4, 0.1]) * WAVES**2
+    rows = np.column_stack([1017.78 + TIME, Q, DQ, ddq, Q + 1e-4, TAU, DQ, 0.9 * TAU])
+    (folder / 'log.csv').write_text(''.join(
+        ','.join(map(repr, row)) + ',\n' for row in rows.tolist()))
+    return [folder / 'log.csv']
+
+
 def in_degrees(folder: Path) -> list[Path]:
     np.savetxt(folder / 'run.txt', np.column_stack(
         [TIME, np.rad2deg(2 * Q), np.rad2deg(2 * DQ), TAU]), fmt='%.17g')
@@ -174,6 +183,14 @@ def one_file_each(folder: Path) -> list[Path]:
         np.savetxt(folder / f'{name}.csv', values, delimiter=',', fmt='%.17g')
         made.append(folder / f'{name}.csv')
     return made
+
+
+def numbers_in_turn(folder: Path) -> list[Path]:
+    # q_1 of the first sample, its q_2, ..., each on a line of its own.
+    (folder / 'rbt_log').mkdir()
+    for name, values in (('positions', Q), ('velocity', DQ), ('torques', TAU), ('time', TIME)):
+        np.savetxt(folder / 'rbt_log' / f'exciting_{name}.txt', np.ravel(values), fmt='%.17g')
+    return [folder / 'rbt_log']
 
 
 def a_folder_of_files(folder: Path) -> list[Path]:
@@ -277,9 +294,10 @@ WITHOUT_VELOCITY = (plotjuggler_of_arrays, commas)
 
 
 @pytest.mark.parametrize('write', [
-    plotjuggler, plotjuggler_of_arrays, numbered, named, real_time, without_header, in_degrees,
-    commas, structure, one_file_each, a_folder_of_files, lerobot, lerobot_without_names, bag,
-    bag_with_a_prefix, bag_with_other_names, currents, arrays])
+    plotjuggler, plotjuggler_of_arrays, numbered, named, real_time, without_header,
+    with_what_was_asked_for, in_degrees, commas, structure, one_file_each, a_folder_of_files,
+    numbers_in_turn, lerobot, lerobot_without_names, bag, bag_with_a_prefix,
+    bag_with_other_names, currents, arrays])
 def test_what_init_writes_reads_the_recording_as_it_was(
     write: Callable[[Path], list[Path]], robot: Path, tmp_path: Path,
 ) -> None:
@@ -299,6 +317,47 @@ def test_the_tool_is_the_flange_and_the_base_what_all_hangs_on(robot: Path) -> N
     assert (values['arm.tool'], values['arm.joints']) == ('camera', ('elbow',))
     with pytest.raises(ModelError, match=r'--tool: unknown link flnge .*flange'):
         first_model(robot, tool='flnge')
+
+
+def test_what_is_commented_out_of_a_description_is_no_xacro(robot: Path) -> None:
+    text = robot.read_text()
+    robot.write_text(text.replace('</robot>', '<!-- <box size="${size} 1 1"/>\n<xacro:x/> -->'
+                                  '</robot>'))
+    assert first_model(robot).model.drives == JOINTS
+    robot.write_text(text.replace('xyz="0.2 0 0.1"', 'xyz="${a} 0 0.1"'))
+    with pytest.raises(PprsError, match='xacro'):
+        first_model(robot)
+
+
+def test_a_joint_that_was_not_recorded_is_given_no_column_of_another(
+    tmp_path: Path,
+) -> None:
+    # A lift that was not recorded, then arm_1, arm_2, arm_3 that were, all but in order.
+    joints = ('lift', 'arm_1_joint', 'arm_2_joint', 'arm_3_joint')
+    text = ''.join(f'<link name="l{k}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" '
+                   'izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>' for k in range(5))
+    text += ''.join(f'<joint name="{name}" type="revolute"><parent link="l{k}"/><child '
+                    f'link="l{k + 1}"/><axis xyz="0 1 0"/></joint>'
+                    for k, name in enumerate(joints))
+    (tmp_path / 'x.urdf').write_text(f'<robot name="x">{text}</robot>')
+    for name, values in (('position', Q), ('effort', TAU)):
+        frame({'t': TIME, **{f'- arm_{k + 1}_joint_{name}': values[:, k]
+                             for k in (2, 0, 1)}}).to_csv(tmp_path / f'{name}.csv', index=False)
+    first = first_model(tmp_path / 'x.urdf', [tmp_path / 'position.csv', tmp_path / 'effort.csv'],
+                        tmp_path / 'robot.yaml')
+    assert first.model.drives == joints[1:]
+    assert_read(read_recording(first.recordings[0], first.model.recorded), velocity=False)
+
+
+def test_joints_that_share_a_transmission_are_left_out_and_told(robot: Path) -> None:
+    text = robot.read_text()
+    robot.write_text(text.replace('</robot>', '<transmission name="wrist"><type>'
+                                  'transmission_interface/DifferentialTransmission</type>'
+                                  '<joint name="shoulder_lift"/><joint name="elbow"/>'
+                                  '</transmission></robot>'))
+    first = first_model(robot)
+    assert first.model.drives == ('shoulder_pan',)
+    assert any('shoulder_lift and elbow share a transmission' in note for note in first.notes)
 
 
 def two_arms(path: Path) -> Path:

@@ -210,7 +210,8 @@ OUTPUTS = {
     ('adopt', 'viscous_friction', 'run.csv', '--output', 'x.csv'): '.yaml or .yml',
     ('diagnose', 'run.csv', '--adopt-all', '--output', 'x'): '.yaml or .yml',
     ('history', 'model.yaml', '--undo', '--output', 'x.json'): '.yaml or .yml',
-    ('history', 'model.yaml', '--report', 'x.svg'): '.html or .png',
+    ('history', 'model.yaml', '--report', 'x.svg'): '.html',
+    ('history', 'model.yaml', '--picture', 'x.svg'): '.png',
     ('next-experiment', 'run.csv', '--output', 'x.yaml'): '.csv',
     ('compare', 'run.csv', '--report', 'x.txt'): '.html',
     ('info', 'run.csv', '--json', 'x.txt'): '.json'}

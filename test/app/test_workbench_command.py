@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import http.client
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -115,6 +116,18 @@ def test_it_ends_at_once_and_in_a_line_while_a_browser_listens(folder: Path) -> 
         assert b'Error' not in events.read()  # to its end
         assert bench.process.wait(60) == 128 + signal.SIGINT
         connection.close()
+    assert (folder / 'workbench.log').read_text() == 'pprs workbench: interrupted\n'
+
+
+def test_ctrl_c_during_a_diagnosis_ends_it_in_a_line(folder: Path) -> None:
+    """A terminal sends the signal to all processes of the command, those that compute included."""
+    with workbench(write_hidden(folder / 'long.csv', 1), folder=folder) as bench:
+        bench.enter()
+        bench.wait(lambda screen: any(
+            job['kind'] == 'diagnose' and job['is_running'] and job['share'] > 0
+            for job in screen.get('jobs', {}).values()), 60)
+        os.killpg(bench.process.pid, signal.SIGINT)
+        assert bench.process.wait(60) == 128 + signal.SIGINT
     assert (folder / 'workbench.log').read_text() == 'pprs workbench: interrupted\n'
 
 

@@ -81,8 +81,9 @@ def bench(tmp_path: Path, ros_domain: int) -> Iterator[Workbench]:
     recorded, live = write_hidden(tmp_path / 'run.csv', 1), write_hidden(tmp_path / 'live.csv', 3)
     with ExitStack() as stack:
         for name in ('monitor', 'feedforward'):
-            stack.enter_context(node_process([executable(name)], ros_domain,
-                                             tmp_path / f'{name}.log'))
+            stack.enter_context(node_process(
+                [executable(name), '--ros-args', '-p', 'demo:=true'], ros_domain,
+                tmp_path / f'{name}.log'))
         replay = Replay(read_recording(live))
         stack.callback(replay.close)
         running = stack.enter_context(workbench(recorded, '--live', folder=tmp_path))
@@ -129,8 +130,11 @@ def test_an_arm_is_compared_and_set_in_its_own_window_names_and_units(
         assert bench.post('/api/tick', effect='viscous_friction', drives=['turn'],
                           revision=revision).status == 200
         bench.settled()
-        assert bench.post('/api/live/set').json == {'nodes': {
-            'watch': '', '/right/control': 'does not run'}}
+        assert bench.post('/api/live/set', confirmed='the other arm').status != 200
+        machine = bench.get('/api/live/machine').json['machine']
+        assert machine.startswith('nodes /left/watch; robot arm')
+        assert bench.post('/api/live/set', confirmed=machine).json == {
+            'is_set': True, 'nodes': {'watch': ''}}
         awaited(lambda found: found['error'][0] and max(
             found['error'][0], found['monitor_error'][0]) < 0.5)
 
@@ -161,6 +165,9 @@ def test_ticked_effects_go_to_running_nodes_and_the_error_falls(bench: Workbench
             page.tab.wait_for_function(
                 f'bench.live.{key} && Math.max(...bench.live.{key}) > {6 * NOISE}')
         page.tab.locator('#live-set').click()
+        assert 'nodes /monitor, /feedforward; robot 3-PPRS' in page.tab.locator(
+            '#live-machine').inner_text()
+        page.tab.locator('#live-yes').click()
         page.tab.locator('#live-nodes li').nth(1).wait_for()
         assert page.tab.locator('#live-nodes').inner_text().splitlines() == [
             'monitor: took the effects', 'feedforward: took the effects']

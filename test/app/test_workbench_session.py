@@ -80,7 +80,10 @@ def test_ticks_lower_the_error_at_once_and_find_what_was_hidden(session: Session
     mass = shown.estimates['payload_mass']['mass']
     assert abs(force.value - FORCE) < 4 * force.std < 0.1 * FORCE
     assert abs(mass.value - MASS) < 4 * mass.std < 0.1 * MASS
-    assert min(shown.evidence.values()) > 100
+    assert min(terms.total for terms in shown.without.values()) > 100
+    told = next(one for one in session.to_dict()['effects'] if one['name'] == 'payload_mass')
+    assert told['evidence'] == pytest.approx(shown.without['payload_mass'].total)
+    assert told['evidence_terms'].startswith('fit + ')
     noise = session.noise['lift_2']
     assert session.errors()['lift_2'].now == pytest.approx(noise, rel=0.1)
 

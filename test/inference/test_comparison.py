@@ -109,15 +109,15 @@ def test_noise_is_called_noise_and_an_error_beyond_it_is_set_against_the_models_
     time = PERIOD * np.arange(3000)
     effort = 3 * np.sin(0.7 * time)[:, None]
     noise = 0.05 * ar1(0.9, 3000, rng)[:, None]
-    quiet = compare(recording(noise, effort)).drives['drive_0']
+    floors = {'drive_0': 0.05}
+    quiet = compare(recording(noise, effort), floors=floors).drives['drive_0']
     assert quiet.grade == 'noise'
     assert quiet.verdict.startswith('drive_0: the model leaves')
     friction = 0.5 * np.sign(np.cos(time))[:, None]
-    loud = compare(recording(noise + friction, effort)).drives['drive_0']
+    loud = compare(recording(noise + friction, effort), floors=floors).drives['drive_0']
     assert loud.grade == 'poor'
     # What is left is known to a few per cent: the noise model is fitted to 3000 samples.
     assert loud.unexplained == pytest.approx(0.5, rel=0.1)
-    assert loud.noise_floor < 0.1
     assert 'more than passive friction contributes' in loud.verdict
 
 
@@ -166,11 +166,11 @@ def test_a_vibration_on_one_drive_is_told_and_no_noise() -> None:
     time = PERIOD * np.arange(4000)
     error = 0.05 * rng.normal(size=(4000, 6))
     error[:, 3] += 0.9 * np.sin(2 * np.pi * 6.1 * time)
-    found = compare(recording(error, 3 * np.sin(0.7 * time)[:, None] * np.ones(6)))
+    found = compare(recording(error, 3 * np.sin(0.7 * time)[:, None] * np.ones(6)),
+                    floors={f'drive_{k}': 0.05 for k in range(6)})
     assert [(one.drive, one.variable) for one in found.localisation.statements] == [
         ('drive_3', 'frequency')]
     assert found.drives['drive_3'].grade == 'poor'
-    assert found.drives['drive_3'].noise_floor == pytest.approx(0.05, rel=0.1)
     assert 'noise accounts for it on every drive' not in found.verdict
 
 
@@ -191,13 +191,11 @@ def test_what_a_statement_explains_is_never_put_down_to_noise(
     residuals = made_up_residuals()
     error = residuals.error[:, 1]
     told = replace(statement('slide_2'), mean_square=share * float(np.mean(error ** 2)))
-    # A spectrum that takes all of the error for noise.
-    loud = NoiseSpectrum(np.array([1.0]), np.array([4 * NOISE ** 2, 0.0]), residuals.period)
-    where = Localisation((told,), {name: DriveFindings((told,) if name == 'slide_2' else (), loud)
+    where = Localisation((told,), {name: DriveFindings((told,) if name == 'slide_2' else (), None)
                                    for name in residuals.drives})
-    found = compare(residuals, where)
+    # A noise that would account for all of the error.
+    found = compare(residuals, where, dict.fromkeys(residuals.drives, NOISE))
     drive = found.drives['slide_2']
-    assert drive.noise_floor ** 2 <= (1 - share) * drive.rms ** 2 * (1 + 1e-9)
     assert found.where == ((told,) if share >= 0.01 else ())
     assert ('on every drive' in found.verdict) == (not found.where)
     assert ('nothing else stands out' in drive.verdict) == (not found.where)
@@ -213,12 +211,12 @@ def test_verdict_places_and_next_step_fit_25_lines_of_80_columns(count: int) -> 
                  for name in (*residuals.drives, *residuals.drives))[:count]
     found = compare(residuals, Localisation(told, {
         name: DriveFindings(tuple(one for one in told if one.drive == name), None)
-        for name in residuals.drives}))
+        for name in residuals.drives}), dict.fromkeys(residuals.drives, NOISE))
     command = 'pprs diagnose a_recording_with_a_long_name.mcap --model robot.yaml --report why.html'
 
     def printed(details: bool) -> list[str]:
         screen = Console(width=80, file=io.StringIO())
-        screen.print(comparison_view(found, command, details))
+        screen.print(comparison_view(found, ('Find out why', command), details))
         assert isinstance(screen.file, io.StringIO)
         return screen.file.getvalue().splitlines()
 

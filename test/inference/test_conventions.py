@@ -11,7 +11,9 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
+import made_up_arm as arm
 import numpy as np
 import pytest
 from ros_processes import executable
@@ -22,10 +24,13 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.residuals.conventions import find_mistakes
-from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.inference.residuals.mistakes import OtherReading, columns_line
+from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
+from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
+from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.axis_model import AxisModel, AxisMotion
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.model_file import build_model, load_model
 from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
 
 ROOT = Path(__file__).parents[2]
@@ -252,8 +257,8 @@ def test_a_real_drive_is_called_right() -> None:
 def test_commands_say_it_before_they_compare(tmp_path: Path) -> None:
     write_recording(tmp_path / 'minus.csv', recording(scaled(effort=-1.0)(robot())))
     write_recording(tmp_path / 'mm.csv', recording(scaled(motion=1e3)(robot())))
-    for command in ('info', 'compare'):
-        done = subprocess.run([executable('pprs'), command, 'minus.csv'], cwd=tmp_path,
+    for command in (('info',), ('compare', '--as-it-is')):
+        done = subprocess.run([executable('pprs'), *command, 'minus.csv'], cwd=tmp_path,
                               capture_output=True, text=True, timeout=100)
         assert done.returncode == 0, done.stderr
         said = ' '.join(done.stdout.split())
@@ -263,11 +268,104 @@ def test_commands_say_it_before_they_compare(tmp_path: Path) -> None:
                           capture_output=True, text=True, timeout=100)
     assert 'look like millimetres' in ' '.join(done.stdout.split())
     # No mechanism follows such positions: the sentence is about their unit, not about a pose.
-    for command in (('compare', 'mm.csv'), ('diagnose', 'minus.csv', '--validate', 'mm.csv'),
+    for command in (('compare', 'mm.csv'), ('diagnose', 'mm.csv', '--validate', 'minus.csv'),
                     ('adopt', 'viscous_friction', 'mm.csv', '--output', 'x.yaml'),
                     ('next-experiment', 'mm.csv', '--output', 'x.csv')):
         done = subprocess.run([executable('pprs'), *command], cwd=tmp_path, capture_output=True,
                               text=True, timeout=100)
-        assert done.returncode == 2
-        assert done.stderr == (f'pprs {command[0]}: mm.csv: the positions of all drives look '
-                               'like millimetres, must be metres\n')
+        assert done.returncode == 1
+        scales = ', '.join(f'{drive}: {{position_scale: 0.001}}' for drive in DRIVES)
+        stopped = (f'pprs {command[0]}: mm.csv: the positions of all drives look like '
+                   f'millimetres: if so, write into the model file  columns: {{{scales}}}; '
+                   'if not, go on with --as-it-is\n')
+        assert done.stderr == stopped
+
+
+def arm_recording(model: ArmModel, motion: float | list[float] = 1.0,
+                  effort: float | list[float] = 1.0,
+                  changes: Callable[[Arrays], Arrays] | None = None,
+                  ) -> Recording:
+    run = arm.record(arm.real_arm(Path(model.source).parent), arm.motion(12.0))
+    assert run.velocity is not None
+    arrays = (run.time, run.position, run.velocity, run.effort)
+    arrays = arrays if changes is None else changes(arrays)
+    return recording(scaled(motion=motion, effort=effort)(arrays), model.drives)
+
+
+def read_as_told(model: ArmModel, folder: Path, run: Recording) -> tuple[str, tuple[Defect, ...]]:
+    """Return the line that is told, and what is told of the recording once it is written."""
+    readings = [one for one in find_mistakes(model, run) if isinstance(one, OtherReading)]
+    line = columns_line(readings)
+    write_recording(folder / 'run.csv', run)
+    path = folder / 'corrected.yaml'
+    path.write_text((folder / 'arm.yaml').read_text() + f'    {line}\n')
+    corrected = load_model(path)
+    return line, find_mistakes(corrected, read_recording(folder / 'run.csv', corrected.recorded))
+
+
+ARM_MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
+    'degrees': ({'motion': [180 / np.pi, 180 / np.pi, 1.0]}, 'turn: {position_scale: 0.01745329}'),
+    'millimetres': ({'motion': [1.0, 1.0, 1e3]}, 'reach: {position_scale: 0.001}'),
+    'sign': ({'effort': -1.0}, 'swing: {scale: -1}'),
+    'a sign': ({'effort': [1.0, -1.0, 1.0]}, 'swing: {scale: -1}')}
+
+
+@pytest.mark.parametrize('mistake', ARM_MISTAKES)
+def test_the_line_that_is_told_mends_a_recording_of_an_arm(mistake: str, tmp_path: Path) -> None:
+    """The model has no friction, of which most of these efforts are."""
+    model = ArmModel.load(arm.write_arm(tmp_path))
+    change, entry = ARM_MISTAKES[mistake]
+    line, left = read_as_told(model, tmp_path, arm_recording(model, **change))
+    assert entry in line
+    assert left == ()
+
+
+def test_efforts_in_percent_of_the_largest_are_told(tmp_path: Path) -> None:
+    largest = np.array([400.0, 80.0, 30.0])
+    text = arm.urdf()
+    for limit in largest:
+        text = text.replace('effort="200"', f'effort="{limit:g}"', 1)
+    model = ArmModel.load(arm.write_arm(tmp_path, text))
+    run = arm_recording(model, effort=(100 / largest).tolist())
+    (finding,) = find_mistakes(model, run)
+    assert "percent of the drives' largest" in finding.what
+    assert columns_line([finding]) == (
+        'columns: {turn: {scale: 4}, swing: {scale: 0.8}, reach: {scale: 0.3}}')
+
+
+def test_a_joint_that_stands_is_no_reason_to_doubt_a_unit(tmp_path: Path) -> None:
+    """The constant effort of a standing joint is most alike where nothing moves at all."""
+    def standing(a: Arrays) -> Arrays:
+        position, velocity, effort = a[1].copy(), a[2].copy(), a[3].copy()
+        position[:, 1], velocity[:, 1] = 0.1, 0.0
+        effort[:, 1] += 40.0
+        return a[0], position, velocity, effort
+
+    model = ArmModel.load(arm.write_arm(tmp_path))
+    assert [one for one in find_mistakes(model, arm_recording(model, changes=standing))
+            if isinstance(one, OtherReading)] == []
+
+
+OTHERS = {  # folder, model, recording: kinds of what is told, and a clause of it
+    'sign': ('kuka_sign', 'iiwa_unflipped.yaml', 'dyn.csv.gz', 'effort of all drives .* minus'),
+    'sign read': ('kuka_sign', 'iiwa.yaml', 'dyn.csv.gz', ''),
+    'degrees': ('kr300_degrees', 'kr_deg.yaml', 'A.csv.gz', 'positions of all drives .* degrees'),
+    'degrees read': ('kr300_degrees', 'kr.yaml', 'A.csv.gz', ''),
+    'radians': ('false_units', 'nofric.yaml', 'r0.csv.gz', ''),
+    'metres': ('false_units', 'v9b.yaml', 'v9b.csv.gz', ''),
+    'degrees of an arm': ('wrong_tool_named_next', 'arm2.yaml', 'v19.csv.gz', 'like degrees')}
+
+
+@pytest.mark.parametrize('case', OTHERS)
+def test_recordings_of_other_people(case: str) -> None:
+    folder, model_file, run, clause = OTHERS[case]
+    place = ROOT.resolve().parent / 'shared' / 'cases' / folder
+    if not place.is_dir():
+        pytest.skip('no recordings in ../shared/cases')
+    model = load_model(place / model_file)
+    whole = read_recording(place / run, model.recorded)
+    count = len(whole.time)
+    for part in (slice(0, count), slice(0, count // 2), slice(count // 3, count)):
+        piece = Recording.from_arrays('piece', whole.time[part], whole.position[part], None,
+                                      whole.effort[part], model.drives)
+        expect([one.what for one in find_mistakes(model, piece)], [clause] * bool(clause))

@@ -261,8 +261,18 @@ def test_the_page_is_told_the_runner_up_and_evidence_is_the_difference_of_costs(
     assert found.sets[0].cost == 0
     assert [one.cost for one in found.sets] == sorted(one.cost for one in found.sets)
     assert found.selection is not None
-    assert found.effects[0].evidence == pytest.approx(
-        found.selection.nothing.cost - found.selection.best.cost)
+    # Whatever stands there instead: without a payload another effect takes on what it can.
+    without = [one for one in found.selection.sets
+               if 'payload_mass' not in {c.name for c in one.effects}]
+    rival = min(without, key=lambda one: one.cost)
+    assert rival.effects
+    assert found.effects[0].evidence == pytest.approx(rival.cost - found.selection.best.cost)
+    assert found.effects[0].evidence < found.selection.nothing.cost - found.selection.best.cost
+    for told, one in zip(found.sets, found.selection.sets, strict=False):
+        assert told.cost == pytest.approx(one.cost - found.selection.best.cost)
+        assert sum(told.terms.to_dict().values()) == pytest.approx(told.cost)
+    assert found.effects[0].without is not None
+    assert {name for name, _ in found.effects[0].without.names} == {c.name for c in rival.effects}
 
 
 def test_friction_fades_from_the_start_of_the_recording_not_of_what_is_kept() -> None:

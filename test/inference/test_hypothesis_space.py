@@ -182,3 +182,20 @@ def test_an_effect_alone_is_on_the_drives_where_it_costs_least(number: int) -> N
                       if one.effect is effect]
         # A tenth of what rivals may differ by.
         assert not alone or min(alone) <= min(exhaustive) + DECISIONS.rival_margin / 10
+
+
+def test_the_terms_of_a_cost_add_up_to_the_likelihood_and_the_prices_of_what_was_chosen() -> None:
+    design = random_design({('structure_0', None): 0.4, ('drive_1', 1): -0.5}, 12)
+    fits = FittedSets(design, DECISIONS)
+    structure, on_drives = everything()[0], next(
+        one for one in everything() if one.name == 'drive_1' and one.drives == (0, 2))
+    for candidates in ((), (structure,), (structure, on_drives)):
+        found = fits.evaluate(candidates)
+        terms = found.terms.to_dict()
+        assert sum(terms.values()) == pytest.approx(found.total) == found.cost
+        assert terms['fit'] + terms['coefficients'] == pytest.approx(found.fit.deviance)
+        # Seven names at odds of 1 : 10; two of three drives, as one of three kinds of choice.
+        assert terms['names'] == pytest.approx(len(candidates) * 2 * np.log(7 * 10))
+        assert terms['drives'] == pytest.approx(
+            2 * np.log(3) + 2 * np.log(3) if on_drives in candidates else 0)
+        assert all(terms[name] == 0 for name in ('shapes', 'signs', 'discrepancy', 'feasibility'))

@@ -6,7 +6,7 @@
 import numpy as np
 import pytest
 
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.inference.residuals.live import LiveComparison
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
@@ -41,3 +41,57 @@ def test_a_stream_that_slows_down_is_compared_again():
     assert max(compared) > 5.5
     assert comparison.running_error() == pytest.approx(np.full(6, OFFSET), rel=0.1)
     assert comparison.gaps >= 1
+
+
+def compared_with(share_lost=0.0, change=lambda effort, forces: effort, span=SPAN, rest=False):
+    """Return a comparison after a motion of 4 s, some of whose samples are lost."""
+    rng = np.random.default_rng(2)
+    model = DriveModel.load()
+    time = np.arange(0, 4.0, STEP)
+    motion = Excitation(4.0, seed=3).motion(time)
+    if rest:
+        motion = PlatformMotion.at_rest(np.tile(motion.position[:1], (len(time), 1)))
+    forces = model.drive_forces(motion)
+    effort = change(forces.total.copy(), forces) + rng.normal(0.0, 0.02, forces.total.shape)
+    comparison, count = LiveComparison(model, span=span), 0
+    for row in range(len(time)):
+        if row > 100 and rng.random() < share_lost:
+            continue
+        comparison.push(time[row], forces.mechanism.position[row], effort[row])
+        if row % 10 == 0 and (found := comparison.evaluate()) is not None:
+            count += len(found.time)
+    return comparison, count
+
+
+def test_single_lost_samples_cost_no_window():
+    whole, all_of_them = compared_with()
+    lossy, most_of_them = compared_with(0.02)
+    assert lossy.bridged >= 10
+    assert lossy.gaps == 0
+    assert most_of_them > 0.9 * all_of_them
+    assert lossy.running_error() == pytest.approx(whole.running_error(), rel=0.3)
+
+
+@pytest.mark.parametrize(('change', 'told'), [
+    (lambda effort, forces: effort, False),
+    (lambda effort, forces: 0.6 * effort, False),  # off, but not another machine
+    (lambda effort, forces: effort + 0.3 * np.sign(forces.mechanism.velocity), False),
+    (lambda effort, forces: 0 * effort, True),  # hardware that mirrors a controller's zeros
+    (lambda effort, forces: -effort, True),
+    (lambda effort, forces: 1000 * effort, True)])  # N for kN
+def test_an_error_as_large_as_the_effort_is_told(change, told):
+    comparison, _ = compared_with(change=change)
+    lifts = {'lift_1', 'lift_2', 'lift_3'}
+    assert (lifts <= set(comparison.unexplained())) == told
+    if not told:
+        assert comparison.unexplained() == ()
+
+
+def test_static_friction_of_a_drive_that_stands_is_no_unexplained_effort():
+    def stuck(effort, forces):
+        effort[:, :3] += (0.7, -0.4, 0.5)
+        return effort
+    assert compared_with(change=stuck, rest=True)[0].unexplained() == ()
+    # What holds the weight is known at rest, too.
+    zero, _ = compared_with(change=lambda effort, forces: 0 * effort, rest=True)
+    assert {'lift_1', 'lift_2', 'lift_3'} <= set(zero.unexplained())

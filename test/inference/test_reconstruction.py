@@ -660,16 +660,42 @@ def test_live_platform_motion_is_that_of_the_recording():
                         atol=1e-6)
 
 
-def test_live_leaves_out_positions_that_are_none_and_starts_again():
+def test_live_bridges_a_position_that_is_none_and_starts_again_after_three():
     polynomial = LocalPolynomial(17, STEP)
     live = LiveReconstruction(polynomial)
-    for k in range(40):
-        q = np.full(6, np.nan) if k == 20 else np.full(6, 0.1 * k)
+    for k in range(80):
+        q = np.full(6, np.nan) if k in (20, 50, 51, 52) else np.full(6, 0.1 * k)
         sample = live.push(k * STEP, q, np.zeros(6))
-        assert (sample is not None) == (16 <= k < 20 or k >= 37)
+        # Neither the missing one is answered, nor the one that would have been with it: 12, 20.
+        answered = (16 <= k < 50 and k not in (20, 28)) or k >= 53 + 16
+        assert (sample is not None) == answered, k
         if sample is not None:
             assert_allclose(sample.velocity, 0.1 / STEP, rtol=1e-9)
-    assert live.gaps == 1
+            assert sample.time == pytest.approx((k - 8) * STEP)
+    assert (live.gaps, live.bridged) == (1, 1)
+
+
+def test_live_is_as_good_with_single_samples_missing():
+    """A few lost samples must not cost more than the answers that belong to them."""
+    rng = np.random.default_rng(5)
+    polynomial = LocalPolynomial(61, STEP)
+    time = np.arange(0, 4.0, STEP)
+    position = 0.05 * np.sin(2 * np.pi * 1.5 * time)
+    acceleration = -(2 * np.pi * 1.5) ** 2 * position
+    lost = {int(k) for k in rng.choice(np.arange(100, len(time) - 1), 40, replace=False)}
+    live, found = LiveReconstruction(polynomial), {}
+    for k in range(len(time)):
+        if k not in lost:
+            sample = live.push(time[k], [position[k]], [1.0 * k])
+            if sample is not None:
+                found[int(sample.effort[0])] = sample.acceleration[0]
+    assert live.gaps == 0
+    assert live.bridged == len(lost)
+    assert len(found) >= len(time) - 60 - 2 * len(lost)
+    rows = np.array(sorted(found))
+    assert not lost & set(rows.tolist())
+    error = np.array([found[k] for k in rows]) - acceleration[rows]
+    assert rms(error) < 1e-4 * rms(acceleration)
 
 
 def test_rates_of_a_platform_at_rest_are_zero():

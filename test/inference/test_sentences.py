@@ -20,6 +20,7 @@ from made_up_diagnosis import (
     found_effect,
     made_up_diagnosis,
     made_up_residuals,
+    ranked_set,
     ranked_sets,
     statement,
     within_model_error,
@@ -42,6 +43,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     with_uncertainty,
 )
 from pprs_dynamics.inference.diagnosis.sentences import runner_up, set_rows, word_diagnosis
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.estimates import Calibration
 from pprs_dynamics.inference.search.patterns import OWN, PLATFORM
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -302,7 +304,8 @@ def test_verdict_fall_and_next_step_fit_25_lines_of_80_columns(make: Any) -> Non
     # The command adds a finding of a recording and the name of the page.
     assert len(text.splitlines()) <= 25 - 2
     for part in (words.headline, words.following, words.command,
-                 'Runner-up hysteresis on lift_2 instead of coulomb_friction on lift_2, cost +7'):
+                 'Runner-up hysteresis on lift_2 instead of coulomb_friction on lift_2: '
+                 'costs 7.0 more: names + 7.0'):
         assert part in in_one_line(text)
 
 
@@ -313,7 +316,7 @@ def test_what_is_within_model_error_stands_by_name_in_the_short_view() -> None:
         return as_text(diagnosis_view(diagnosis, word_diagnosis(diagnosis), **options), 80)
 
     name = within_model_error().name
-    line = next(one for one in said().splitlines() if one.startswith('Within the model error'))
+    line = next(one for one in said().splitlines() if one.startswith('May be left by the forms'))
     assert name in line
     assert 'pprs adopt' in said()
     assert 'pprs adopt' not in said(next_step=False)
@@ -322,36 +325,61 @@ def test_what_is_within_model_error_stands_by_name_in_the_short_view() -> None:
 def test_the_runner_up_stands_beside_the_best_set_with_its_cost() -> None:
     diagnosis = one_effect(sets=(
         *ranked_sets('coulomb_friction', 'hysteresis'),
-        RankedSet((), 120.4), RankedSet((('unknown, position', ('lift_2',)),), 130.0)))
+        ranked_set((), 120.4), ranked_set((('unknown, position', ('lift_2',)),), 130.0)))
     assert set_rows(diagnosis) == [
-        ('coulomb_friction on lift_2', 'the best'), ('hysteresis on lift_2', '+7'),
-        ('nothing missing', '+120'), ('a pattern depending on position on lift_2', '+130')]
+        ('coulomb_friction on lift_2', 'the best', ''),
+        ('hysteresis on lift_2', '+7.0', 'names + 7.0'),
+        ('nothing missing', '+120.4', 'names + 120.4'),
+        ('a pattern depending on position on lift_2', '+130.0', 'names + 130.0')]
     page = diagnosis_page(diagnosis, word_diagnosis(diagnosis), made_up_residuals(), ['a'])
     assert '>hysteresis on lift_2</td>' in page.html()
 
 
 @pytest.mark.parametrize(('second', 'said'), [
-    (('hysteresis',), 'hysteresis on lift_2 instead of coulomb_friction on lift_2, cost +7'),
-    (('coulomb_friction', 'hysteresis'), 'hysteresis on lift_2 as well, cost +7'),
-    ((), 'without coulomb_friction on lift_2, cost +7')])
+    (('hysteresis',), 'hysteresis on lift_2 instead of coulomb_friction on lift_2'),
+    (('coulomb_friction', 'hysteresis'), 'hysteresis on lift_2 as well'),
+    ((), 'without coulomb_friction on lift_2')])
 def test_the_runner_up_is_told_by_what_it_has_instead(second: tuple[str, ...], said: str) -> None:
     best, = ranked_sets('coulomb_friction')
-    diagnosis = one_effect(sets=(best, RankedSet(
+    diagnosis = one_effect(sets=(best, ranked_set(
         tuple((name, ('lift_2',)) for name in second), 7.0)))
-    assert runner_up(diagnosis) == said
+    assert runner_up(diagnosis) == f'{said}: costs 7.0 more: names + 7.0'
     assert runner_up(one_effect()) == ''
+
+
+def test_why_one_set_and_not_another_is_told_by_the_terms_of_their_costs() -> None:
+    terms = CostTerms(fit=2.03, coefficients=-1.3, names=0.04, drives=2.8, signs=-0.001)
+    best, = ranked_sets('coulomb_friction')
+    second = RankedSet((('rod_mass', None),), terms)
+    barred = RankedSet((('payload_mass', None),), CostTerms(fit=-4.0), 'its mass cannot be')
+    found = replace(found_effect('coulomb_friction'), evidence=second.cost, without=second)
+    diagnosis = made_up_diagnosis(effects=(found,), sets=(best, second), barred=(barred,))
+    why = 'costs 3.6 more: fit + 2.0, coefficients - 1.3, drives + 2.8'
+    assert runner_up(diagnosis) == f'rod_mass instead of coulomb_friction on lift_2: {why}'
+    words = word_diagnosis(diagnosis)
+    assert f'the best set without it, rod_mass, {why}.' in words.effects[0].why
+    assert words.barred == ('payload_mass may not be, whatever it costs: its mass cannot be. It '
+                            'costs 4.0 less: fit - 4.0',)
+    told = diagnosis.to_dict()
+    assert told['sets'][1]['terms'] == terms.to_dict()
+    assert told['sets'][1]['cost'] == pytest.approx(sum(told['sets'][1]['terms'].values()))
+    assert told['barred'][0]['barred'] == 'its mass cannot be'
+    assert told['effects'][0]['without']['cost'] == pytest.approx(told['effects'][0]['evidence'])
+    page = diagnosis_page(diagnosis, words, made_up_residuals(), ['a'])
+    assert 'fit + 2.0, coefficients - 1.3, drives + 2.8' in page.html()
 
 
 def test_effects_that_are_only_on_other_drives_in_the_runner_up_are_told_once() -> None:
     every = tuple(DRIVES)
-    best = RankedSet((('hysteresis', every), ('coulomb_friction', ('lift_2',))), 0.0)
-    second = RankedSet((('hysteresis', every[:4]), ('load_friction', ('lift_2',))), 12.0)
+    best = ranked_set((('hysteresis', every), ('coulomb_friction', ('lift_2',))), 0.0)
+    second = ranked_set((('hysteresis', every[:4]), ('load_friction', ('lift_2',))), 12.0)
     assert runner_up(one_effect(sets=(best, second))) == (
         'load_friction on lift_2 instead of coulomb_friction on lift_2, '
-        'hysteresis on other drives, cost +12')
-    alone = RankedSet((('hysteresis', every[:1]), ('coulomb_friction', ('lift_2',))), 12.0)
+        'hysteresis on other drives: costs 12.0 more: names + 12.0')
+    alone = ranked_set((('hysteresis', every[:1]), ('coulomb_friction', ('lift_2',))), 12.0)
     assert runner_up(one_effect(sets=(best, alone))) == (
-        'hysteresis on slide_1 instead of hysteresis on all six drives, cost +12')
+        'hysteresis on slide_1 instead of hysteresis on all six drives: costs 12.0 more: '
+        'names + 12.0')
 
 
 def test_one_pattern_on_all_drives_is_one_finding() -> None:

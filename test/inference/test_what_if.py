@@ -96,7 +96,7 @@ def fitted(diagnosis: Diagnosis, tried: list[Tried]) -> tuple[JointFit, float]:
               for block in (fits.library.block(component), *one.nuisance.get(component, ()))]
     fit = fits.regression.at(blocks, selection.best.fit.amplitudes)
     components = [component for one, _ in tried for component in one.components]
-    price = sum(fits.library.price(one) for one, _ in tried) + sum(
+    price = sum(fits.library.price(one).total for one, _ in tried) + sum(
         fits.prices.of_wrong_signs(one, one.values(fit.of(fits.library.block(one))))
         for one in components)
     return fit, fit.deviance + price

@@ -67,6 +67,38 @@ def test_non_finite_times_and_positions_are_dropped() -> None:
     assert recording.segments == (slice(0, 995),)
 
 
+@pytest.mark.parametrize('noise', [0.0, 0.02])
+def test_efforts_that_fall_to_zero_for_a_tick_were_not_measured(noise: float) -> None:
+    rng = np.random.default_rng(2)
+    time = np.arange(2000) * STEP
+    position = 0.1 * np.sin(np.arange(2000)[:, None] * [0.01, 0.013])
+    # One weighs 20 N, the other passes through 0 all the time.
+    effort = np.array([20.0, 0.0]) + [2.0, 8.0] * np.cos(np.arange(2000)[:, None] * [0.01, 0.013])
+    effort += 0.02 * rng.normal(size=effort.shape)
+    sound = Recording.from_arrays('sound', time, position, None, effort, ('upright', 'level'))
+    assert 'effort_zero' not in kinds(sound)
+    lost = [300, 900, 901]
+    effort[lost] = noise * rng.normal(size=(3, 2))
+    recording = Recording.from_arrays('run', time, position, None, effort, ('upright', 'level'))
+    finding = the_one(recording, 'effort_zero')
+    assert finding.count == 3
+    assert finding.text.endswith('they count as not measured')
+    assert np.flatnonzero(np.isnan(recording.effort[:, 0])).tolist() == lost
+    # The other's are lost at those moments only.
+    assert set(np.flatnonzero(np.isnan(recording.effort[:, 1]))) <= set(lost)
+    assert len(recording.time) == 2000
+
+
+def test_efforts_of_a_coarse_converter_that_rest_near_zero_are_measured() -> None:
+    rng = np.random.default_rng(4)
+    position = 0.1 * np.sin(np.arange(2000)[:, None] * 0.01)
+    effort = 0.1 * (rng.random((2000, 1)) > 0.02)
+    recording = Recording.from_arrays('run', np.arange(2000) * STEP, position, None, effort,
+                                      ('axis',))
+    assert 'effort_zero' not in kinds(recording)
+    assert np.isfinite(recording.effort).all()
+
+
 def test_late_stamps_are_sorted_in() -> None:
     arrays = measured()
     order = np.arange(1000)

@@ -28,6 +28,7 @@ from pprs_dynamics.physics.effects.laws.effort_filter import EffortFilter
 from pprs_dynamics.physics.effects.laws.effort_offset import EffortOffset
 from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
 from pprs_dynamics.physics.effects.laws.friction_drift import FrictionDrift
+from pprs_dynamics.physics.effects.laws.gear_efficiency import GearEfficiency
 from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
 from pprs_dynamics.physics.effects.laws.load_friction import LoadFriction
 from pprs_dynamics.physics.effects.laws.quadratic_friction import QuadraticFriction
@@ -36,12 +37,12 @@ from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 
 EFFECTS: tuple[type[DriveEffect], ...] = (
     AsymmetricFriction, CoulombFriction, DriveInertia, DriveSpring, EffortOffset, ForceRipple,
-    FrictionDrift, Hysteresis, LoadFriction, QuadraticFriction, StribeckFriction,
+    FrictionDrift, GearEfficiency, Hysteresis, LoadFriction, QuadraticFriction, StribeckFriction,
     ViscousFriction)
 WITH_MEMORY = (FrictionDrift, Hysteresis)
 # Presliding alone is what is taken away from the model's friction.
-FRICTION = (AsymmetricFriction, CoulombFriction, FrictionDrift, LoadFriction, QuadraticFriction,
-            StribeckFriction, ViscousFriction)
+FRICTION = (AsymmetricFriction, CoulombFriction, FrictionDrift, GearEfficiency, LoadFriction,
+            QuadraticFriction, StribeckFriction, ViscousFriction)
 STEP = 0.002
 COVERED = DriveRange(duration=20.0, step=STEP, stroke=0.16, top_speed=0.25)
 
@@ -58,6 +59,11 @@ class Axes:
     acceleration: Any
     guide_load: Any
     drives: tuple[str, ...] = ('axis',)
+
+    @property
+    def transmitted(self):
+        """As large as the load, and here of its sign."""
+        return self.guide_load
 
     @property
     def direction(self):
@@ -103,6 +109,10 @@ def random_values(effect, rng):
      -0.1624023),  # 1.2 / e^2
     (QuadraticFriction, {'coefficient': 20.0}, {'v': -0.3}, -1.8),
     (LoadFriction, {'coefficient': 0.05}, {'v': -0.2, 'load': 40.0}, -2.0),
+    # Both quadrants of either sign: the motor drives the load, or the load the motor.
+    *((GearEfficiency, {'driving': 0.25, 'driven_back': 0.1}, {'v': v, 'load': load}, force)
+      for v, load, force in ((0.2, 40.0, 10.0), (-0.2, 40.0, -4.0), (-0.2, -40.0, -10.0),
+                             (0.2, -40.0, 4.0))),
     (EffortOffset, {'force': -0.4}, {'v': 0.3, 'q': 0.1}, -0.4),
     (FrictionDrift, {'force': 0.9, 'time': 10.0}, {'t': 7.0, 'v': -0.2}, -0.9),
     (DriveSpring, {'stiffness': 20.0, 'position': 0.05}, {'q': 0.2}, 3.0),
@@ -249,7 +259,7 @@ def test_trials_are_distinct_and_lie_within_the_bounds(effect, covered):
 
 def test_some_pitch_tried_shows_most_of_any_ripple():
     q = np.linspace(0, COVERED.stroke, 2000)
-    drive = DriveSamples(None, q, q, q, q, q)
+    drive = DriveSamples(None, q, q, q, q, q, q)
     bases = [np.linalg.qr(np.stack(ForceRipple.columns(drive, **trial)[:2], axis=1))[0]
              for trial in ForceRipple.trials(COVERED)]
     rng = np.random.default_rng(64)

@@ -17,27 +17,30 @@ import robots_with_loops as robots
 from pprs_dynamics import ArmModel, JointMotion, load_model
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.physics.mechanism.description import Description
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
+from pprs_dynamics.physics.model.arm_model import inertial_values
+from pprs_dynamics.physics.model.model_file import build_model
 
 INERTIA = '<inertia ixx="{}" iyy="{}" izz="{}" ixy="0" ixz="0" iyz="0"/>'
 
 
-def one_link(folder: Path, inertia: tuple[float, float, float], more: str = '') -> tuple[str, ...]:
-    """Return what is said of a robot of 0.4 m with a body of 5 kg."""
+def one_link(folder: Path, inertia: tuple[float, float, float], more: str = '') -> Description:
+    """Return a robot of 0.4 m with a body of 5 kg."""
     path = folder / 'one.urdf'
     path.write_text(f'''<robot name="one"><link name="base"/><link name="upper"><inertial>
       <origin xyz="0.2 0 0"/><mass value="5"/>{INERTIA.format(*inertia)}</inertial></link>
       <joint name="turn" type="revolute"><parent link="base"/><child link="upper"/>
       <origin xyz="0 0 0.2"/><axis xyz="0 0 1"/></joint>{more}</robot>''')
-    return read_urdf(str(path)).remarks
+    return read_urdf(str(path))
 
 
 def test_bodies_that_cannot_be_are_told_and_those_that_can_are_not(tmp_path: Path) -> None:
-    assert one_link(tmp_path, (0.01, 0.08, 0.08)) == ()
-    assert one_link(tmp_path, (0.0, 0.08, 0.0801)) == ()  # a thin rod, rounded
-    (triangle,) = one_link(tmp_path, (0.005, 0.03, 0.08))
+    assert one_link(tmp_path, (0.01, 0.08, 0.08)).faults == ()
+    assert one_link(tmp_path, (0.0, 0.08, 0.0801)).faults == ()  # a thin rod, rounded
+    (triangle,) = one_link(tmp_path, (0.005, 0.03, 0.08)).faults
     assert 'upper is no body: its principal moments of inertia are 0.005, 0.03, 0.08' in triangle
-    (millimetres,) = one_link(tmp_path, (1e4, 8e4, 8e4))
+    (millimetres,) = one_link(tmp_path, (1e4, 8e4, 8e4)).faults
     assert 'upper has 8e+04 kg m^2 in 5 kg' in millimetres
     assert '126 m in a robot that reaches 0.4 m' in millimetres
     assert '0.08 kg m^2' in millimetres
@@ -49,6 +52,11 @@ def test_info_tells_what_is_wrong_with_a_description(
     text = arm.urdf().replace('ixx="0.02"', 'ixx="20000"')
     assert main(['info', '--model', str(arm.write_arm(tmp_path, text))]) == 0
     assert 'beam is no body' in ' '.join(capsys.readouterr().out.split())
+    model = load_model(tmp_path / 'arm.yaml')
+    assert 'beam is no body' in model.faults[0]
+    # A fit puts other numbers in their place.
+    fitted = build_model({**model.values, **inertial_values(model.robot.inertial)}, model.source)
+    assert fitted.faults == ()
 
 
 def as_constraints(text: robots.RobotText, folder: Path) -> Path:
@@ -188,14 +196,14 @@ def test_gears_that_are_none_are_told(tmp_path: Path) -> None:
         load_model(arm.write_arm(tmp_path, arm.urdf(
             more=gear('mechanicalReduction', 'type', 'actuator', 'fifty'))))
     other = gear('mechanicalReduction', 'type', 'actuator', '50').replace('Simple', 'FourBarish')
-    (remark,) = one_link(tmp_path, (0.01, 0.08, 0.08), other)
+    (remark,) = one_link(tmp_path, (0.01, 0.08, 0.08), other).remarks
     assert '<transmission> t is not used' in remark
 
 
 def test_what_has_a_shape_and_no_mass_and_dynamics_are_told(tmp_path: Path) -> None:
     cover = ('<link name="cover"><collision/></link><joint name="lid" type="fixed">'
              '<parent link="upper"/><child link="cover"/><dynamics damping="2"/></joint>')
-    hollow, rubbing = one_link(tmp_path, (0.01, 0.08, 0.08), cover)
+    hollow, rubbing = one_link(tmp_path, (0.01, 0.08, 0.08), cover).remarks
     assert hollow.startswith('cover have a shape and no <inertial>')
     assert '<dynamics> of lid is not used' in rubbing
 

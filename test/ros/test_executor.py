@@ -28,8 +28,27 @@ pytestmark = pytest.mark.nodes
 PATIENCE = 10.0  # [s]
 
 
+class Raising:
+    """A subscription whose call has the old name and raises rclpy's own error."""
+
+    raw, msg_type = True, None
+
+    @property
+    def handle(self) -> Any:
+        return self
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, *error: object) -> None:
+        return None
+
+    def take_message(self, kind: Any, raw: bool) -> None:
+        raise rclpy_internals.rclpy_implementation.RCLError('taken in another way')
+
+
 @pytest.fixture(params=['as known', 'names missing', 'WaitSet changed', 'Subscription changed',
-                        'Timer changed'])
+                        'Timer changed', 'take raises', 'wait raises', 'timers never due'])
 def spun(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[tuple[Node, PromptExecutor]]:
@@ -47,6 +66,18 @@ def spun(
     elif request.param == 'Timer changed':
         monkeypatch.setattr(executors, 'call_if_due', lambda _: rclpy_internals.call_if_due(
             SimpleNamespace(handle=nullcontext())))
+    elif request.param == 'take raises':
+        monkeypatch.setattr(executors, 'take', lambda _: rclpy_internals.take(Raising()))
+    elif request.param == 'wait raises':
+        known = rclpy_internals.rclpy_implementation
+
+        def fail(self: Any, timeout: int) -> None:
+            raise known.RCLError('wait set is of another release')
+        monkeypatch.setattr(rclpy_internals, 'rclpy_implementation', SimpleNamespace(
+            **{**vars(known), 'WaitSet': type('WaitSet', (known.WaitSet,), {'wait': fail})}))
+    elif request.param == 'timers never due':
+        monkeypatch.setattr(rclpy_internals, 'call_if_due', lambda _: False)
+        monkeypatch.setattr(executors, 'call_if_due', lambda _: False)
     context = Context()
     rclpy.init(context=context)
     node, executor = Node('spun', context=context), PromptExecutor(context=context)

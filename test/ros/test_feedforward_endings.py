@@ -89,3 +89,34 @@ def test_the_warning_goes_when_the_clock_comes() -> None:
             0.05, lambda: clock.publish(Clock(clock=conversions.time(5_000_000_000))))
         assert node.wait_for_status(code='WAITING')['level'] == 'OK'
         timer.cancel()
+
+
+@pytest.mark.parametrize('effect', [{}, {
+    'effects__active': ['hysteresis'], 'effects__hysteresis__slide_1__force': 2.0,
+    'effects__hysteresis__slide_1__distance': 0.01}], ids=['no memory', 'memory'])
+def test_a_simulation_that_starts_over_leaves_no_command_without_a_watchdog(
+    effect: dict[str, object],
+) -> None:
+    with feedforward_bench(command_timeout=TIMEOUT, use_sim_time=True, max_age=0.5, max_ahead=0.5,
+                           **effect) as node:
+        clock = node.bench.probe.create_publisher(Clock, '/clock', 10)
+        assert node.bench.spin_until(clock.get_subscription_count)
+
+        def set_clock(seconds: int) -> None:
+            clock.publish(Clock(clock=conversions.time(seconds * 1_000_000_000)))
+            assert node.bench.spin_until(
+                lambda: node.node.get_clock().now().nanoseconds == seconds * 1_000_000_000)
+
+        def stamped(seconds: int) -> object:
+            return message_of(POSE, conversions.time(seconds * 1_000_000_000))
+
+        for now, before in ((100, 5), (5, 100)):
+            set_clock(now)
+            node.answer(stamped(now))
+            # What belongs to the time before is executed no more, nor does it keep the command.
+            rejected, commands = node.counters['TIME'], len(node.commands)
+            node.send(stamped(before))
+            assert node.counters['TIME'] == rejected + 1
+            assert node.bench.spin_until(lambda commands=commands: len(node.commands) > commands, 3)
+            np.testing.assert_allclose(
+                node.commands[-1].data, node.node._feedforward.hold(True).effort[0], atol=EQUAL)

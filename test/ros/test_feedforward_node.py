@@ -281,3 +281,6 @@ def test_memory_advances_with_first_points_only() -> None:
             found = node.answer(message_of(motion))
             expected = model.drive_forces(motion[:1], state).total[0]
             np.testing.assert_allclose(found, expected, rtol=0, atol=EQUAL)
+        node.bench.follow_status('/feedforward/status')
+        assert node.bench.spin_until(lambda: node.bench.status)
+        assert set(node.bench.status[-1]['assumed']) == {'hysteresis'}

@@ -68,6 +68,25 @@ def test_no_step_of_a_ramp_is_larger_than_its_share() -> None:
         np.testing.assert_allclose(found, old + share * (new - old), atol=1e-12)
 
 
+def test_a_change_during_a_ramp_goes_on_from_where_that_is() -> None:
+    clock = Clock()
+    own: dict[str, Any] = {**OWN, 'ramp_time': 2.0}
+    node = Feedforward(MODEL, own, clock)
+    asked = request()
+    node.answer(asked)
+    node.use(HEAVY, own)
+    clock.now += 1.0
+    half_way = node.answer(asked).effort
+    assert np.abs(half_way - HEAVY.drive_forces(asked.motion).total).max() > 1.0
+    node.use(build_model(dict(HEAVY.values)), {**own, 'limit_policy': 'clamp'})
+    np.testing.assert_allclose(node.answer(asked).effort, half_way, atol=1e-12)  # no other model
+    node.use(MODEL, own)
+    np.testing.assert_allclose(node.answer(asked).effort, half_way, atol=1e-12)
+    clock.now += 2.0
+    np.testing.assert_array_equal(
+        node.answer(asked).effort, MODEL.drive_forces(asked.motion).total)
+
+
 def test_without_a_ramp_and_before_the_first_command_a_change_is_at_once() -> None:
     asked = request()
     expected = HEAVY.drive_forces(asked.motion).total

@@ -22,6 +22,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 
@@ -84,7 +85,7 @@ def made_up_diagnosis(verdict: str = 'effect', **changes: Any) -> Diagnosis:
         'verdict': verdict, 'effects': (), 'indistinguishable': (), 'unconfirmed': (),
         'candidates': tuple(
             RankedEffect(one.name, one.drives, one.evidence, one.error_after) for one in effects),
-        'suspects': (), 'depends_on': (), 'within_model_error': (), 'sets': (),
+        'suspects': (), 'depends_on': (), 'within_model_error': (), 'sets': (), 'barred': (),
         'calibrated': (), 'warnings': (), 'noise': dict.fromkeys(DRIVES, white_noise()),
         'noise_floors': dict.fromkeys(DRIVES, NOISE),
         'notes': (), 'model': model, 'adopted': model, 'residuals': given,
@@ -102,9 +103,14 @@ def within_model_error(of: str = 'coulomb_friction') -> WithinModelError:
     return WithinModelError('hysteresis', ('lift_2',), 0.021, (of,))
 
 
+def ranked_set(names: tuple[tuple[str, tuple[str, ...] | None], ...], cost: float) -> RankedSet:
+    """Return a set that costs so much more than the best, all of it for its names."""
+    return RankedSet(names, CostTerms(names=cost))
+
+
 def ranked_sets(*names: str) -> tuple[RankedSet, ...]:
     """Return sets of one effect each, every one 7 worse than the one before."""
-    return tuple(RankedSet(((name, ('lift_2',)),), 7.0 * k) for k, name in enumerate(names))
+    return tuple(ranked_set(((name, ('lift_2',)),), 7.0 * k) for k, name in enumerate(names))
 
 
 def calibration(after: float = 1.02) -> Calibration:

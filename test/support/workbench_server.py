@@ -125,7 +125,7 @@ def workbench(*arguments: object, folder: Path) -> Iterator[Workbench]:
     with (folder / 'workbench.log').open('w') as log:
         process = subprocess.Popen(
             [executable('pprs'), 'workbench', '--no-browser', *map(str, arguments)], text=True,
-            stdout=subprocess.PIPE, stderr=log)
+            stdout=subprocess.PIPE, stderr=log, process_group=0)
         try:
             assert process.stdout is not None
             yield Workbench(process, process.stdout.readline().strip())

@@ -6,6 +6,8 @@ import {digits, plain, titleOf} from './format.mjs';
 const ABOUT = [['', 'equation'], ['Looks like: ', 'looks_like'], ['Caused by: ', 'causes'],
                ['Confirm: ', 'confirm']];
 
+const EVIDENCE = 'evidence: 0 is the threshold, 10 are odds of 150 to 1';
+
 /* A slider is a factor of ten either way, or as much as matters where there is a sign. */
 export const fromSlider = (one, middle, at) => {
   const value = one.is_relative ? middle * 10 ** (at / 100)
@@ -32,7 +34,6 @@ class EffectRow {
       this.name, this.box.checked ? undefined : [], event.timeStamp));
     this.title = make('span');
     this.evidence = make('span', '', 'evidence');
-    this.evidence.title = 'evidence: 0 is the threshold, 10 are odds of 150 to 1';
     const label = make('label');
     label.append(this.box, this.title, this.evidence);
     const head = make('div', '', 'head');
@@ -73,6 +74,8 @@ class EffectRow {
     }
     if (effect.is_called_for) this.title.append(' ', make('span', 'called for', 'badge'));
     this.evidence.textContent = plain(effect.evidence);
+    this.evidence.title = EVIDENCE + (effect.evidence_terms
+      ? `; what the cost has more without it: ${effect.evidence_terms}` : '');
     this.evidence.classList.toggle('pays', effect.evidence > 0);
     this.evidence.classList.toggle('pending', effect.evidence_is_pending);
     this.evidence.setAttribute('aria-label', `evidence ${this.evidence.textContent}${

@@ -34,17 +34,43 @@ export class Live {
   constructor(server, isSeen) {
     Object.assign(this, {server, isSeen, plots: []});
     setInterval(() => this.show(), PERIOD);
-    $('live-set').addEventListener('click', () => this.set());
+    $('live-set').addEventListener('click', () => this.ask(
+      'live/set', 'Set the ticked effects on this machine?', 'Set'));
+    $('live-restore').addEventListener('click', () => this.ask(
+      'live/restore', 'Set this machine back to what it had?', 'Restore'));
+    $('live-no').addEventListener('click', () => $('live-confirm').close());
+    $('live-yes').addEventListener('click', () => this.set());
     $('live-take').addEventListener('click', () => server.run(
       'live/take', {}, 'What came in last is a recording of this session now.'));
   }
 
-  async set() {
+  /* A person confirms the machine by its name: the robot that moves may not be the one meant. */
+  async ask(change, question, verb) {
     try {
-      const {nodes} = await this.server.ask('live/set', {});
+      const {machine} = await this.server.ask('live/machine');
+      if (!machine) {
+        this.server.tell('No node runs that could be set.');
+        return;
+      }
+      this.asked = {change, machine};
+      $('live-question').textContent = question;
+      $('live-machine').textContent = machine;
+      $('live-yes').textContent = verb;
+      $('live-confirm').showModal();
+    } catch (error) {
+      this.server.tell(error.message);
+    }
+  }
+
+  async set() {
+    const {change, machine} = this.asked;
+    $('live-confirm').close();
+    try {
+      const {nodes, is_set: isSet} = await this.server.ask(change, {confirmed: machine});
+      const took = change === 'live/set' ? 'took the effects' : 'has what it had';
       $('live-nodes').replaceChildren(...Object.entries(nodes).map(([name, said]) =>
-        make('li', `${name}: ${said || 'took the effects'}`)));
-      this.server.tell('');
+        make('li', `${name}: ${said || took}`)));
+      this.server.tell(isSet ? '' : 'Nothing was set: one of the nodes refused.');
     } catch (error) {
       this.server.tell(error.message);
     }
@@ -65,6 +91,7 @@ export class Live {
     $('live-changes').textContent = changesSaid(found.diagnosis);
     $('live-changes').classList.toggle('changed', Boolean(found.diagnosis?.confirmed));
     $('live-take').disabled = !found.kept;
+    $('live-restore').disabled = !found.can_restore;
     if (!found.residual.length) return;
     const time = found.time.map((t) => t - found.time[found.time.length - 1]);
     if (this.plots.length !== found.drives.length) this.build(found.drives, time, found.residual);

@@ -37,6 +37,7 @@ export const showJobs = (jobs, cancel) => {
 export const showVerdict = (state) => {
   const {before, now, noise} = state.overall;
   const line = make('span');
+  if (state.little) line.append(make('b', `${state.little} · `));
   line.append('error ', make('b', fall(before, now, state)), ` · noise ${amount(noise)} ${
     state.unit}${state.noise_is_guess ? ' (first guess)' : ''}`);
   if (state.verdict) line.append(` · diagnosis: ${VERDICTS[state.verdict]}`);

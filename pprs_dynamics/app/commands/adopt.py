@@ -30,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'explains')
     effect.completer = lambda **_: catalogue()  # type: ignore[attr-defined]  # of argcomplete
     arguments.add_recordings(parser)
+    arguments.add_as_it_is(parser)
     arguments.add_validation(parser)
     arguments.add_model_output(parser, 'model file to write')
     parser.add_argument('--force', action='store_true',

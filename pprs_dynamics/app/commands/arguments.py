@@ -23,7 +23,7 @@ RECORDING = (*FILES_OF_RECORDINGS, '')  # without an ending: a rosbag2 folder
 LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
-OUTPUTS = ('output', 'json', 'report', 'mcap')
+OUTPUTS = ('output', 'json', 'report', 'mcap', 'picture')
 INPUTS = ('model', 'recordings', 'validate', 'beside', 'refit', 'file', 'manifest', 'store', 'path')
 
 DEFAULT_MODEL = 'config/paper.yaml'
@@ -44,6 +44,11 @@ def add_report(parser: argparse.ArgumentParser, what: str = 'write a page with a
     parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE), help=what)
 
 
+def add_picture(parser: argparse.ArgumentParser, what: str) -> None:
+    """Declare --picture."""
+    parser.add_argument('--picture', metavar='FILE.png', type=output_file('.png'), help=what)
+
+
 def add_topic(parser: argparse.ArgumentParser) -> None:
     """Declare --topic."""
     parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
@@ -55,6 +60,12 @@ def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> No
     parser.add_argument('recordings', metavar='RECORDING', nargs='+' if required else '*',
                         help='rosbag2 folder, .mcap, .db3, .csv or .csv.gz')
     add_topic(parser)
+
+
+def add_as_it_is(parser: argparse.ArgumentParser) -> None:
+    """Declare --as-it-is."""
+    parser.add_argument('--as-it-is', action='store_true', help='take recordings as they are, '
+                        'whatever their units, signs and efforts look like')
 
 
 def add_validation(parser: argparse.ArgumentParser,

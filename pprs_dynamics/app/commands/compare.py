@@ -18,6 +18,7 @@ EXAMPLE = 'pprs compare run.mcap --model robot.yaml --report page.html'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     arguments.add_recordings(parser)
+    arguments.add_as_it_is(parser)
     arguments.add_details(parser)
     parser.add_argument('--mcap', metavar='FILE.mcap', type=arguments.output_file('.mcap'),
                         help='write measured effort, model, parts and residual as joint states, '

@@ -22,9 +22,11 @@ EXAMPLE = 'pprs diagnose run.mcap --model robot.yaml --validate other.mcap --rep
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     arguments.add_recordings(parser)
+    arguments.add_as_it_is(parser)
     arguments.add_validation(parser)
     arguments.add_details(parser)
     arguments.add_report(parser)
+    arguments.add_picture(parser, 'draw the error of every drive, before and with what was found')
     parser.add_argument('--adopt-all', action='store_true',
                         help='add what is found until nothing more can be told')
     parser.add_argument('--refit', metavar='RECORDING', nargs='*',
@@ -44,6 +46,10 @@ def run(options: argparse.Namespace) -> int:
         result = diagnose(inputs.model, inputs, progress=progress)
     tell(result, options, screen,
          view=result.view(options.details, next_step=not options.adopt_all))
+    if options.picture:
+        from pprs_dynamics.app.report.pictures import save
+
+        screen.print(f'picture: {shown(save(result.plot(), options.picture))}')
     return _adopt_all(result, options, screen) if options.adopt_all else 0
 
 

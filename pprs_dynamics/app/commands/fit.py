@@ -18,6 +18,7 @@ EXAMPLE = 'pprs fit free_1.csv free_2.csv --model robot.yaml --output base.yaml'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     arguments.add_recordings(parser)
+    arguments.add_as_it_is(parser)
     arguments.add_validation(parser)
     arguments.add_model_output(parser, 'model file that is written')
     arguments.add_report(parser)

@@ -9,7 +9,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from pprs_dynamics.app.commands.arguments import PAGE, add_model_output, output_file
+from pprs_dynamics.app.commands.arguments import add_model_output, add_picture, add_report
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.drives import common_effort
@@ -27,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('file', metavar='FILE', help='model file')
     parser.add_argument('--undo', action='store_true', help='take the last step back')
     add_model_output(parser, 'model file that --undo writes', required=False)
-    parser.add_argument('--report', metavar='FILE', type=output_file(*PAGE, '.png'),
-                        help='draw the falling error: a page (.html) or a picture (.png)')
+    add_report(parser, 'draw the falling error as a page')
+    add_picture(parser, 'draw the falling error as a picture')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -49,9 +49,9 @@ def run(options: argparse.Namespace) -> int:
     screen.print(history_view(steps, unit))
     if options.json:
         write_json(options.json, {'steps': [step.to_dict() for step in steps]})
-    if options.report and options.report.endswith('.png'):
-        screen.print(f'picture: {shown(draw_history(options.report, steps, unit))}')
-    elif options.report:
+    if options.picture:
+        screen.print(f'picture: {shown(draw_history(options.picture, steps, unit))}')
+    if options.report:
         page = history_page(Path(options.file).name, steps, unit)
         screen.print(f'page: {shown(page.write(options.report))}')
     if options.undo:

@@ -21,6 +21,7 @@ from pprs_dynamics.app.report.mechanism_view import (
 )
 from pprs_dynamics.app.report.tables import recording_table
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
+from pprs_dynamics.inference.residuals.mistakes import effort_looks_like
 from pprs_dynamics.measurement.files.recording import Summary, describe
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.arm_model import ArmModel
@@ -45,7 +46,8 @@ def run(options: argparse.Namespace) -> int:
         content['robot'] = describe_mechanism(model)
         for line in mechanism_lines(model):
             screen.print(shown(line))
-        for remark in model.robot.structure.description.remarks:
+        description = model.robot.structure.description
+        for remark in (*description.faults, *description.remarks):
             screen.print(f'[yellow]![/] {shown(remark)}')
         if options.report:
             write_mechanism_page(options.report, model, Path(options.model).stem)
@@ -55,7 +57,8 @@ def run(options: argparse.Namespace) -> int:
     summaries = show_recordings(model, options.recordings, options.topic, screen)
     if options.json:
         write_json(options.json, {
-            **content, 'recordings': [asdict(summary) for summary in summaries]})
+            **content, 'effort_looks_like': effort_looks_like(one.findings for one in summaries),
+            'recordings': [asdict(summary) for summary in summaries]})
     return 0
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
@@ -38,7 +39,7 @@ def read_inputs(options: argparse.Namespace, screen: Any, whole: bool = False) -
 
     with staged_bar(screen) as progress:
         inputs = Inputs.of(options.model, options.recordings, getattr(options, 'validate', ()),
-                           options.topic, progress, whole)
+                           options.topic, progress, whole, getattr(options, 'as_it_is', False))
     for recording in (*inputs.fitted, *inputs.held_out):
         for finding in recording.findings:
             screen.print(f'[yellow]![/] {shown(recording.name)}: {shown(finding.text)}')
@@ -75,5 +76,7 @@ def tell(result: Result, options: argparse.Namespace, screen: Any,
     if options.report:
         with staged_bar(screen) as progress:
             progress('page', 0.0)
-            written = (page or result.page)().write(options.report)
+            made = (page or result.page)()
+            made.record(result.record(shlex.join(['pprs', *getattr(options, 'words', ())])))
+            written = made.write(options.report)
         screen.print(f'page: {shown(written)}')

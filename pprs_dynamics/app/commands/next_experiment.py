@@ -11,6 +11,7 @@ import shlex
 
 from pprs_dynamics.app.commands.arguments import (
     POSES,
+    add_as_it_is,
     add_overwrite,
     add_recordings,
     add_report,
@@ -43,6 +44,7 @@ EXAMPLE = 'pprs next-experiment run.mcap --output next.csv'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     add_recordings(parser, required=False)
+    add_as_it_is(parser)
     parser.add_argument('--output', metavar='FILE.csv', type=output_file(*POSES),
                         required=True, help='poses for play_trajectory; of an arm, positions, '
                         'velocities and accelerations of its joints')

@@ -26,7 +26,7 @@ from typing import Any, NoReturn
 from pprs_dynamics import __version__
 from pprs_dynamics.app.commands.arguments import DEFAULT_MODEL, JSON, check_files, output_file
 from pprs_dynamics.app.commands.streams import lasting_output
-from pprs_dynamics.errors import PprsError, suggestion
+from pprs_dynamics.errors import MisreadError, PprsError, suggestion
 from pprs_dynamics.system.plain_text import displayed
 from pprs_dynamics.system.threads import use_one_thread
 
@@ -85,6 +85,7 @@ def _ended(given: Sequence[str]) -> int:
             parser.print_help()
             return 0
         options = parser.parse_args(given)
+        options.words = given  # for the record of a page
         check_files(options)
         from pprs_dynamics.physics.mechanism.evaluation import postpone_compiling
 
@@ -93,7 +94,7 @@ def _ended(given: Sequence[str]) -> int:
     except PprsError as error:
         # What other packages and files say may hold what a terminal would obey.
         _say(displayed(error), given)
-        return 2
+        return 1 if isinstance(error, MisreadError) else 2
     except KeyboardInterrupt:
         _say('interrupted', given)
         return 130

@@ -193,7 +193,8 @@ class AdoptionRunResult(Result):
 
 def adopt(model: Model, effect: str, recordings: Recordings, validate: Recordings = (), *,
           force: bool = False, diagnosis: DiagnosisResult | None = None,
-          topic: str | None = None, progress: Progress | None = None) -> AdoptionResult:
+          topic: str | None = None, progress: Progress | None = None, as_it_is: bool = False,
+          ) -> AdoptionResult:
     """Add an effect to a model: fit it, check it on data it was not fitted to, take or refuse it.
 
     Parameters
@@ -208,7 +209,7 @@ def adopt(model: Model, effect: str, recordings: Recordings, validate: Recording
         Take it in spite of objections.
     diagnosis : DiagnosisResult, optional
         Of this model on these recordings, where it is known: it is not made again.
-    topic, progress : optional
+    topic, progress, as_it_is : optional
         As in `compare`.
 
     Returns
@@ -222,7 +223,8 @@ def adopt(model: Model, effect: str, recordings: Recordings, validate: Recording
     PprsError
         As `compare`.
     """
-    inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
+    inputs = Inputs.of(
+        model, recordings, validate, topic, progress, as_it_is=as_it_is).require_measurements()
     request = requested(effect, inputs.model)
     return AdoptionResult(inputs, adopt_effect(
         inputs.model, request, inputs.fitted, inputs.held_out, force,
@@ -259,7 +261,7 @@ def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *
     if refit is not None:
         require_open_numbers(inputs.model)
         again = Inputs.of(inputs.model, refit, inputs.held_out, topic,
-                          progress).fitted or inputs.fitted
+                          progress, as_it_is=inputs.as_it_is).fitted or inputs.fitted
     run = adopt_effects(
         inputs.model, inputs.fitted, inputs.held_out, inputs.ledger.entered, progress,
         None if diagnosis is None else diagnosis.diagnosis)

@@ -16,11 +16,15 @@ from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.comparison import compare as compare_residuals
 from pprs_dynamics.inference.diagnosis.localisation import localise
+from pprs_dynamics.inference.diagnosis.next_step import first_step, measure_first
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.comparison_bag import write_comparison
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.mistakes import effort_looks_like, no_measurements
 from pprs_dynamics.inference.residuals.paired_errors import rms, rms_by_drive
 from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.search.explained_effort import little_explained
+from pprs_dynamics.inference.search.noise_floors import measure_columns, noise_floors
 from pprs_dynamics.measurement.files.recording import read_recording
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.system.output_files import write_text
@@ -71,7 +75,9 @@ class ComparisonResult(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `pprs compare --json` writes."""
-        content = {**self.comparison.to_dict(), 'verdict': self.verdict}
+        content = {**self.comparison.to_dict(), 'verdict': self.verdict,
+                   'effort_looks_like': effort_looks_like(
+                       one.findings for one in self.inputs.fitted)}
         return content if self.beside is None else {**content, 'beside': self.beside.to_dict()}
 
     def view(self, details: bool = False) -> Any:
@@ -134,7 +140,8 @@ class ComparisonResult(Result):
         drives = self.comparison.drives
         figure = plot_errors(
             {'error': {name: one.rms for name, one in drives.items()},
-             'noise': {name: one.noise_floor for name, one in drives.items()}},
+             'noise': {name: one.noise_floor for name, one in drives.items()
+                       if one.noise_floor is not None}},
             self.comparison.unit, rows=2)
         worst = max(drives, key=lambda name: drives[name].unexplained)
         d, residuals = self.residuals.drives.index(worst), self.residuals
@@ -145,13 +152,19 @@ class ComparisonResult(Result):
         return figure
 
     @property
-    def _next(self) -> str:
-        return self.inputs.files.command('diagnose', '--report', 'why.html')
+    def _next(self) -> tuple[str, str]:
+        other = no_measurements(one.findings for one in self.inputs.fitted)
+        if other and not self.inputs.as_it_is:
+            return measure_first(other, self.inputs.files)
+        if self.comparison.little:
+            return first_step(self.inputs.model, self.inputs.files)
+        return ('Find out which physical effect is missing',
+                self.inputs.files.command('diagnose', '--report', 'why.html'))
 
 
 def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
             beside: str | PathLike[str] | None = None, progress: Progress | None = None,
-            ) -> ComparisonResult:
+            as_it_is: bool = False) -> ComparisonResult:
     """Hold a model against recordings: how wrong it is, on which drive, in which situations.
 
     Parameters
@@ -166,6 +179,8 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
         held against the same model: before and after side by side.
     progress : callable, optional
         Called with what is being done and the share of it that is done.
+    as_it_is : bool
+        Whether files are taken as their names and units say, whatever they look like.
 
     Returns
     -------
@@ -174,20 +189,25 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
     Raises
     ------
     PprsError
-        For files that cannot be read, and a motion that the model cannot follow.
+        For files that cannot be read, or that look as if they were in other units or signs than
+        they say, and a motion that the model cannot follow.
 
     Examples
     --------
     >>> print(compare('config/paper.yaml', 'run.mcap'))  # doctest: +SKIP
     """
-    inputs = Inputs.of(model, recordings, (), topic, progress, whole=True).require_recordings()
+    inputs = Inputs.of(
+        model, recordings, (), topic, progress, whole=True,
+        as_it_is=as_it_is).require_recordings()
     measuring = stage(progress, 'motion and model')
-    residuals, notes = measure_residuals(
-        inputs.model, inputs.fitted,
-        lambda done, total: measuring(done / total if total else 0.0))
+    columns, residuals, notes = measure_columns(inputs.model, inputs.fitted, measuring)
     where = localise(residuals, progress=stage(progress, 'where it fails'))
+    comparison = compare_residuals(
+        residuals, where,
+        noise_floors(columns, where.patterns, period=residuals.period) if columns else {},
+        little_explained(inputs.model, residuals))
     return ComparisonResult(
-        inputs, residuals, compare_residuals(residuals, where), tuple(notes),
+        inputs, residuals, comparison, tuple(notes),
         None if beside is None else _beside(inputs, Path(beside), topic))
 
 

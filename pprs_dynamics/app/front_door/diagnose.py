@@ -100,7 +100,8 @@ class DiagnosisResult(Result):
 
 
 def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,
-             topic: str | None = None, progress: Progress | None = None) -> DiagnosisResult:
+             topic: str | None = None, progress: Progress | None = None, as_it_is: bool = False,
+             ) -> DiagnosisResult:
     """Find the physical effect that a model lacks, as far as recordings can tell.
 
     Parameters
@@ -110,7 +111,7 @@ def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,
         To fit to.
     validate : path, Recording, or a sequence of them, optional
         Of other motions, never fitted: held-out errors are taken on them, instead of on blocks.
-    topic, progress : optional
+    topic, progress, as_it_is : optional
         As in `compare`.
 
     Returns
@@ -122,6 +123,8 @@ def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,
     PprsError
         As `compare`.
     """
-    inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
+    inputs = Inputs.of(
+        model, recordings, validate, topic, progress, as_it_is=as_it_is).require_recordings()
     return DiagnosisResult(inputs, diagnose_recordings(
-        inputs.model, inputs.fitted, inputs.held_out, stage(progress, 'diagnosing')))
+        inputs.model, inputs.fitted, inputs.held_out, stage(progress, 'diagnosing'),
+        as_it_is=inputs.as_it_is))

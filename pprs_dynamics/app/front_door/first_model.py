@@ -17,7 +17,7 @@ from pprs_dynamics.drives import RecordedDrives
 from pprs_dynamics.errors import PprsError, UnknownNameError, UnreadableFileError, meant
 from pprs_dynamics.measurement.files.array_files import is_lerobot
 from pprs_dynamics.measurement.files.bag_storage import is_storage
-from pprs_dynamics.measurement.files.contents import Contents, look_into
+from pprs_dynamics.measurement.files.contents import Contents, Series, look_into
 from pprs_dynamics.measurement.files.guessed_columns import (
     CURRENT,
     EFFORT,
@@ -29,7 +29,7 @@ from pprs_dynamics.measurement.files.guessed_columns import (
     words_of,
 )
 from pprs_dynamics.measurement.files.recording import read_recording
-from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
+from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE, read_column
 from pprs_dynamics.measurement.files.way_out import common_prefix
 from pprs_dynamics.physics.mechanism.branches import (
     Branch,
@@ -47,6 +47,8 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.physics.mechanism.urdf import expanded, read_urdf
 from pprs_dynamics.physics.model.model_file import Model, build_model
 from pprs_dynamics.physics.model.parameter_file import parse_parameters
+from pprs_dynamics.physics.model.recorded_names import EFFORT_KINDS
+from pprs_dynamics.physics.model.robot_block import coupled
 from pprs_dynamics.system.plain_yaml import scalar
 
 Ask = Callable[[str, Sequence[str]], int]
@@ -137,21 +139,26 @@ def first_model(
     is_mjcf = _root_tag(path) == 'mujoco'
     description = _description(path, is_mjcf)
     given, files = _grouped([Path(one) for one in recordings])
-    contents = look_into(given[0]) if given and not files else None
+    contents = look_into(files.get(POSITION, given[0])) if given else None
     movable = [joint.name for joint in description.joints.values()
                if joint.kind not in (FIXED, FLOATING) and joint.mimic is None]
-    names = _names(contents, movable) if contents is not None else Names()
+    names = _names(contents, movable) if contents is not None and not files else Names()
     recorded = set(names.joints) | (_mentioned(contents, movable) if contents else set())
     branch, notes = _branch(description, tool, recorded, ask)
     notes += description.remarks
     chosen = _drives(description, path, is_mjcf, branch, drives, recorded)
+    shared = [name for each in coupled(description) for name in each.joints if name in chosen]
+    if shared and not drives:
+        chosen = tuple(name for name in chosen if name not in shared)
+        notes.append(f'{" and ".join(shared)} share a transmission: they are left out, and '
+                     'taken to stand')
     if contents is not None and contents.joints and not names.joints:
         names = _by_numbers(contents, chosen)
         notes.append('joints are matched by the numbers in their names')
     columns: list[str] = []
     guessed: list[str] = []
     found: Collection[str] = ()
-    if given:
+    if contents is not None:
         columns, guessed, found = _columns(given[0], files, contents, names, description, chosen,
                                            rate)
         notes += guessed
@@ -328,14 +335,14 @@ def _mentioned(contents: Contents, joints: Sequence[str]) -> set[str]:
     return found
 
 
-def _columns(path: Path, files: Mapping[str, Path], contents: Contents | None, names: Names,
+def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: Names,
              description: Description, drives: Sequence[str], rate: float | None,
              ) -> tuple[list[str], list[str], Collection[str]]:
     """Return the lines of `columns`, what was guessed, and which quantities there are."""
     limits = [_limit(description, name) for name in drives]
+    movable = list(description.joints)
     if files:
-        return _file_columns(path, files, drives, limits, rate)
-    assert contents is not None
+        return _file_columns(path, files, drives, limits, rate, movable)
     joints = tuple(names.joints.get(name, f'{names.prefix}{name}') for name in drives)
     try:
         recording = read_recording(path, RecordedDrives(
@@ -346,7 +353,7 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents | None, n
         # Positions of joint states may have their efforts in arrays; what is left is a table.
         if contents.joints and not contents.series:
             raise
-    guess = guess_columns(contents.series, drives, limits)
+    guess = guess_columns(contents.series, drives, limits, others=movable)
     lines = []
     if guess.time is not None and guess.time not in TIME_COLUMNS:
         lines.append(f'time: {scalar(guess.time)}')
@@ -366,11 +373,12 @@ def _rate(path: Path, rate: float | None) -> str:
 
 
 def _file_columns(path: Path, files: Mapping[str, Path], drives: Sequence[str],
-                  limits: Sequence[float], rate: float | None,
+                  limits: Sequence[float], rate: float | None, movable: Sequence[str],
                   ) -> tuple[list[str], list[str], Collection[str]]:
     """Return the same of files of one quantity each."""
     inside = {kind: look_into(file) for kind, file in files.items()}
-    guesses = {kind: guess_columns(one.series, drives, limits, kind)
+    inside.update(_in_turn(files, inside, len(drives)))
+    guesses = {kind: guess_columns(one.series, drives, limits, kind, movable)
                for kind, one in inside.items() if kind != FILE_TIME}
     merged = Guess(
         guesses[POSITION].time, {key: column for one in guesses.values()
@@ -392,6 +400,20 @@ def _file_columns(path: Path, files: Mapping[str, Path], drives: Sequence[str],
                                         for kind, file in files.items()) + '}')
     return ([*lines, *_drive_lines(merged, drives, inside[POSITION].decimal)], merged.notes,
             {*files})
+
+
+def _in_turn(files: Mapping[str, Path], inside: Mapping[str, Contents], count: int,
+             ) -> Iterator[tuple[str, Contents]]:
+    """Yield what is in files of one column that hold the joints' numbers in turn."""
+    if FILE_TIME not in files or count < 2:
+        return
+    times = len(read_column(files[FILE_TIME]))
+    for kind, one in inside.items():
+        if kind != FILE_TIME and len(one.series) == 1 and not one.has_header:
+            values = read_column(files[kind])
+            if len(values) == count * times:
+                yield kind, replace(one, series=tuple(
+                    Series(f'1[{k}]', f'{kind} {k}', values[k::count]) for k in range(count)))
 
 
 def _drive_lines(guess: Guess, drives: Sequence[str], decimal: str) -> Iterator[str]:
@@ -446,7 +468,10 @@ def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, ba
     ]
     lines += [f'      # loop {loop.name}: {loop.kind}, {loop.a} to {loop.b}, from the '
               'description' for loop in description.loops]
-    lines.append('    # Friction is not known yet: `pprs fit` finds it and writes it here.')
+    lines += [
+        f'    effort_kind: {"current" if currents else "measured"}  # not known from the files: '
+        f'what efforts are, one of {", ".join(EFFORT_KINDS)}',
+        '    # Friction is not known yet: `pprs fit` finds it and writes it here.']
     if names.prefix:
         lines.append(f'    joint_prefix: {scalar(names.prefix)}  # recordings call {drives[0]} '
                      f'{names.prefix}{drives[0]}')

@@ -81,12 +81,13 @@ class FitResult(Result):
 
 
 def fit(model: Model, recordings: Recordings, validate: Recordings = (), *,
-        topic: str | None = None, progress: Progress | None = None) -> FitResult:
+        topic: str | None = None, progress: Progress | None = None, as_it_is: bool = False,
+        ) -> FitResult:
     """Fit a base model: an arm's inertia and friction, or what `tolerances` leave open.
 
     Parameters
     ----------
-    model, recordings, validate, topic, progress
+    model, recordings, validate, topic, progress, as_it_is
         As in `diagnose`; recordings of free motion.
 
     Returns
@@ -100,6 +101,7 @@ def fit(model: Model, recordings: Recordings, validate: Recordings = (), *,
     PprsError
         As `compare`.
     """
-    inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
+    inputs = Inputs.of(
+        model, recordings, validate, topic, progress, as_it_is=as_it_is).require_measurements()
     return FitResult(inputs, fit_base(inputs.model, inputs.fitted, inputs.held_out,
                                       stage(progress, 'fitting')))

@@ -11,13 +11,16 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from pprs_dynamics.errors import PprsError, UnreadableFileError
+from pprs_dynamics.errors import MisreadError, PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.conventions import find_mistakes
 from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
-from pprs_dynamics.inference.residuals.readings import POSITION_UNIT
+from pprs_dynamics.inference.residuals.mistakes import (
+    OtherReading,
+    columns_line,
+    no_measurements,
+)
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
@@ -61,6 +64,8 @@ class Inputs:
         As given; '' for the default or from memory.
     topic : str
         As given; '' for none.
+    as_it_is : bool
+        Whether recordings are taken as their names and units say, whatever they look like.
     """
 
     model: ForceModel
@@ -70,11 +75,12 @@ class Inputs:
     base: Path | None = None
     model_path: str = ''
     topic: str = ''
+    as_it_is: bool = False
 
     @classmethod
     def of(cls, model: Model, recordings: Recordings, validate: Recordings = (),
            topic: str | None = None, progress: Progress | None = None,
-           whole: bool = False) -> Inputs:
+           whole: bool = False, as_it_is: bool = False) -> Inputs:
         """Read what is given as a path and check it, and take what is in memory as it is.
 
         Of recordings that are too long for a fit excerpts are taken, but where the `whole` is
@@ -83,8 +89,10 @@ class Inputs:
         Raises
         ------
         UnreadableFileError
-            Where a file cannot be read, holds the samples of another, or positions that are no
-            metres.
+            Where a file cannot be read, or holds the samples of another.
+        MisreadError
+            Where a file looks as if it were in other units, signs or another order than it says,
+            but with `as_it_is`.
         ModelError
             Where the model is none.
         """
@@ -92,7 +100,8 @@ class Inputs:
             found = recordings
         else:
             held_out = () if isinstance(validate, Inputs) else validate
-            found = cls.read(model, recordings, held_out, topic, progress).checked()
+            found = replace(cls.read(model, recordings, held_out, topic, progress),
+                            as_it_is=as_it_is).checked()
         return found if whole else found.within_memory()
 
     @classmethod
@@ -120,12 +129,13 @@ class Inputs:
 
         Raises
         ------
-        UnreadableFileError
-            For positions of the 3-PPRS that are no metres.
+        MisreadError
+            Where one looks as if it were in other units, signs or another order than it says, but
+            with `as_it_is`.
         """
         def each(recordings: Mapping[str, Recording]) -> dict[str, Recording]:
-            return {name: with_mistakes(self.model, one, refuse=True) if name in self.paths
-                    else one for name, one in recordings.items()}
+            return {name: with_mistakes(self.model, one, refuse=not self.as_it_is)
+                    if name in self.paths else one for name, one in recordings.items()}
         return replace(self, recordings=each(self.recordings), validation=each(self.validation))
 
     def within_memory(self) -> Inputs:
@@ -138,11 +148,12 @@ class Inputs:
     def with_more(self, path: File, is_held_out: bool = False) -> Inputs:
         """Return this with one more file; errors as `of`."""
         try:
-            more = Inputs.of(self.model, path)
+            more = Inputs.of(self.model, path, as_it_is=self.as_it_is)
         except UnreadableFileError:
             if not self.topic:
                 raise
-            more = Inputs.of(self.model, path, topic=self.topic)  # of several that it may hold
+            # Of several that it may hold.
+            more = Inputs.of(self.model, path, topic=self.topic, as_it_is=self.as_it_is)
         _refuse_repeats([_Read(str(path), one, True) for one in more.fitted],
                         [_Read(name, one, True) for name, one in
                          {**self.recordings, **self.validation}.items()], ONCE)
@@ -157,6 +168,18 @@ class Inputs:
         if not self.recordings:
             raise InputError('no recording is given, must be at least one')
         return self
+
+    def require_measurements(self) -> Inputs:
+        """Return this, or raise MisreadError where efforts of files look like no measurement.
+
+        Not so with `as_it_is`. For what would write them into a model.
+        """
+        for name in () if self.as_it_is else self.recordings:
+            found = no_measurements([self.recordings[name].findings])
+            if found:
+                raise MisreadError(displayed(name), [one.what for one in found],
+                                   [one.line for one in found])
+        return self.require_recordings()
 
     @property
     def fitted(self) -> list[Recording]:
@@ -205,13 +228,14 @@ def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False)
 
     Raises
     ------
-    UnreadableFileError
-        With `refuse`, for positions of the 3-PPRS that are no metres.
+    MisreadError
+        With `refuse`, where it looks as if it were in other units, signs or another order than it
+        says.
     """
     mistakes = find_mistakes(model, recording)
-    for finding in mistakes:
-        if refuse and finding.kind == POSITION_UNIT and isinstance(model, DriveModel):
-            raise UnreadableFileError(recording.name, f'{finding.what}, must be metres')
+    readings = [one for one in mistakes if isinstance(one, OtherReading)]
+    if refuse and readings:
+        raise MisreadError(recording.name, [one.what for one in readings], [columns_line(readings)])
     return replace(recording, findings=(*mistakes, *recording.findings))
 
 

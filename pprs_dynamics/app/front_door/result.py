@@ -75,7 +75,17 @@ class Result(ABC):
 
     def report(self, path: str | PathLike[str]) -> Path:
         """Write the page of all figures, which needs no network, and return its file."""
-        return self.page().write(path)
+        page = self.page()
+        page.record(self.record())
+        return page.write(path)
+
+    def record(self, command: str = '') -> list[tuple[str, str]]:
+        """Return what a result is of: date, version, command, model and recordings with hashes."""
+        from pprs_dynamics.app.report.record import record_of
+
+        inputs = getattr(self, 'inputs', None)
+        return (record_of(None, {}, {}, command) if inputs is None else
+                record_of(inputs.model, inputs.recordings, inputs.validation, command))
 
     def __str__(self) -> str:
         from pprs_dynamics.app.report.terminal import as_text

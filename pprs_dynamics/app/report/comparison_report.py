@@ -13,11 +13,12 @@ from pprs_dynamics.app.report import comparison_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, text_table
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
-from pprs_dynamics.inference.diagnosis.quantities import percent, plain, sentence
+from pprs_dynamics.inference.diagnosis.quantities import percent, plain, rounded_as, sentence
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 
+NOWHERE = 'No place stands out: the error lies nowhere in particular.'
 FIRST = 3  # statements on the first screen
 # Lines that places take without --details, and characters of a line of 80 columns, which words
 # seldom fill.
@@ -30,21 +31,23 @@ def drives_table(comparison: Comparison) -> PlainTable:
     headings = ('rms', 'relative', 'bias', 'peak', 'explained', 'noise', 'independent samples')
     return ('drive', *(f'{name} [{comparison.unit}]' if name in EFFORTS else name
                        for name in headings)), [
-        (name, f'{drive.rms:.3f}', percent(drive.relative), f'{drive.bias:+.3f}',
-         f'{drive.peak:.3f}', percent(drive.explained_variance), f'{drive.noise_floor:.3f}',
+        (name, plain(drive.rms), percent(drive.relative),
+         rounded_as(drive.bias, drive.rms, '+'), rounded_as(drive.peak, drive.rms),
+         percent(drive.explained_variance),
+         '' if drive.noise_floor is None else plain(drive.noise_floor, 2),
          f'{drive.effective_samples:.0f} of {drive.samples}')
         for name, drive in comparison.drives.items()]
 
 
-def comparison_view(comparison: Comparison, command: str, details: bool = False,
+def comparison_view(comparison: Comparison, following: tuple[str, str], details: bool = False,
                     beside: Beside | None = None) -> Any:
     """Return how wrong the model is, where, and what to do next.
 
     Parameters
     ----------
     comparison : Comparison
-    command : str
-        That finds out why.
+    following : (str, str)
+        What to do next, in words and for a shell.
     details : bool
         Everything, instead of at most 25 lines of 80 columns.
     beside : Beside, optional
@@ -55,14 +58,14 @@ def comparison_view(comparison: Comparison, command: str, details: bool = False,
             if details or total <= MOST_LINES]
     parts = [_drives_table(comparison), escape(comparison.verdict), *map(escape, told)]
     if not lines:
-        parts.append('Nowhere in particular: nothing stands out against noise.')
+        parts.append(NOWHERE)
     if len(lines) > len(told):
         parts.append(f'… and {len(lines) - len(told)} more, with --details, --json or --report')
     if details:
         parts += [escape(drive.verdict) for drive in comparison.drives.values()]
     if comparison.is_beyond_noise:
-        parts += ['[bold]Next[/] Find out which physical effect is missing:',
-                  f'  [bold cyan]{escape(command)}[/]']
+        words, command = following
+        parts += [f'[bold]Next[/] {escape(words)}:', f'  [bold cyan]{escape(command)}[/]']
     if beside is not None:
         parts.append(_beside_table(comparison, beside))
     return stacked(*parts)
@@ -92,7 +95,7 @@ def _drives_table(comparison: Comparison) -> Any:
 
 def comparison_page(
     model: ForceModel, recordings: Sequence[Recording], residuals: Residuals,
-    comparison: Comparison, notes: Sequence[str], command: str = '',
+    comparison: Comparison, notes: Sequence[str], following: tuple[str, str] = ('', ''),
     beside: Beside | None = None,
 ) -> Page:
     """Return the page of one comparison: where it fails on one screen, the rest to be unfolded.
@@ -106,8 +109,8 @@ def comparison_page(
         Of them.
     notes : sequence of str
         How it was computed.
-    command : str, optional
-        That finds out why.
+    following : (str, str), optional
+        What to do next, in words and for a shell.
     beside : Beside, optional
         Drawn as what the error becomes.
     """
@@ -125,15 +128,15 @@ def comparison_page(
             if statements:
                 page.bullets([one.text for one in statements[:FIRST]], numbered=True)
             else:
-                page.text('Nowhere in particular: nothing stands out against noise.')
+                page.text(NOWHERE)
         if statements:
             noise = comparison.localisation.drives[statements[0].drive].noise
             picture = noise and figures.along(residuals, noise, statements[0], 'error')
             if picture is not None:
                 page.figure(picture, f'Where it fails most: {statements[0].drive}. Bars: two '
                             'standard deviations under the noise.')
-    if command and comparison.is_beyond_noise:
-        page.command('Find out which physical effect is missing', command)
+    if following[1] and comparison.is_beyond_noise:
+        page.command(*following)
     page.folded_list(f'{len(statements) - FIRST} more places',
                      [one.text for one in statements[FIRST:]])
     with page.fold('Drive by drive'):

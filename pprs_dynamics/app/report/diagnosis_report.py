@@ -8,6 +8,7 @@ The terminal is readable from 80 columns on.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
 from typing import Any
@@ -41,7 +42,7 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
 MOST_LISTED = 2  # places of effects whose parameters the sentences give; names in one line
 WIDTH = 80
-LONGEST = 160  # characters of values that are shown without --details: two lines
+LONGEST = 240  # characters of values and the runner-up without --details: three lines
 MOST_EFFECTS = 4  # that are shown without --details
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
 ELSEWHERE = '[dim]Why, how to confirm it, and all values: --details, or --report FILE.html[/]'
@@ -52,7 +53,7 @@ METHOD = (
     'Sets of effects and of patterns of no catalogue are compared by one cost: the penalised '
     'deviance under noise that is correlated in time, whose spectrum is fitted anew for each set, '
     'and prices for effects, drives, shapes and patterns that were tried. Evidence of an effect '
-    'is by how much the cost rises without it.')
+    'is by how much more the best set without it costs, whatever stands there instead.')
 
 
 def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False,
@@ -77,22 +78,30 @@ def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False
 def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     """Yield verdict, fall and next step, in at most 25 lines of 80 columns."""
     yield verdict_panel(diagnosis.verdict, COLOURS[diagnosis.verdict], words.headline)
+    second = runner_up(diagnosis)
+    room = max(LONGEST - _room(f'Runner-up {second}'), WIDTH)
     if diagnosis.effects:
         yield text_table(_headings(diagnosis), _effect_rows(diagnosis)[:MOST_EFFECTS],
                          right=(2, 3, 4), whole=(0, 2, 3, 4), frame='none')
         lines = [f'  {f"{effect} on {drive}" if drive else effect}: {text}'
                  for effect, drive, text in _joined(fitted_values(diagnosis))]
-        taken = accumulate(-(-len(line) // WIDTH) * WIDTH for line in lines)
-        shown = [line for line, total in zip(lines, taken, strict=True) if total <= LONGEST]
+        shown = [line for line, total in zip(lines, accumulate(map(_room, lines)), strict=True)
+                 if total <= room]
         yield from map(escape, shown)
         if len(lines) > len(shown):
             yield f'  … values of {len(lines) - len(shown)} more: --details'
-    if second := runner_up(diagnosis):
+    if second:
         yield f'[bold]Runner-up[/] {escape(second)}'
     if words.within_model_error:
-        yield f'Within the model error of what was found: {escape(_within_model_error(diagnosis))}'
+        yield ('May be left by the forms of what was found, no finding: '
+               f'{escape(_within_model_error(diagnosis))}')
     if words.warnings:
         yield f'[yellow]![/] {escape(words.warnings[0].partition(";")[0])}'
+
+
+def _room(line: str) -> int:
+    """Return how many characters a line takes, whole lines of the screen."""
+    return -(-len(line) // WIDTH) * WIDTH
 
 
 def _within_model_error(diagnosis: Diagnosis) -> str:
@@ -125,8 +134,9 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
         yield _table('Values, ± two standard deviations', ('effect', 'drive', 'values'),
                      [tuple(map(escape, row)) for row in _joined(values)])
     if diagnosis.sets:
-        yield _table('The best sets of effects, and their costs above the best', ('cost', 'set'),
-                     [(cost, escape(text)) for text, cost in set_rows(diagnosis)])
+        yield _table('The best sets of effects, and their costs above the best',
+                     ('cost', 'set', 'of which'),
+                     [(cost, escape(text), why) for text, cost, why in set_rows(diagnosis)])
     if diagnosis.candidates:
         yield _table('Each effect alone', (
             'effect', 'on', 'evidence', f'error after [{diagnosis.residuals.unit}]'), [
@@ -135,6 +145,7 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     yield from _list('Within their tolerance', words.calibrated, 'blue')
     yield from _list('Suspects', words.suspects, 'yellow')
     yield from _list('Within model error', words.within_model_error, 'blue')
+    yield from _list('Sets that may not be', words.barred, 'blue')
     yield from _list('Warnings', words.warnings, 'yellow')
 
 
@@ -236,6 +247,7 @@ def diagnosis_page(
         _errors(page, diagnosis, steps)
         _first_picture(page, diagnosis)
     page.command(words.following, words.command)
+    page.copy('Copy as Markdown', diagnosis_markdown(diagnosis, words))
     page.folded_list('Warnings', words.warnings, is_open=True)
     if system is not None:
         add_what_if(page, system, diagnosis.residuals)
@@ -250,6 +262,25 @@ def diagnosis_page(
         if diagnosis.notes:
             page.bullets(diagnosis.notes)
     return page
+
+
+def diagnosis_markdown(diagnosis: Diagnosis, words: Sentences) -> str:
+    """Return the answer as Markdown, for an issue or a log book."""
+    rows = [f'**{diagnosis.verdict}**: {words.headline}']
+    if diagnosis.effects:
+        heads = _headings(diagnosis)
+        cells = [[re.sub(r'\[/?\w+\]', '', cell) for cell in row]
+                 for row in _effect_rows(diagnosis)]
+        table = (heads, ['---'] * len(heads), *cells)
+        rows.append('\n'.join(f'| {" | ".join(cell.replace("|", "/") for cell in row)} |'
+                              for row in table))
+        rows.append('\n'.join(f'- {f"{effect} on {drive}" if drive else effect}: {text}'
+                              for effect, drive, text in _joined(fitted_values(diagnosis))))
+    if words.warnings:
+        rows.append('\n'.join(f'- {text}' for text in words.warnings))
+    rows.append(f'Next: {words.following}' + (
+        f':\n\n```sh\n{words.command}\n```' if words.command else ''))
+    return '\n\n'.join(rows) + '\n'
 
 
 def _errors(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> None:
@@ -298,7 +329,9 @@ def _findings(page: Page, diagnosis: Diagnosis, words: Sentences,
                 page.card(finding.title, finding_lines(finding),
                           [(figure, text) for figure, text in pictures if figure is not None])
     page.folded_list('Suspects: effects that slow noise would explain as well', words.suspects)
-    page.folded_list('Within the model error of what was found', words.within_model_error)
+    page.folded_list('What the forms of the effects that were found may leave: no findings',
+                     words.within_model_error)
+    page.folded_list('Sets that may not be', words.barred)
 
 
 def _lines(finding: Finding, equation: str) -> list[tuple[str, str]]:
@@ -311,8 +344,11 @@ def _sets(page: Page, diagnosis: Diagnosis) -> None:
         return
     with page.fold('The best sets of effects, and their costs'):
         page.text('Cost above that of the best set. 10 stands for odds of 150 to 1: a set that '
-                  'comes nearer is told as a rival.', 'note')
-        page.table(('cost', 'set'), [(cost, text) for text, cost in set_rows(diagnosis)])
+                  'comes nearer is told as a rival. Of which: how much worse it fits, what its '
+                  'coefficients ask of their prior, and the prices of its names, drives, shapes '
+                  'and signs.', 'note')
+        page.table(('cost', 'set', 'of which'), [
+            (cost, text, why) for text, cost, why in set_rows(diagnosis)])
         if diagnosis.candidates:
             page.figure(figures.evidence_bars(diagnosis),
                         'Evidence of each effect alone; 0 is the threshold. Blue: found. Yellow: '

@@ -12,7 +12,7 @@ from typing import Any
 
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import PlainTable, escape, plain_rows, stacked, text_table
-from pprs_dynamics.inference.diagnosis.quantities import plain, sentence
+from pprs_dynamics.inference.diagnosis.quantities import plain, sentence, word_little
 from pprs_dynamics.inference.fit.base_fit import HALVES, RECORDINGS, VALIDATION, BaseFit
 from pprs_dynamics.physics.model.force_model import ForceModel
 
@@ -41,7 +41,8 @@ def fit_view(model: ForceModel, fit: BaseFit, details: bool = False) -> Any:
     errors = text_table(*plain_rows(errors_table(model, fit)), right=(2, 3, 4),
                         title=f'Error, rms; held out: {HELD_OUT[fit.held_out_on]}')
     numbers = [text_table(*plain_rows(numbers_table(fit)), right=(2, 3, 4))] if details else []
-    return stacked(errors, *map(escape, fit.told), *numbers)
+    headline = [escape(f'{word_little(fit.little)}, fitted as it is')] if fit.little else []
+    return stacked(*headline, errors, *map(escape, fit.told), *numbers)
 
 
 def fit_page(model: ForceModel, fit: BaseFit, recordings: Sequence[str],
@@ -57,6 +58,8 @@ def fit_page(model: ForceModel, fit: BaseFit, recordings: Sequence[str],
         Names.
     """
     page = Page('Base model')
+    if fit.little:
+        page.text(sentence(f'{word_little(fit.little)}, fitted as it is'), 'lead')
     held_out = f'; {", ".join(validate)} held out' if validate else ''
     page.text(f'Model: {Path(model.source).name or "built in memory"}. Fitted to '
               f'{", ".join(recordings)}{held_out}.', 'note')

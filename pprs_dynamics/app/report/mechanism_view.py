@@ -42,7 +42,8 @@ def describe_mechanism(model: ArmModel) -> dict[str, Any]:
                   for loop in s.loops],
         'drives': list(s.drives), 'held': list(s.held), 'home': home,
         'degrees_of_freedom': s.mobility.freedoms, 'independent_rows': len(s.mobility.rows),
-        'condition_number': s.mobility.condition, 'remarks': list(s.description.remarks)}
+        'condition_number': s.mobility.condition, 'faults': list(s.description.faults),
+        'remarks': list(s.description.remarks)}
 
 
 def mechanism_lines(model: ArmModel) -> list[str]:

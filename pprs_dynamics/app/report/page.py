@@ -111,6 +111,18 @@ class Page:
         self._body.append(f'<section class="next" aria-label="Next step"><p><b>Next:</b> '
                           f'{escape(text)}{":" if command else "."}</p>{code}</section>')
 
+    def copy(self, label: str, text: str) -> None:
+        """Add a button that copies a text which is not shown."""
+        self._body.append(f'<div class="command copy"><code style="display:none">{escape(text)}'
+                          f'</code><button type="button">{escape(label)}</button></div>')
+
+    def record(self, lines: Iterable[tuple[str, str]]) -> None:
+        """Add what the page is of, so that it can be filed: labelled lines behind a title."""
+        with self.fold('Record: when, by what, from which files'):
+            terms = ''.join(f'<dt>{escape(label)}</dt><dd>{escape(text)}</dd>'
+                            for label, text in lines)
+            self._body.append(f'<dl class="record">{terms}</dl>')
+
     def bullets(self, lines: Iterable[str], numbered: bool = False) -> None:
         """Add a list."""
         tag = 'ol' if numbered else 'ul'

@@ -148,8 +148,9 @@ def run_in_process(work: Callable[..., Any], *arguments: Any,
     Exception
         Whatever the work raised.
     """
+    # In a group of its own: Ctrl-C in a terminal is for the command, which calls the work off.
     with subprocess.Popen([sys.executable, '-c', START], stdin=subprocess.PIPE,
-                          stdout=subprocess.PIPE) as process:
+                          stdout=subprocess.PIPE, process_group=0) as process:
         assert process.stdin is not None
         assert process.stdout is not None
         share, answers = 0.0, []

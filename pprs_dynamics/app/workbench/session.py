@@ -28,8 +28,10 @@ from pprs_dynamics.inference.adoption.adopt import adopt, original
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.quantities import word_little
 from pprs_dynamics.inference.experiments.next_experiment import check_duration
 from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.arm_model import ArmModel
@@ -557,6 +559,8 @@ class Session:
                     views.effect_to_dict(view, effect, self.model, effect.name in called_for)
                     for effect in self.candidates],
                 'verdict': diagnosis.verdict if diagnosis else None,
+                'little': word_little(little_explained(
+                    self.model, self.fits.fits.design.residuals, self.now)),
                 'steps': [step.to_dict() for step in self.steps],
                 'jobs': {kind: job.to_dict() for kind, job in self.jobs.items()},
                 'adoption': for_json(adoption.to_dict()) if adoption else None,

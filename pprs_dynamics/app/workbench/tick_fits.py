@@ -21,6 +21,7 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
 from pprs_dynamics.inference.search.fitted_model import exact_forces, fitted_model, linear_residual
@@ -235,7 +236,8 @@ class TickFits:
             return found
         fit = self.fits.regression.held(self.fits.regression.stated(found.fit),
                                         found.fit.index_of(blocks), np.array(values))
-        return replace(found, fit=fit, total=found.total + fit.deviance - found.fit.deviance)
+        held = CostTerms(fit=fit.deviance - found.fit.deviance)
+        return replace(found, fit=fit, terms=found.terms + held)
 
     # What a set says
 

@@ -18,7 +18,9 @@ from pprs_dynamics.app.workbench.tick_fits import Exact, Offer, Tick, TickFits
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.drives import DriveUnits, common_effort
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.diagnosis.sentences import word_terms
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -85,8 +87,8 @@ class ViewState:
     estimates : mapping of str to mapping of str to Estimate
         By effect, of the values that are shown; NaN where the deviation is not known yet.
     stage : {'linear', 'fitted', 'refined', 'exact'}
-    evidence : mapping of str to float
-        Of the ticked effects: by how much the cost rises without each.
+    without : mapping of str to CostTerms
+        Of the ticked effects: by how much the cost rises without each, term by term.
     offers : sequence of Offer
         The unticked effects, the best first; of the set before until `has_offers`.
     has_offers : bool
@@ -102,7 +104,7 @@ class ViewState:
     residual: Array = field(repr=False)
     estimates: Mapping[str, Mapping[str, Estimate]]
     stage: str = LINEAR
-    evidence: Mapping[str, float] = field(default_factory=dict)
+    without: Mapping[str, CostTerms] = field(default_factory=dict)
     offers: Sequence[Offer] = ()
     has_offers: bool = False
     exact: Exact | None = None
@@ -147,7 +149,7 @@ def linear(fits: TickFits, last: ViewState, ticks: Mapping[str, Tick], revision:
               for name, every in fits.values(found).items()}
     residual = fits.residual(found) if ticks else fits.before
     return ViewState(revision, ticks, free, found, residual, values, LINEAR if ticks else FITTED,
-                     last.evidence, last.offers)
+                     last.without, last.offers)
 
 
 def following(fits: TickFits, view: ViewState) -> Iterator[ViewState]:
@@ -177,14 +179,14 @@ def following(fits: TickFits, view: ViewState) -> Iterator[ViewState]:
 
 
 def _fitted(fits: TickFits, view: ViewState, free: CandidateSet, stage: str) -> ViewState:
-    evidence = {}
+    without = {}
     for candidate in free.effects:
         rest = [one for one in free.effects if one is not candidate]
-        evidence[candidate.name] = fits.fitted(rest).total - free.total
+        without[candidate.name] = fits.fitted(rest).terms - free.terms
     free = fits.at(free.effects, free)
     found = _with_chosen(fits, free, view.ticks)
     residual = fits.residual(found) if view.ticks else fits.before
-    return replace(view, free=free, found=found, residual=residual, evidence=evidence,
+    return replace(view, free=free, found=found, residual=residual, without=without,
                    stage=stage, estimates=fits.estimates(found))
 
 
@@ -202,11 +204,13 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: ForceM
     tick = view.ticks.get(effect.name)
     offer = next((one for one in view.offers if one.candidate.effect is effect), None)
     candidate = tick.best if tick else offer.candidate if offer else None
-    evidence = view.evidence.get(effect.name) if tick else offer.evidence if offer else None
+    without = view.without.get(effect.name) if tick else None
+    evidence = without.total if without else offer.evidence if offer and not tick else None
     return {
         'name': effect.name, 'is_ticked': tick is not None,
         'drives': None if candidate is None else names_of(candidate, drives),
         'is_on_drives': issubclass(effect, DriveEffect), 'evidence': finite(evidence),
+        'evidence_terms': '' if without is None else word_terms(without),
         'evidence_is_pending': (view.stage == LINEAR if tick else not view.has_offers),
         'bends_columns': effect.bends_columns, 'is_called_for': is_called_for,
         'equation': card.equation, 'looks_like': card.looks_like,

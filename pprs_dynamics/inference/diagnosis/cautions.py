@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What may make an answer worth less: motion, length, filtering, bounds."""
+"""What may make an answer worth less: bodies that cannot be, motion, length, filtering, bounds."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ def find_cautions(
     fits: FittedSets, best: CandidateSet, effects: Sequence[FoundEffect],
 ) -> tuple[str, ...]:
     """Return sentences, the graver first."""
-    return (*_courses(effects), *_length(fits, best), *_motion(fits), *_filtered(fits),
+    return (*fits.design.given.faults, *_courses(effects), *_length(fits, best), *_motion(fits),
+            *_filtered(fits),
             *_unexcited(fits, best), *_bounds(effects))
 
 

@@ -6,21 +6,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.localisation import DriveFindings, Localisation, localise
-from pprs_dynamics.inference.diagnosis.quantities import in_unit, listed, percent
+from pprs_dynamics.inference.diagnosis.quantities import in_unit, listed, percent, word_little
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.explained_effort import explained_shares
 from pprs_dynamics.system.numbers import finite
-
-# Of the effort's size, below which a changing effort is rounding.
-CONSTANT = 1e-9
 
 
 @dataclass(frozen=True)
@@ -42,14 +41,16 @@ class DriveComparison:
         Measured ones.
     effective_samples : float
         Independent samples whose mean would be as uncertain.
-    noise_floor : float
-        rms of the noise: of the spectrum that is fitted beside all patterns [N].
+    noise_floor : float or None
+        rms of the noise [N]; None where it cannot be told. See `search.noise_floors`.
     parts : mapping of str to float
         rms of each part of the model, its mean removed [N].
     unit : str
         Of the drive's efforts.
-    is_told : bool
-        Whether a statement explains a share of the error that is worth a word.
+    told : float
+        rms of the largest pattern that a statement tells [N]; it is no noise.
+    is_little : bool
+        Whether the model explains little of the effort, see `search.explained_effort`.
     """
 
     drive: str
@@ -61,22 +62,26 @@ class DriveComparison:
     explained_variance: float
     samples: int
     effective_samples: float
-    noise_floor: float
+    noise_floor: float | None
     parts: Mapping[str, float]
     unit: str
-    is_told: bool
+    told: float
+    is_little: bool = False
 
     @property
     def unexplained(self) -> float:
-        """Root of rms squared minus noise floor squared [N]."""
-        return float(np.sqrt(max(self.rms ** 2 - self.noise_floor ** 2, 0.0)))
+        """Root of rms squared minus noise floor squared [N]; the rms where that is not known."""
+        return float(np.sqrt(max(self.rms ** 2 - (self.noise_floor or 0.0) ** 2, 0.0)))
 
     @property
     def grade(self) -> str:
         """How good the model is: 'noise', 'good', 'fair' or 'poor'."""
         # The noise is known to a share: what is left beyond it is nothing below this.
         sure = np.sqrt((1 + DECISIONS.noise_accuracy) ** 2 - 1)
-        if self.unexplained <= sure * self.noise_floor:
+        if self.is_little:
+            return 'poor'
+        if self.rms == 0 or self.relative < DECISIONS.negligible or (self.noise_floor is not None
+                             and max(self.unexplained, self.told) <= sure * self.noise_floor):
             return 'noise'
         if np.isnan(self.relative) or self.unexplained > DECISIONS.poor * self.effort:
             return 'poor'
@@ -92,12 +97,18 @@ class DriveComparison:
         if self.rms == 0:
             return f'{self.drive}: the model leaves nothing {of}'
         left = f'{self.drive}: the model leaves {self._told(self.rms)} {of}; '
+        if self.relative < DECISIONS.negligible:
+            return f'{left}next to nothing'
         if self.grade == 'noise':
-            return left + ('noise accounts for most of it' if self.is_told else
+            is_told = self.told ** 2 >= DECISIONS.statement_share * self.rms ** 2
+            return left + ('noise accounts for most of it' if is_told else
                            'noise accounts for it: nothing else stands out in this recording')
-        left += (f'noise accounts for {self._told(self.noise_floor)}, so '
+        left += ('how much of it is noise cannot be told' if self.noise_floor is None else
+                 f'noise accounts for {self._told(self.noise_floor)}, so '
                  f'{self._told(self.unexplained)} is unexplained')
-        ranked = sorted(((size, part) for part, size in self.parts.items() if size > 0),
+        # What contributes next to nothing is no measure of anything.
+        least = DECISIONS.statement_share * self.effort
+        ranked = sorted(((size, part) for part, size in self.parts.items() if size > least),
                         reverse=True)
         below = [(size, part) for size, part in ranked if size < self.unexplained]
         if ranked:
@@ -151,6 +162,8 @@ class Comparison:
         Where it fails.
     unit : str
         Of errors over all drives.
+    little : mapping of str to float
+        Drives of whose effort the model explains little, with the shares.
     """
 
     drives: Mapping[str, DriveComparison]
@@ -158,11 +171,14 @@ class Comparison:
     relative: float
     localisation: Localisation
     unit: str = 'N'
+    little: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def where(self) -> tuple[Statement, ...]:
         """Where it fails, what explains most of the squared error first, and nothing slight."""
         told = [one for one in self.localisation.statements if one.drive in self.drives
+                and not self.drives[one.drive].relative < DECISIONS.negligible
+                and one.share_of_error >= DECISIONS.statement_share
                 and one.mean_square >= (
                     DECISIONS.statement_share * self.drives[one.drive].rms ** 2)]
         return tuple(sorted(told, key=lambda one: -one.mean_square))
@@ -176,16 +192,26 @@ class Comparison:
     def verdict(self) -> str:
         """The numbers over all drives in words."""
         share = '' if np.isnan(self.relative) else f' ({percent(self.relative)} of the effort)'
-        left = f'the model leaves {in_unit(self.rms, self.unit)}{share}: '
+        leaves = f'leaves {in_unit(self.rms, self.unit)}{share}'
+        left = (f'{word_little(self.little)}; it {leaves}: ' if self.little
+                else f'the model {leaves}: ')
         beyond = [drive for drive in self.drives.values() if drive.grade != 'noise']
+        told = [drive for drive in beyond if drive.noise_floor is not None]
+        if beyond and not told:
+            worst = max(beyond, key=lambda drive: drive.rms / max(drive.effort, 1e-300))
+            return (f'{left}how much of it is noise cannot be told on '
+                    f'{listed([drive.drive for drive in beyond])}; worst on {worst.drive}, '
+                    f'{in_unit(worst.rms, worst.unit)} ({worst.grade})')
+        if self.relative < DECISIONS.negligible:
+            return f'{left}next to nothing'
         if not beyond:
-            told = sorted({one.drive for one in self.where})
+            placed = sorted({one.drive for one in self.where})
             return f'{left}noise accounts for ' + (
-                f'most of it on {listed(told)}, for all of it elsewhere' if told
+                f'most of it on {listed(placed)}, for all of it elsewhere' if placed
                 else 'it on every drive')
-        worst = max(beyond, key=lambda drive: drive.unexplained)
-        where = ('every drive' if len(beyond) == len(self.drives) > 1
-                 else ', '.join(drive.drive for drive in beyond))
+        worst = max(told, key=lambda drive: drive.unexplained)
+        where = ('every drive' if len(told) == len(self.drives) > 1
+                 else ', '.join(drive.drive for drive in told))
         return (f'{left}more than noise on {where}; worst on {worst.drive}, '
                 f'{in_unit(worst.unexplained, worst.unit)} unexplained ({worst.grade})')
 
@@ -196,10 +222,15 @@ class Comparison:
                               for key in ('rms', 'relative', 'bias', 'peak')}
                        for name, drive in self.drives.items()},
             'overall': {'rms': finite(self.rms), 'relative': finite(self.relative)},
+            'explained': {name: finite(drive.explained_variance)
+                          for name, drive in self.drives.items()},
+            'noise_floors': {name: drive.noise_floor for name, drive in self.drives.items()},
             'where': [statement.to_dict() for statement in self.where]}
 
 
-def compare(residuals: Residuals, localisation: Localisation | None = None) -> Comparison:
+def compare(residuals: Residuals, localisation: Localisation | None = None,
+            floors: Mapping[str, float] = MappingProxyType({}),
+            little: Mapping[str, float] = MappingProxyType({})) -> Comparison:
     """Return how the model compares with the measurement.
 
     Parameters
@@ -207,41 +238,39 @@ def compare(residuals: Residuals, localisation: Localisation | None = None) -> C
     residuals : Residuals
     localisation : Localisation, optional
         Its result where it is known already; what it finds is not noise.
+    floors : mapping of str to float, optional
+        The noise of the drives where it can be told [N], see `search.noise_floors`.
+    little : mapping of str to float, optional
+        Drives of whose effort little is explained, see `search.explained_effort`.
     """
     where = localisation or localise(residuals)
-    drives = {name: _compare_drive(residuals, index, name, where)
-              for index, name in enumerate(residuals.drives)
-              if np.isfinite(residuals.measured[:, index]).any()}
+    shares = explained_shares(residuals)
+    drives = {name: _compare_drive(residuals, name, where, share, floors.get(name),
+                                   name in little) for name, share in shares.items()}
     samples = [drive.samples for drive in drives.values()]
     rms, effort = (float(np.sqrt(np.average(np.square(values), weights=samples))) for values in (
         [drive.rms for drive in drives.values()], [drive.effort for drive in drives.values()]))
     constant = all(np.isnan(drive.relative) for drive in drives.values())
     return Comparison(drives, rms, float('nan') if constant else rms / effort, where,
-                      residuals.unit)
+                      residuals.unit, little)
 
 
 def _compare_drive(
-    residuals: Residuals, index: int, name: str, where: Localisation,
+    residuals: Residuals, name: str, where: Localisation, share: float, floor: float | None,
+    is_little: bool,
 ) -> DriveComparison:
+    index = residuals.drives.index(name)
     known = np.isfinite(residuals.measured[:, index])
     error, effort = residuals.error[known, index], residuals.measured[known, index]
     rms, swing = root_mean_square(error), root_mean_square(effort - effort.mean())
-    constant = swing <= CONSTANT * max(float(np.abs(effort).max()), CONSTANT)
     findings = where.drives.get(name, DriveFindings((), None))
-    noise = findings.noise
-    floor = rms if noise is None else min(rms, noise.rms_at(residuals.period))
-    level = next((one for one in findings.statements if one.kind == 'level'), None)
-    if level is not None:
-        floor = float(np.sqrt(max(floor ** 2 - level.mean_square, 0.0)))
-    # What a statement explains is no noise, even where a spectrum takes its peaks for some.
     most = max((one.mean_square for one in findings.statements
                 if one.kind not in ('scatter', 'level')), default=0.0)
-    floor = min(floor, float(np.sqrt(max(rms ** 2 - most, 0.0))))
     return DriveComparison(
         name, rms, float(error.mean()), float(np.abs(error).max()), swing,
-        float('nan') if constant else rms / swing,
-        float('nan') if constant else 1 - float(np.var(error)) / swing ** 2, len(error),
-        float(len(error)) if noise is None else noise.effective_samples(len(error)), floor,
+        float('nan') if np.isnan(share) else rms / swing, share, len(error),
+        float(len(error)) if findings.noise is None else findings.noise.effective_samples(
+            len(error)), floor,
         {part: root_mean_square(values[known, index] - values[known, index].mean())
          for part, values in residuals.parts.items()},
-        residuals.units_of(name).effort, most >= DECISIONS.statement_share * rms ** 2)
+        residuals.units_of(name).effort, float(np.sqrt(most)), is_little)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -22,9 +22,12 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
-from pprs_dynamics.inference.diagnosis.quantities import plain
+from pprs_dynamics.inference.diagnosis.possible import why_impossible, why_nothing
+from pprs_dynamics.inference.diagnosis.quantities import listed, plain
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
+from pprs_dynamics.inference.residuals.measured_effort import kinds_of, looks_like
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import certainty, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -35,6 +38,7 @@ from pprs_dynamics.inference.search.candidates import (
     CandidateSet,
     EffectCandidate,
 )
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.courses import with_courses
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import (
@@ -43,6 +47,10 @@ from pprs_dynamics.inference.search.estimates import (
     averaged,
     calibrations,
     estimate,
+)
+from pprs_dynamics.inference.search.explained_effort import (
+    explained_shares,
+    little_explained,
 )
 from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
@@ -55,13 +63,15 @@ from pprs_dynamics.inference.search.fitted_model import (
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder
 from pprs_dynamics.inference.search.held_out import hold_out
-from pprs_dynamics.inference.search.ranking import Ranking, select
+from pprs_dynamics.inference.search.noise_floors import noise_floors
+from pprs_dynamics.inference.search.ranking import Ranking, select, without_search
 from pprs_dynamics.inference.search.relinearisation import settled
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.system.numbers import finite
 
-MOST_SETS = 8  # that are told with their costs
+MOST_SETS, MOST_BARRED = 8, 3  # that are told with their costs, and those that may not be
 MOST_AVERAGED = 5  # sets that estimates are averaged over
 
 
@@ -77,13 +87,16 @@ class Diagnosis:
     indistinguishable : tuple of tuple of str
         Each an adopted effect and its rivals.
     unconfirmed : tuple of FoundEffect
-        Fitted as well, but the error does not fall with them, or not on held-out data.
+        Fitted as well, but no machine can have them, or the error does not fall with them, or not
+        on held-out data.
     candidates, suspects : tuple of RankedEffect
     depends_on : tuple of Statement
         What no effect explains.
     within_model_error : tuple of WithinModelError
     sets : tuple of RankedSet
         The best sets of the search, the best first.
+    barred : tuple of RankedSet
+        Those that would cost less than a rival and may not be.
     calibrated : tuple of Calibration
         Numbers that moved within their tolerances.
     warnings, notes : tuple of str
@@ -103,7 +116,14 @@ class Diagnosis:
         The same over drives [N].
     above_noise : mapping of str to float
         How many times its noise a drive keeps, where that is more than what was found may leave.
+    little : mapping of str to float
+        Drives of whose effort little is explained with what was found, with the shares.
+    unseen_noise : tuple of str
+        Drives whose noise cannot be told apart from what may be missing: their floor is an upper
+        bound, what the best set leaves.
     held_out_on : {'blocks', 'validation'}
+    effort_looks_like : mapping of str to NoMeasurement
+        Drives whose efforts are no measurement: then nothing is claimed.
     selection : Ranking, optional
         All that was tried, for looking closer.
     decisions : Decisions
@@ -119,6 +139,7 @@ class Diagnosis:
     depends_on: tuple[Statement, ...]
     within_model_error: tuple[WithinModelError, ...]
     sets: tuple[RankedSet, ...]
+    barred: tuple[RankedSet, ...]
     calibrated: tuple[Calibration, ...]
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
@@ -130,7 +151,10 @@ class Diagnosis:
     noise_floors: dict[str, float]
     noise_floor: float
     above_noise: Mapping[str, float] = field(default_factory=dict)
+    little: Mapping[str, float] = field(default_factory=dict)
+    unseen_noise: tuple[str, ...] = ()
     held_out_on: str = 'blocks'
+    effort_looks_like: Mapping[str, NoMeasurement] = field(default_factory=dict)
     selection: Ranking | None = field(default=None, repr=False, compare=False)
     decisions: Decisions = DECISIONS
 
@@ -149,8 +173,13 @@ class Diagnosis:
             'suspects': [{key: value for key, value in s.to_dict().items() if key != 'error_after'}
                          for s in self.suspects],
             'sets': [one.to_dict() for one in self.sets],
+            'barred': [one.to_dict() for one in self.barred],
             'calibrated': [one.to_dict() for one in self.calibrated],
             'held_out_on': self.held_out_on, 'above_noise': dict(self.above_noise),
+            'effort_looks_like': kinds_of(self.effort_looks_like),
+            'explained': _for_json(explained_shares(self.residuals)),
+            'little_explained': dict(self.little),
+            'explained_after': _for_json(explained_shares(self.residuals, self.remaining)),
             'noise_floor': self.noise_floor,
             'noise_floors': dict(self.noise_floors), 'warnings': list(self.warnings)}
 
@@ -158,6 +187,7 @@ class Diagnosis:
 def diagnose(
     model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
     progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
+    as_it_is: bool = False,
 ) -> Diagnosis:
     """Return which physical effect a model lacks, as far as recordings can tell.
 
@@ -171,6 +201,8 @@ def diagnose(
     progress : callable, optional
         Called with the share of the work that is done.
     decisions : Decisions, optional
+    as_it_is : bool
+        Whether efforts that look like no measurement are taken for one all the same.
 
     Raises
     ------
@@ -182,10 +214,23 @@ def diagnose(
         raise MotionError('position', 'no drive moves by more than its measured position resolves '
                           f'in {", ".join(one.name for one in recordings)}', 'move: a robot that '
                           'stands tells nothing of friction, masses or delays', 'shape')
+    other = {} if as_it_is else looks_like(model, recordings)
+    if other:
+        answer = _Answer(without_search(model, recordings, decisions, report), validate, decisions,
+                         claims=False)
+        return replace(answer.diagnosis(()), verdict='unknown', depends_on=(), warnings=(),
+                       effort_looks_like=other)
     answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share)),
                      validate, decisions)
     unconfirmed: list[FoundEffect] = []
-    while weak := [one for one in answer.effects if not one.is_confirmed]:
+    if any(one.is_impossible for one in answer.effects):
+        # Whatever stands for what cannot be, or beside it, would be as wrong.
+        found = _all_objected(answer.effects)
+        answer = _Answer(answer.ranking.claiming_nothing(), validate, decisions,
+                         claims=False)
+        report(1.0)
+        return replace(answer.diagnosis(found), verdict='unknown')
+    while weak := [one for one in answer.effects if one.objection or not one.is_confirmed]:
         unconfirmed.append(min(weak, key=lambda one: one.evidence))
         gone = answer.ranking.order[answer.effects.index(unconfirmed[-1])]
         answer = _Answer(answer.ranking.less(gone), validate, decisions)
@@ -194,11 +239,19 @@ def diagnose(
     return diagnosis
 
 
+def _all_objected(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
+    """Return effects of which one cannot be: that first, and the others as found beside it."""
+    impossible = [one for one in effects if one.is_impossible]
+    beside = listed([one.name for one in impossible])
+    return (*impossible, *(replace(one, objection=f'it was found beside {beside}, which cannot be')
+                           for one in effects if not one.is_impossible))
+
+
 class _Answer:
     """What is to be said of a ranking."""
 
     def __init__(self, ranking: Ranking, validate: Sequence[Recording],
-                 decisions: Decisions) -> None:
+                 decisions: Decisions, claims: bool = True) -> None:
         self.ranking, self.validate, self.decisions = ranking, validate, decisions
         self.fits, self.best, self.kept = ranking.last, ranking.best, ranking.kept
         self.design = self.fits.design
@@ -207,18 +260,22 @@ class _Answer:
         self.remaining = ranking.first.design.residuals.measured - exact_forces(
             self.design, self.final.model)
         # Before a constant form is believed.
-        self.dated_fits, self.dated = with_courses(self.fits, self.kept, ranking.alone.values())
-        self.is_dated = self.dated is not self.kept
+        self.dated_fits, self.dated = with_courses(
+            self.fits, self.kept, ranking.alone.values()) if claims else (self.fits, self.kept)
+        self.is_dated, self.adopted = self.dated is not self.kept, self.final.model
         if self.is_dated:
             self.remaining = linear_residual(self.dated_fits, self.dated)
+            self.adopted = self._dated_model()
         self.effects = self._dated_effects() if self.is_dated else self._effects()
 
     def diagnosis(self, unconfirmed: tuple[FoundEffect, ...]) -> Diagnosis:
         first, final, effects = self.ranking.first.design, self.final, self.effects
         regression = self.fits.regression
         noise = {self.drives[d]: one for d, one in regression.noise(self.best.fit).items()}
-        floors = {self.drives[d]: regression.noise_floor(self.best.fit, d)
-                  for d in regression.drives}
+        seen = noise_floors(self.fits, blocks=self.best.fit.blocks)
+        # Where the noise cannot be told it is at most what the best set leaves.
+        floors = {self.drives[d]: seen.get(self.drives[d], regression.noise_floor(
+            self.best.fit, d)) for d in regression.drives}
         rivals = self._rivals()
         if self.is_dated:
             # What imitates a constant form is no rival of one that changes.
@@ -228,10 +285,10 @@ class _Answer:
         if self.is_dated:
             depends = (*self._passing(), *depends)
         sets = tuple((name, *others) for name, others in rivals.items() if others)
-        # Where nothing was found, what is left is the noise.
-        above = self._above_noise(floors) if effects or unconfirmed else {}
+        above = self._above_noise(floors)
+        little = little_explained(self.adopted, first.residuals, self.remaining, self.decisions)
         passing = any(one.course is not None and one.course.kind != SINCE for one in effects)
-        verdict = ('unknown' if depends or above or passing else 'ambiguous' if sets
+        verdict = ('unknown' if depends or above or little or passing else 'ambiguous' if sets
                    else 'effect' if effects else 'adequate')
         moved = [one for one in calibrations(final.fits, final.found, final.widths)
                  if abs(one.after - one.before) > self.decisions.sure * one.std]
@@ -239,12 +296,13 @@ class _Answer:
         return Diagnosis(
             verdict, tuple(effects), sets, unconfirmed, self._candidates(),
             self._suspects(), depends, tuple(map(self._within_model_error, remainders)),
-            self._sets(),
-            tuple(moved), find_cautions(self.fits, self.best, effects), first.notes,
-            first.given, self._dated_model() if self.is_dated else final.model,
-            first.residuals, self.remaining, noise, floors,
-            root_mean_square(list(floors.values())), above,
-            'validation' if self.validate else 'blocks', self.ranking, self.decisions)
+            self._sets(), self._barred(), tuple(moved),
+            find_cautions(self.fits, self.best, effects), first.notes,
+            first.given, self.adopted, first.residuals, self.remaining, noise, floors,
+            root_mean_square(list(floors.values())), above, little,
+            tuple(name for name in floors if name not in seen),
+            'validation' if self.validate else 'blocks', selection=self.ranking,
+            decisions=self.decisions)
 
     def _effects(self) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""
@@ -266,15 +324,21 @@ class _Answer:
         for k, candidate in enumerate(ordered):
             last = next(c for c in final.found.effects if c.effect is candidate.effect)
             said = averaged(estimate(final.fits, final.found, last), self._nearly(candidate))
+            without = self._told(self.ranking.best_without(candidate),
+                                 self.ranking.best_with(candidate))
+            impossible = why_impossible(
+                candidate.effect, said.parameters, self.design, self.decisions)
             found.append(FoundEffect(
                 candidate.effect, self.design.named(candidate.drives), said.parameters,
                 final.fits.library.force(final.found, last, self.remaining.shape),
-                self._evidence(candidate), errors[k], errors[k + 1], held_out[k], held_out[k + 1],
+                without.cost, errors[k], errors[k + 1], held_out[k], held_out[k + 1],
                 said.at_bound, self.ranking.shares[k],
                 (errors[k + 1] < errors[k] and (
                     held_out[k + 1] < held_out[k]
                     or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
-                or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1])))
+                or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1]),
+                impossible or why_nothing(candidate.effect, said.parameters), bool(impossible),
+                without))
         return found
 
     def _dated_effects(self) -> list[FoundEffect]:
@@ -296,7 +360,8 @@ class _Answer:
                 fits.library.force(found, candidate, self.remaining.shape),
                 fits.evaluate(found.without(candidate)).total - found.total, errors[k],
                 errors[k + 1], held_out[k], held_out[k + 1], said.at_bound,
-                (errors[k] - errors[k + 1]) / errors[0], True, None if course is None else replace(
+                (errors[k] - errors[k + 1]) / errors[0],
+                course=None if course is None else replace(
                     course, begin=course.begin - begun, end=course.end - begun)))
         return effects
 
@@ -369,9 +434,17 @@ class _Answer:
 
     def _above_noise(self, floors: Mapping[str, float]) -> dict[str, float]:
         """Return the drives that keep an error above their noise, as multiples of it."""
-        kept = {self.drives[d]: root_mean_square(self.remaining[:, d]) / max(
+        # A constant that slow noise would show as well is none of it.
+        kept = {self.drives[d]: float(np.nanstd(self.remaining[:, d])) / max(
             floors[self.drives[d]], 1e-300) for d in self.fits.regression.drives}
-        return {name: ratio for name, ratio in kept.items() if ratio > self.decisions.left_ratio}
+        return {name: ratio for name, ratio in kept.items() if ratio > self.decisions.left_ratio
+                and self._is_worth_a_word(self.drives.index(name))}
+
+    def _is_worth_a_word(self, d: int) -> bool:
+        """Return whether what is left on a drive is more than a negligible share of its effort."""
+        effort = self.ranking.first.design.residuals.measured[:, d]
+        return float(np.nanstd(self.remaining[:, d])) > (
+            self.decisions.negligible * float(np.nanstd(effort)))
 
     def _evidence(self, candidate: Candidate) -> float:
         return self.ranking.without[candidate].total - self.kept.total
@@ -426,17 +499,29 @@ class _Answer:
         if self.is_dated:
             # Those of the search are of constant forms.
             return (RankedSet(tuple((c.name, self.design.named(c.drives))
-                                    for c in self.dated.candidates), 0.0),)
+                                    for c in self.dated.candidates), CostTerms()),)
+        # Of a set that bends nothing the cost is that in the first design.
+        best, *others = self._of_each_name(self.ranking.sets, MOST_SETS)
+        return (best, *sorted(others, key=lambda one: one.cost))
+
+    def _barred(self) -> tuple[RankedSet, ...]:
+        """Return the sets that would be rivals, or better, and may not be."""
+        return self._of_each_name(self.ranking.barred(self.decisions.rival_margin), MOST_BARRED)
+
+    def _of_each_name(self, sets: Iterable[CandidateSet], most: int) -> tuple[RankedSet, ...]:
+        """Return the first set of every choice of names."""
         found: dict[frozenset[str], RankedSet] = {}
-        for one in self.ranking.sets:
-            names = tuple((c.name, self.design.named(c.drives)) for c in one.candidates)
-            key = frozenset(name for name, _ in names)
-            if key not in found:
-                # Of a set that bends nothing the cost is that in the first design.
-                found[key] = RankedSet(names, max(one.cost - self.best.cost, 0.0))
-            if len(found) == MOST_SETS:
+        for one in sets:
+            told = self._told(one, self.best)
+            found.setdefault(frozenset(name for name, _ in told.names), told)
+            if len(found) == most:
                 break
         return tuple(found.values())
+
+    def _told(self, found: CandidateSet, best: CandidateSet) -> RankedSet:
+        """Return a set against another one."""
+        names = tuple((c.name, self.design.named(c.drives)) for c in found.candidates)
+        return RankedSet(names, self.ranking.difference(found, best), found.barred)
 
     def _within_model_error(self, remainder: Remainder) -> WithinModelError:
         force = self.fits.library.force(remainder.found, remainder.candidate,
@@ -444,6 +529,10 @@ class _Answer:
         return WithinModelError(
             remainder.candidate.name, self.design.named(remainder.candidate.drives),
             float(np.sqrt(np.mean(force ** 2, axis=0)).max()), remainder.of)
+
+
+def _for_json(shares: Mapping[str, float]) -> dict[str, float | None]:
+    return {name: finite(share) for name, share in shares.items()}
 
 
 def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),

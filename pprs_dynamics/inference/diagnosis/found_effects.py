@@ -10,10 +10,41 @@ from typing import Any
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.search.candidates import SINCE, Course
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 Drives = tuple[str, ...] | None
+
+
+@dataclass(frozen=True)
+class RankedSet:
+    """A set of effects with its cost.
+
+    Parameters
+    ----------
+    names : tuple of (name, drives)
+        Effects, and `unknown, VARIABLE` for patterns of no catalogue.
+    terms : CostTerms
+        Of its cost, less those of the best set.
+    barred : str
+        Why it may not be, whatever it costs; '' where it may.
+    """
+
+    names: tuple[tuple[str, Drives], ...]
+    terms: CostTerms
+    barred: str = ''
+
+    @property
+    def cost(self) -> float:
+        """Above that of the best set; lower is better."""
+        return self.terms.total
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return an entry of `sets` in the JSON."""
+        return {'cost': self.cost, 'terms': self.terms.to_dict(), 'effects': [
+            {'name': name, 'drives': listed(drives)} for name, drives in self.names],
+            **({'barred': self.barred} if self.barred else {})}
 
 
 @dataclass(frozen=True)
@@ -58,7 +89,7 @@ class FoundEffect(FittedEffect):
     Parameters
     ----------
     evidence : float
-        By which the cost of the best set rises without it.
+        By which the best set without it, whatever stands there, costs more than that with it.
     error_before, error_after, held_out_before, held_out_after : float
         [N], with the effects before it, and with it as well.
     at_bound : tuple of str
@@ -70,6 +101,12 @@ class FoundEffect(FittedEffect):
         Whether the error falls with it, and that on held-out data: either their rms, or for
         certain that of each frequency in units of its noise. In the former slow noise and the
         model's own numbers have a share.
+    objection : str
+        Why it is no finding whatever the error does, as a clause; '' where nothing speaks against.
+    is_impossible : bool
+        Whether that is that no machine can have it.
+    without : RankedSet, optional
+        The best set without it, against the best one with it.
     course : Course or None
         When it is there, from the start of the first recording [s]; None: all the time.
     """
@@ -82,6 +119,9 @@ class FoundEffect(FittedEffect):
     at_bound: tuple[str, ...] = ()
     share: float = 0.0
     is_confirmed: bool = True
+    objection: str = ''
+    is_impossible: bool = False
+    without: RankedSet | None = None
     course: Course | None = None
 
     @property
@@ -101,6 +141,7 @@ class FoundEffect(FittedEffect):
                 'course': self.course.kind if self.course else None,
                 'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
                 'evidence': self.evidence,
+                'without': None if self.without is None else self.without.to_dict(),
                 'error_before': self.error_before, 'error_after': self.error_after,
                 'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after}
 
@@ -143,27 +184,6 @@ class RankedEffect:
         """Return the keys of the interface."""
         return {'name': self.name, 'drives': listed(self.drives), 'evidence': self.evidence,
                 'error_after': self.error_after}
-
-
-@dataclass(frozen=True)
-class RankedSet:
-    """A set of effects with its cost.
-
-    Parameters
-    ----------
-    names : tuple of (name, drives)
-        Effects, and `unknown, VARIABLE` for patterns of no catalogue.
-    cost : float
-        Above that of the best set; lower is better.
-    """
-
-    names: tuple[tuple[str, Drives], ...]
-    cost: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return an entry of `sets` in the JSON."""
-        return {'cost': self.cost, 'effects': [
-            {'name': name, 'drives': listed(drives)} for name, drives in self.names]}
 
 
 @dataclass(frozen=True)

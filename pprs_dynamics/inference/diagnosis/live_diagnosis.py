@@ -24,7 +24,11 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
-from pprs_dynamics.inference.diagnosis.quantities import with_drives, with_uncertainty
+from pprs_dynamics.inference.diagnosis.quantities import (
+    with_drives,
+    with_uncertainty,
+    word_little,
+)
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import (
@@ -176,7 +180,9 @@ class LiveDiagnosis:
                 'confirmed': bool(self.claimed),
                 'since': min((effect.since for effect in self.claimed
                               if effect.since is not None), default=None),
-                'text': '; '.join(effect.sentence(self.model.drives) for effect in self.claimed),
+                'text': '; '.join(filter(None, [
+                    word_little(content.get('little_explained', {}), ' with what was found'),
+                    *(effect.sentence(self.model.drives) for effect in self.claimed)])),
                 'window': [self.last.start, self.last.end] if self.last else None,
                 'note': self.note}
 

@@ -17,6 +17,7 @@ from statistics import NormalDist
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.diagnosis.quantities import in_unit, plain
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_scatter, word_statement
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
@@ -47,10 +48,13 @@ class DriveFindings:
     statements : tuple of Statement
     noise : NoiseSpectrum or None
         Of what remains; None with too few samples to search.
+    patterns : tuple of (k, M) arrays
+        Of the statements, sample by sample.
     """
 
     statements: tuple[Statement, ...]
     noise: NoiseSpectrum | None
+    patterns: tuple[Array, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -65,6 +69,11 @@ class Localisation:
 
     statements: tuple[Statement, ...]
     drives: dict[str, DriveFindings]
+
+    @property
+    def patterns(self) -> dict[str, tuple[Array, ...]]:
+        """The patterns that were found on each drive, (k, M) each."""
+        return {name: found.patterns for name, found in self.drives.items()}
 
 
 def localise(residuals: Residuals, progress: Callable[[float], None] | None = None,
@@ -117,8 +126,10 @@ def levels(residuals: Residuals, noises: dict[str, NoiseSpectrum | None],
             share = square / noise.rms ** 2
             found[name] = Statement(
                 name, 'time', None, float(min(share, 1.0)), 1.0,
-                f'{name}: its error drifts {ratio / usual:.1f} times as much as that of the other '
-                f'drives, {np.sqrt(square):.2g} N rms, with no pattern that stands out',
+                f'{name}: its error drifts by '
+                f'{in_unit(float(np.sqrt(square)), residuals.units_of(name).effort, 2)} rms, with '
+                f'no pattern that stands out: beside its fast noise that is '
+                f'{plain(ratio / usual, 2)} times as much as on the other drives',
                 0.0, 'level', float(np.sqrt(square)), float(square))
     return found
 
@@ -136,6 +147,7 @@ def _search(residuals: Residuals, drive: int) -> DriveFindings:
     fit = regression.fit(())
     statements: list[Statement] = []
     blocks: list[Block] = []
+    patterns: list[Array] = []
     while len(statements) < MOST_STATEMENTS:
         winner = _best(library, fit, blocks, {one.variable for one in statements})
         if winner is None:
@@ -143,12 +155,13 @@ def _search(residuals: Residuals, drive: int) -> DriveFindings:
         candidate, found, evidence, rivals = winner
         statements.append(word_statement(library, candidate, found.of(candidate.parts[drive]),
                                          evidence, rivals))
+        patterns.append(candidate.rows[drive])
         blocks += [*candidate.blocks, *_carried(library, candidate)]
         fit = regression.fit(blocks, found.amplitudes)
     scatter = _scatter(library, fit, {one.variable for one in statements})
     if scatter is not None:
         statements.append(scatter)
-    return DriveFindings(tuple(statements), regression.noise(fit)[drive])
+    return DriveFindings(tuple(statements), regression.noise(fit)[drive], tuple(patterns))
 
 
 def _best(library: PatternLibrary, fit: JointFit, blocks: list[Block], stated: set[str],
@@ -227,7 +240,8 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str]) -> Statem
         members = family.columns > 0.5
         inside = family.weights @ members.sum(axis=1)
         totals = family.weights @ (members @ scores)
-        gains = totals ** 2 / np.maximum(inside * (1 - inside / n), 1e-9) - library.price(family)
+        gains = (totals ** 2 / np.maximum(inside * (1 - inside / n), 1e-9)
+                 - library.price(family).total)
         for at in np.argsort(-gains):
             pattern, gain = family.patterns[at], float(gains[at])
             if gain <= max(0.0, best[0] if best else 0.0):
@@ -250,7 +264,7 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str]) -> Statem
         centred[part] -= centred[part].mean()
     lags = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2)[:200]
     worth = 1 / max(1 + 2 * float(np.maximum(lags[1:] / lags[0], 0.0)[:20].sum()), 1.0)
-    price = library.prices.of_pattern(1, 1, 1)
+    price = library.prices.of_pattern(1, 1, 1).total
     score = worth * (gain + price) - price
     return word_scatter(library, variable, pattern, column, score) if score > 0 else None
 

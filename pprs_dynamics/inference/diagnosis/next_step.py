@@ -6,15 +6,25 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from pprs_dynamics.inference.diagnosis.quantities import listed
+from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
+from pprs_dynamics.physics.model.arm_model import ArmModel
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
-    from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+    from collections.abc import Sequence
 
+    from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+    from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
+    from pprs_dynamics.physics.model.force_model import ForceModel
+
+OWN_FRICTION = ('friction.viscous', 'friction.coulomb')  # of an arm's model file
 SECOND = 'SECOND_RECORDING'  # that is still to be made
 
 
@@ -59,8 +69,36 @@ class GivenFiles:
 PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made without files
 
 
+def first_step(model: ForceModel, files: GivenFiles) -> tuple[str, str]:
+    """Return what to do before anything else where a model explains little, and the command.
+
+    A description alone, without friction and with the maker's masses, is fitted first.
+    """
+    if isinstance(model, ArmModel):
+        bare = not any(np.any(model.values[key]) for key in OWN_FRICTION)
+        words = ('The model has no friction yet: fit inertia and friction first' if bare else
+                 'Check units, signs and zeros, and that this is the model of this machine as it '
+                 'was recorded; then fit it')
+        return words, files.command('fit', '--output', 'base.yaml')
+    return ('Check units, signs and zeros, and that this is the model of this machine as it was '
+            'recorded', files.command('info'))
+
+
+def measure_first(findings: Sequence[NoMeasurement], files: GivenFiles) -> tuple[str, str]:
+    """Return what to do where efforts are no measurement, and the command that goes on."""
+    lines = dict.fromkeys(one.line for one in findings if one.line)
+    say = ('; where it is what it looks like, write '
+           f'{listed(tuple(lines), "or")} into the model file' if lines else '')
+    return (f'Record the effort that is measured{say}. Where it is measured all the same',
+            files.command('diagnose', '--as-it-is'))
+
+
 def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     """Return what to do next, and the command for it."""
+    if diagnosis.effort_looks_like:
+        return measure_first(list(diagnosis.effort_looks_like.values()), files)
+    if diagnosis.little:
+        return first_step(diagnosis.model, files)
     repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
     if diagnosis.depends_on:
         if (curve := _curve(diagnosis)) is not None:
@@ -69,6 +107,11 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                         'adopt', curve, '--output', 'with_curve.yaml', held_out=True))
         return ('Look at that place on the machine, and record the motion again: what comes back '
                 'is the machine. Then diagnose both recordings', repeat)
+    if diagnosis.verdict == 'ambiguous' and all(
+            _need_another_load(names) for names in diagnosis.indistinguishable):
+        return ('Repeat the motion with another load, or in a posture in which the drive carries '
+                'more: only friction by load grows with it. Then diagnose that recording with the '
+                'load in the model', replace(files, recordings=(SECOND,)).command('diagnose'))
     if diagnosis.verdict == 'ambiguous':
         return ('Record a motion that tells the candidates apart; this designs it',
                 files.command('next-experiment', '--output', 'next.csv'))
@@ -88,6 +131,11 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                 repeat)
     return ('Nothing to add. Another motion may show what this one does not excite',
             replace(files, recordings=(SECOND,)).command('diagnose'))
+
+
+def _need_another_load(names: Sequence[str]) -> bool:
+    effect = find_effect(names[0])
+    return effect is not None and list(names[1:]) == [effect.at_one_load]
 
 
 def _curve(diagnosis: Diagnosis) -> str | None:

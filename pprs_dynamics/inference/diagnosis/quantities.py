@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import floor, inf, isfinite, log10, pi
 
 INTERVAL = 2.0  # standard deviations that ± stands for, about 95 %
@@ -14,6 +14,8 @@ READ_IN = {'m': (1.0, 1e3, 'mm'), 'm/s': (1.0, 1e3, 'mm/s'), 's': (0.1, 1e3, 'ms
            'kg': (0.1, 1e3, 'g'), 'rad': (inf, 180 / pi, '°')}
 PRINTED = {'1': '', 'kg m^2': 'kg m²', 'N s^2/m^2': 'N s²/m²', 'm/s^2': 'm/s²',
            'N m s^2/rad^2': 'N m s²/rad²', 'rad/s^2': 'rad/s²'}
+RESOLVED = 1e-9  # of any quantity in SI units, below which a number is rounding
+MOST_TOLD = 3  # drives of whose effort little is explained, in a sentence
 COUNTS = ('no', 'one', 'two', 'three', 'four', 'five', 'six')
 
 
@@ -26,9 +28,9 @@ def with_uncertainty(value: float, std: float, unit: str) -> str:
     name = name if name in ('', '°') else f' {name}'
     value, spread = value * factor, INTERVAL * std * factor
     if not isfinite(spread):
-        return f'{value:.3g}{name} (not determined)'
-    if spread <= 0:
-        return f'{value:.4g}{name}'
+        return f'{plain(value)}{name} (not determined)'
+    if spread < RESOLVED:
+        return f'{plain(value, 4)}{name}'
     decimals = 1 - floor(log10(spread))
     digits = max(decimals, 0)
     return f'{round(value, decimals):.{digits}f} ± {round(spread, decimals):.{digits}f}{name}'
@@ -40,12 +42,28 @@ def in_unit(value: float, unit: str = 'N', digits: int = 3) -> str:
 
 
 def plain(value: float, digits: int = 3) -> str:
-    """Return a number with as many digits, never as a power of ten."""
-    if not isfinite(value) or value == 0:
-        return f'{value:g}'
-    decimals = max(digits - 1 - floor(log10(abs(value))), 0)
-    text = f'{value:.{decimals}f}'
+    """Return a number with as many digits, never as a power of ten; 0 below what is resolved."""
+    if not isfinite(value) or abs(value) < RESOLVED:
+        return f'{value:g}' if not isfinite(value) else '0'
+    text = f'{value:.{_decimals(value, digits)}f}'
     return text.rstrip('0').rstrip('.') if '.' in text else text
+
+
+def rounded_as(value: float, other: float, sign: str = '') -> str:
+    """Return a number to the place at which another of its kind has three digits."""
+    decimals = _decimals(other, 3) if isfinite(other) and abs(other) >= RESOLVED else 0
+    text = f'{value:{sign}.{decimals}f}'
+    return text if float(text) else f'{0:.{decimals}f}'
+
+
+def _decimals(value: float, digits: int) -> int:
+    return max(digits - 1 - floor(log10(abs(value))), 0)
+
+
+def with_sign(value: float, digits: int = 3) -> str:
+    """Return a number as `plain` does, with its sign; 0 has none."""
+    text = plain(value, digits)
+    return f'+{text}' if value > 0 and text != '0' else text
 
 
 def percent(share: float) -> str:
@@ -62,6 +80,31 @@ def change(before: float, after: float, unit: str = 'N') -> str:
                 'after)')
     digits = next((n for n in range(3, 7) if plain(before, n) != plain(after, n)), 6)
     return f'falls from {in_unit(before, unit, digits)} to {in_unit(after, unit, digits)}'
+
+
+def word_little(little: Mapping[str, float], after: str = '') -> str:
+    """Return 'the model explains 14% of the effort of shoulder, …', '' where there is none.
+
+    Parameters
+    ----------
+    little : mapping of str to float
+        See `little_explained`.
+    after : str, optional
+        What stands behind 'the model', e.g. ' with what was found'.
+    """
+    if not little:
+        return ''
+    said = [f'{_of_effort(share)} of the effort of {name}' if not place else
+            f'{_of_effort(share)} of that of {name}'
+            for place, (name, share) in enumerate(list(little.items())[:MOST_TOLD])]
+    more = len(little) - MOST_TOLD
+    if more > 0:
+        said.append(f'less than half of that of {more} more')
+    return f'the model{after} explains {listed(said)}'
+
+
+def _of_effort(share: float) -> str:
+    return 'nothing' if share < 0.005 else f'{100 * share:.0f}%'
 
 
 def name_drives(drives: Sequence[str], every: Sequence[str]) -> str:

@@ -15,6 +15,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     FittedEffect,
     FoundEffect,
     RankedEffect,
+    RankedSet,
     RivalEffect,
     WithinModelError,
 )
@@ -29,6 +30,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     sentence,
     with_drives,
     with_uncertainty,
+    word_little,
 )
 from pprs_dynamics.inference.diagnosis.statements import (
     Statement,
@@ -37,12 +39,16 @@ from pprs_dynamics.inference.diagnosis.statements import (
     place_on,
 )
 from pprs_dynamics.inference.search.candidates import SINCE
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
 
 MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
+TOLD_COST = 0.05  # of a term of a cost, that one digit shows
+# Times the size that matters, an uncertainty beyond which, and beyond the value, nothing is known.
+ANYTHING = 100.0
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
 
 
@@ -81,7 +87,10 @@ class FittedValue:
 
     @property
     def text(self) -> str:
-        """Value with uncertainty and unit as people read it."""
+        """Value with uncertainty and unit as people read it; none where it may be anything."""
+        known = max(abs(self.estimate.value), ANYTHING * self.parameter.scale)
+        if INTERVAL * self.estimate.std > known:
+            return 'not determined by this motion'
         return with_uncertainty(self.estimate.value, self.estimate.std, self.estimate.unit)
 
 
@@ -99,7 +108,7 @@ class Sentences:
         In the order of those given to `word_diagnosis`.
     unexplained : tuple of Finding
         In the order of `unexplained_groups`.
-    suspects, within_model_error, calibrated, warnings : tuple of str
+    suspects, within_model_error, barred, calibrated, warnings : tuple of str
     following, command : str
         What to do next, in words and for a shell.
     """
@@ -110,6 +119,7 @@ class Sentences:
     unexplained: tuple[Finding, ...]
     suspects: tuple[str, ...]
     within_model_error: tuple[str, ...]
+    barred: tuple[str, ...]
     calibrated: tuple[str, ...]
     warnings: tuple[str, ...]
     following: str
@@ -137,6 +147,8 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
               for group in unexplained_groups(diagnosis)),
         tuple(_suspect(diagnosis, one) for one in diagnosis.suspects),
         tuple(_within_model_error(diagnosis, one) for one in diagnosis.within_model_error),
+        tuple(f'{_set(diagnosis, one)} may not be, whatever it costs: {one.barred}. It '
+              f'{_cost(one)}' for one in diagnosis.barred),
         tuple(_calibrated(diagnosis, one) for one in diagnosis.calibrated),
         diagnosis.warnings, following, command)
 
@@ -154,17 +166,32 @@ def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
     return [one for effect in diagnosis.effects for one in _fitted(diagnosis, effect)]
 
 
-def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
-    """Return the best sets of effects in words, each with its cost above the best."""
-    every = diagnosis.residuals.drives
-    return [(' and '.join(with_drives(_plain_name(name), drives, every)
-                          for name, drives in one.names) or 'nothing missing',
-             f'+{plain(one.cost, 2)}' if number else 'the best')
-            for number, one in enumerate(diagnosis.sets)]
+def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
+    """Return the best sets of effects in words, each with its cost above the best, and of what."""
+    return [(_set(diagnosis, one), f'{one.cost:+.1f}' if number else 'the best',
+             word_terms(one.terms)) for number, one in enumerate(diagnosis.sets)]
+
+
+def _set(diagnosis: Diagnosis, found: RankedSet) -> str:
+    return ' and '.join(with_drives(_plain_name(name), drives, diagnosis.residuals.drives)
+                        for name, drives in found.names) or 'nothing missing'
+
+
+def word_terms(terms: CostTerms) -> str:
+    """Return the terms of a difference of costs, those that can be seen."""
+    return ', '.join(f'{name} {"-" if value < 0 else "+"} {abs(value):.1f}'
+                     for name, value in terms.to_dict().items() if abs(value) >= TOLD_COST)
+
+
+def _cost(found: RankedSet) -> str:
+    """Return how much more a set costs, and of what."""
+    why = word_terms(found.terms)
+    return (f'costs {abs(found.cost):.1f} {"less" if found.cost < 0 else "more"}'
+            + (f': {why}' if why else ''))
 
 
 def runner_up(diagnosis: Diagnosis) -> str:
-    """Return how the second best set differs from the best, with its cost; '' for none."""
+    """Return how the second best set differs from the best, and its costs; '' for none."""
     if len(diagnosis.sets) < 2:
         return ''
     best, second = (set(one.names) for one in diagnosis.sets[:2])
@@ -179,17 +206,25 @@ def runner_up(diagnosis: Diagnosis) -> str:
     words = [f'{put} instead of {left}' if put and left else f'{put} as well' if put
              else f'without {left}' if left else '',
              f'{listed(sorted(moved))} on other drives' if moved else '']
-    return ', '.join([*filter(None, words), f'cost +{plain(diagnosis.sets[1].cost, 2)}'])
+    return f'{", ".join(filter(None, words))}: {_cost(diagnosis.sets[1])}'
 
 
 def _headline(diagnosis: Diagnosis) -> str:
     held, unit = diagnosis.effects, diagnosis.residuals.unit
     named = listed([_or_rivals(diagnosis, one) for one in held])
     doubt = _doubt(diagnosis)
+    if diagnosis.effort_looks_like:
+        told = dict.fromkeys(one.what for one in diagnosis.effort_looks_like.values())
+        return f'{" ".join(map(sentence, told))} No effect is claimed.'
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
         f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')
     noise = in_unit(diagnosis.noise_floor, unit)
+    if diagnosis.little:
+        little = word_little(diagnosis.little, ' with what was found' if held else '')
+        beside = f' What was found: {named}.{fall}.' if held else ''
+        return (f'{little[:1].upper()}{little[1:]}, and no effect of the catalogue the rest.'
+                f'{beside}{doubt}')
     if not held and not diagnosis.depends_on and diagnosis.unconfirmed:
         left = root_mean_square(diagnosis.remaining)
         lacks = 'Something is missing. ' if diagnosis.verdict == 'unknown' else ''
@@ -209,11 +244,16 @@ def _headline(diagnosis: Diagnosis) -> str:
         beside = f' Beside it, the model lacks {named}.{fall}, not to the noise.' if held else ''
         return ('Something is missing that no effect of the catalogue explains: '
                 f'{places}.{beside}{doubt}')
+    unseen = (f'How much of the error of {listed(diagnosis.unseen_noise)} is noise cannot be told '
+              'from this recording.') if diagnosis.unseen_noise else ''
     if diagnosis.verdict == 'adequate':
+        if unseen:
+            return f'Nothing stands out. {unseen}'
         return (f'Nothing is missing beyond noise, which is {noise} rms. Effects much weaker than '
                 'that could still hide in it.')
     left = held[-1].error_after
-    level = (', which is the noise.' if left <= AT_NOISE * diagnosis.noise_floor
+    level = (f'. {unseen}' if unseen
+             else ', which is the noise.' if left <= AT_NOISE * diagnosis.noise_floor
              else f'. The noise is {noise}; the rest is within the model error of what was found.'
              if diagnosis.within_model_error
              # Only the widths of reversals are fitted and yet not part of the model.
@@ -228,6 +268,9 @@ def _doubt(diagnosis: Diagnosis) -> str:
     told = []
     for one in diagnosis.unconfirmed:
         title = _title(diagnosis, one)
+        if one.objection:
+            told.append(f' {title} was fitted as well and is no finding: {one.objection}.')
+            continue
         on, before, after = (
             'the error', one.error_before, one.error_after) if (
             one.error_after >= one.error_before) else (
@@ -324,7 +367,10 @@ def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
                      '--validate is the stronger' if is_first else ' (the weaker evidence)')
     return (f'It takes away {percent(found.share)} of the error, each drive in units of its noise. '
             f'With it the error {change(found.error_before, found.error_after, unit)}. '
-            f'{held_out}. Evidence {found.evidence:.0f}, where 0 is the threshold.')
+            f'{held_out}. Evidence {found.evidence:.0f}, where 0 is the threshold'
+            + ('.' if found.without is None else
+               f': the best set without it, {_set(diagnosis, found.without)}, '
+               f'{_cost(found.without)}.'))
 
 
 def _remarks(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:

@@ -13,7 +13,12 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
-from pprs_dynamics.inference.diagnosis.quantities import listed, sentence
+from pprs_dynamics.inference.diagnosis.quantities import (
+    listed,
+    plain,
+    sentence,
+    with_sign,
+)
 from pprs_dynamics.inference.search.candidates import UnknownCandidate
 from pprs_dynamics.inference.search.patterns import Pattern
 from pprs_dynamics.inference.search.unknown import PatternLibrary
@@ -205,32 +210,32 @@ def _sentence(
     units = residuals.units_of(residuals.drives[library.d])
     effort = units.effort
     if kind == 'offset':
-        return (f'its error has a mean of {signed:+.3g} {effort} over the whole recording, '
+        return (f'its error has a mean of {with_sign(signed)} {effort} over the whole recording, '
                 f'{share:.0%} of its squared error')
     if kind == 'friction':
-        return (f'its error has the sign of the motion, {amplitude:.3g} {effort}: friction is too '
-                f'{"small" if signed > 0 else "large"} in the model; this is {share:.0%} of its '
-                'squared error')
+        return (f'its error has the sign of the motion, {plain(amplitude)} {effort}: friction is '
+                f'too {"small" if signed > 0 else "large"} in the model; this is {share:.0%} of '
+                'its squared error')
     if kind == 'ripple':
         factor, place = read_in('position', units)
-        return (f'its error repeats about every {pattern.scale * factor:.3g} {place} of position, '
-                f'{amplitude:.3g} {effort}; this is {share:.0%} of its squared error')
+        return (f'its error repeats about every {plain(pattern.scale * factor)} {place} of '
+                f'position, {plain(amplitude)} {effort}; this is {share:.0%} of its squared error')
     if kind == 'line':
-        return (f'its error holds a vibration at {pattern.scale:.4g} Hz of {amplitude:.3g} '
-                f'{effort}, {share:.0%} of its squared error')
+        return (f'its error holds a vibration at {plain(pattern.scale, 4)} Hz of '
+                f'{plain(amplitude)} {effort}, {share:.0%} of its squared error')
     if kind in ('growth', 'directed_growth'):
         opposed = ' in the direction of motion' if kind == 'directed_growth' else ''
         low, high = _ends(library, variable, shape, kind == 'directed_growth')
-        return (f'its error changes with {word}: {low:+.3g} {effort} at its least, '
-                f'{high:+.3g} {effort} at its greatest{opposed}; this is '
+        return (f'its error changes with {word}: {with_sign(low)} {effort} at its least, '
+                f'{with_sign(high)} {effort} at its greatest{opposed}; this is '
                 f'{share:.0%} of its squared error')
     place = _place(variable, pattern, library)
     where = f'{share:.0%} of its squared error lies {place}, in {time:.0%} of the time'
     if kind == 'scatter':
-        return (f'{where}; it scatters there {np.sqrt(pattern.scale):.2g} times as much as '
-                'elsewhere')
+        return (f'{where}; it scatters there {plain(float(np.sqrt(pattern.scale)), 2)} times as '
+                'much as elsewhere')
     along = ' in the direction of motion' if kind in ('directed_range', 'fading') else ''
-    return f'{where}; it is shifted there by {signed:+.3g} {effort}{along}'
+    return f'{where}; it is shifted there by {with_sign(signed)} {effort}{along}'
 
 
 def _place(variable: str, pattern: Pattern, library: PatternLibrary) -> str:
@@ -248,10 +253,10 @@ def _place(variable: str, pattern: Pattern, library: PatternLibrary) -> str:
         values, low = np.abs(values), max(low, 0.0)
     below, above = high < values.max(), low > values.min() and not (speed and low <= 0)
     if below and (not above or (word.startswith('speed') and low <= 0)):
-        return f'at a {word} below {high * factor:.3g} {unit}'
+        return f'at a {word} below {plain(high * factor)} {unit}'
     if above and not below:
-        return f'at a {word} above {low * factor:.3g} {unit}'
-    return f'at a {word} between {low * factor:.3g} and {high * factor:.3g} {unit}'
+        return f'at a {word} above {plain(low * factor)} {unit}'
+    return f'at a {word} between {plain(low * factor)} and {plain(high * factor)} {unit}'
 
 
 def _ends(

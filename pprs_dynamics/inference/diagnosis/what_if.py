@@ -240,7 +240,7 @@ class _System:
                   for column in self.columns[block]),
             tuple((column, effect.unphysical_below[name]) for name, column in zip(
                 placement.names, self.columns[own[0]], strict=False) if name in placement.signed),
-            self.fits.library.component_price(placement)
+            self.fits.library.component_price(placement).total
             - sum(float(np.linalg.slogdet(one.precision)[1]) for one in free),
             tuple(sorted(map(str, effect.hypotheses(placement.names)))))
 

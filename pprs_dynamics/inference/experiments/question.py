@@ -205,7 +205,7 @@ def _estimation(fits: FittedSets, adopted: CandidateSet) -> Question:
     parts = [terms.of_candidate(adopted, c) for c in adopted.effects]
     plan = ColumnPlan.of_design(fits.design, terms.all)
     samples = fits.library.prices.samples
-    subjects = [_explanation([c.name], own, plan, fits.library.price(c) + sum(
+    subjects = [_explanation([c.name], own, plan, fits.library.price(c).total + sum(
         len(term.names) for term, _ in own) * log(samples))
         for c, own in zip(adopted.effects, parts, strict=True)]
     return _asked('estimate', fits, adopted, plan, precision_of(plan, subjects), (), subjects)

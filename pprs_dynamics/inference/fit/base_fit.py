@@ -17,14 +17,20 @@ from pprs_dynamics.inference.fit.arm_fit import ArmFit, columns_of, fit_arm
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.sensitivities import model_numbers
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import calibrations
+from pprs_dynamics.inference.search.explained_effort import (
+    explained_shares,
+    little_explained,
+)
 from pprs_dynamics.inference.search.fitted_model import fitted_model
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.relinearisation import relinearised
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.system.numbers import finite
 
 RECORDINGS, HALVES, VALIDATION = 'recordings', 'halves', 'validation'
 
@@ -65,6 +71,10 @@ class BaseFit:
         that took no part in a fit.
     held_out_on : {'recordings', 'halves', 'validation'}
         Each recording, or half of the only one, predicted from the others; or the validation.
+    explained_before, explained : dict of str to float
+        Share of each drive's effort that the model explained, and that the fitted one explains.
+    little : dict of str to float
+        Drives of whose effort the fitted model explains little, with the shares.
     """
 
     model: ForceModel
@@ -74,12 +84,18 @@ class BaseFit:
     after: dict[str, float]
     held_out: dict[str, float]
     held_out_on: str
+    explained_before: dict[str, float]
+    explained: dict[str, float]
+    little: dict[str, float]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the fit for JSON."""
         return {'numbers': [one.to_dict() for one in self.numbers], 'notes': list(self.told),
                 'error_before': self.before, 'error_after': self.after,
-                'held_out': self.held_out, 'held_out_on': self.held_out_on}
+                'held_out': self.held_out, 'held_out_on': self.held_out_on,
+                'explained_before': {name: finite(one)
+                                     for name, one in self.explained_before.items()},
+                'explained': {name: finite(one) for name, one in self.explained.items()}}
 
 
 def fit_base(model: ForceModel, recordings: Sequence[Recording],
@@ -118,8 +134,10 @@ def fit_base(model: ForceModel, recordings: Sequence[Recording],
                    for k, part in enumerate(parts)]
         held_out = _rms(model, np.concatenate(squares))
     report(0.9)
-    return BaseFit(fitted, numbers, told, errors_of(model, recordings),
-                   errors_of(fitted, recordings), held_out, on)
+    before, after = (measure_residuals(one, recordings)[0] for one in (model, fitted))
+    return BaseFit(fitted, numbers, told, rms_by_drive(before), rms_by_drive(after), held_out, on,
+                   explained_shares(before), explained_shares(after),
+                   little_explained(fitted, after))
 
 
 def require_open_numbers(model: ForceModel) -> None:

@@ -66,7 +66,8 @@ class ColumnCollector:
         s: Any = forces.mechanism
         effort = forces.total - sum((forces.parts[name] for name in self.sensors),
                                     np.zeros_like(forces.total))
-        self.kept.append((s.velocity, s.acceleration, s.direction, s.guide_load, effort))
+        self.kept.append((s.velocity, s.acceleration, s.direction, s.guide_load,
+                          s.transmitted, effort))
         columns = self.sensitivities.columns(forces)
         columns[NUMBERS][self.without_gain] = 0.0
         # Views: copies of all columns at full rate would take longer than their means.
@@ -75,9 +76,9 @@ class ColumnCollector:
 
     def full_rate(self, reconstruction: Reconstruction) -> FullRate:
         """Return what the drives did, with positions as the mechanism has them."""
-        velocity, acceleration, direction, load, effort = (
+        velocity, acceleration, direction, load, transmitted, effort = (
             np.concatenate(arrays) for arrays in zip(*self.kept, strict=True))
         return FullRate(
             reconstruction.time, reconstruction.position, velocity, acceleration, direction, load,
-            effort, reconstruction.effort, reconstruction.segments, reconstruction.treat,
-            reconstruction.start)
+            transmitted, effort, reconstruction.effort, reconstruction.segments,
+            reconstruction.treat, reconstruction.start)

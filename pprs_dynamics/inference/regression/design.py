@@ -243,6 +243,13 @@ class Design:
         """Return whether a drive is in motion for a noteworthy share of the time."""
         return bool(np.mean(self.moving(drive)) >= LEAST_MOVING)
 
+    def load_variation(self, drive: int) -> float:
+        """Return the standard deviation of a drive's load in motion over its mean."""
+        width = TURNED * self.given.reversal.widths(len(self.drives))[drive]
+        load = np.concatenate([one.guide_load[np.abs(one.velocity[:, drive]) > width, drive]
+                               for one in self.recordings])
+        return float(load.std() / load.mean()) if len(load) and load.mean() else 0.0
+
     @cached_property
     def covered(self) -> tuple[DriveRange, ...]:
         """What each drive did."""
@@ -337,8 +344,7 @@ class Design:
         variables = self.residuals.variables
         time = self.residuals.time
         means = DriveSamples(time, variables['position'][:, drive],
-                             variables['velocity'][:, drive], np.zeros_like(time),
-                             np.zeros_like(time), np.zeros_like(time))
+                             variables['velocity'][:, drive], *np.zeros((4, len(time))))
         rows = effect.averaged(means, self.residuals.period, shapes)
         if rows is None:
             return [self.term(effect, drive, shape) for shape in shapes]
@@ -398,9 +404,11 @@ def searched_in_drives(design: Design) -> list[type[DriveEffect]]:
 
 
 def _delay(recording: FullRate, drive: int) -> float:
-    """Return by how much the measured effort is most like the model's if that is late [s].
+    """Return by how much the measured effort is most like the drive's if that is late [s].
 
-    By the cross-correlation over the longest segment, within `LONGEST_DELAY`.
+    By the multiple correlation with the model's effort and what a model may lack most of (dry and
+    viscous friction, inertia), over the longest segment, within `LONGEST_DELAY`: a model that
+    explains little is like nothing by itself.
     """
     part = max(recording.segments, key=lambda one: one.stop - one.start)
     time = recording.time[part]
@@ -411,13 +419,17 @@ def _delay(recording: FullRate, drive: int) -> float:
     known = np.isfinite(measured)
     if not most or not np.any(known):
         return 0.0
-    model, seen = (np.interp(even, t, values) for t, values in (
-        (time, recording.effort[part, drive]), (time[known], measured[known])))
+    seen = np.interp(even, time[known], measured[known])
+    columns = np.stack([np.interp(even, time, values[part, drive]) for values in (
+        recording.effort, recording.velocity, recording.direction, recording.acceleration)])
+    columns -= columns.mean(axis=1, keepdims=True)
+    columns /= np.maximum(np.linalg.norm(columns, axis=1, keepdims=True), 1e-300)
     size = fft.next_fast_len(len(even) + most, real=True)
-    alike = fft.irfft(fft.rfft(seen - seen.mean(), size)
-                      * fft.rfft(model - model.mean(), size).conj(), size)
+    alike = fft.irfft(fft.rfft(seen - seen.mean(), size) * fft.rfft(columns, size).conj(), size)
     lags = np.arange(-most, most + 1)
-    return float(lags[np.argmax(alike[lags])] * step)
+    explained = np.einsum('kl,km,ml->l', alike[:, lags], np.linalg.pinv(columns @ columns.T),
+                          alike[:, lags])
+    return float(lags[np.argmax(explained)] * step)
 
 
 def _rows(column: Array) -> dict[int, Array]:

@@ -271,6 +271,10 @@ class Regression:
         found: Array = np.sqrt(fit.squares.sum(axis=1) / self.counts.sum(axis=1))
         return found
 
+    def misfit(self, fit: JointFit) -> float:
+        """Return the deviance without what the coefficients' prior has in it."""
+        return float(np.sum(self.counts * np.log(fit.spectra) + fit.squares / fit.spectra))
+
     def noise_floor(self, fit: JointFit, d: int) -> float:
         """Return the root of the mean square of a drive's noise over its coefficients [N].
 

@@ -70,6 +70,7 @@ class FullRate:
     acceleration: Array
     direction: Array
     guide_load: Array
+    transmitted: Array
     effort: Array
     effort_measured: Array
     segments: tuple[slice, ...]
@@ -81,7 +82,7 @@ class FullRate:
         return DriveSamples(
             self.time[part], self.position[part, drive], self.velocity[part, drive],
             self.acceleration[part, drive], self.direction[part, drive],
-            self.guide_load[part, drive], memory)
+            self.guide_load[part, drive], self.transmitted[part, drive], memory)
 
 
 @dataclass(frozen=True)

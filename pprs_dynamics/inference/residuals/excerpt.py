@@ -45,7 +45,8 @@ class Excerpt:
     velocity: Array | None
 
 
-def excerpt_of(recording: Recording, time_unit: float = 1.0) -> Excerpt | None:
+def excerpt_of(recording: Recording, time_unit: float = 1.0, stretches: int = STRETCHES,
+               ) -> Excerpt | None:
     """Return an excerpt; None where no stretch is long enough.
 
     Parameters
@@ -53,6 +54,8 @@ def excerpt_of(recording: Recording, time_unit: float = 1.0) -> Excerpt | None:
     recording : Recording
     time_unit : float
         What its times are counted in [s].
+    stretches : int
+        How many are taken at most, evenly over the recording.
     """
     windows = [slice(first, min(first + LONGEST, part.stop)) for part in recording.segments
                for first in range(part.start, part.stop, LONGEST)
@@ -60,7 +63,7 @@ def excerpt_of(recording: Recording, time_unit: float = 1.0) -> Excerpt | None:
                or part.stop - part.start < LONGEST]
     if not windows:
         return None
-    chosen = sorted({round(place) for place in np.linspace(0, len(windows) - 1, STRETCHES)})
+    chosen = sorted({round(place) for place in np.linspace(0, len(windows) - 1, stretches)})
     scaled = replace(
         recording, time=recording.time * time_unit, segments=tuple(windows[k] for k in chosen))
     try:

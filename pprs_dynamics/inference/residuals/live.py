@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.measurement.files.samples import Mask
 from pprs_dynamics.measurement.motion.differentiation import LocalPolynomial
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction, LiveSample
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
@@ -28,6 +29,13 @@ ARM_WINDOW = 0.25  # [s]
 ERROR_SPAN = 2.0  # [s] over which the running error is taken
 # Stamps to see before their step is known; more than a late first message or two.
 STAMPS_TO_LEARN = 50
+# A drive's model explains nothing where its error is that share of what is larger of its effort and
+# the model's, both well above the noise: below it is the size of a friction that is off.
+AS_LARGE, ABOVE_NOISE = 0.9, 5.0
+# Where a drive stands, static friction is any: only a model that says that share of what is
+# measured says anything then.
+SAYS = 0.3
+FEWEST_JUDGED = 50  # samples
 
 
 class Compared(NamedTuple):
@@ -68,9 +76,9 @@ class LiveComparison:
         self._span = span
         self._stamps: list[float] = []
         self._live: LiveReconstruction | None = None
-        self._gaps_before = self._gaps_in_a_row = 0
+        self._gaps_before = self._bridged_before = self._lost_in_a_row = 0
         self._waiting: list[LiveSample] = []
-        self._recent: deque[tuple[float, Array]] = deque()
+        self._recent: deque[tuple[float, Array, Array, Array]] = deque()
         self._model, self._state = model, model.initial_state()
         self.use_model(model)
 
@@ -86,18 +94,25 @@ class LiveComparison:
         """How often the stream was interrupted."""
         return self._gaps_before + (0 if self._live is None else self._live.gaps)
 
+    @property
+    def bridged(self) -> int:
+        """How many single samples were missing, and bridged."""
+        return self._bridged_before + (0 if self._live is None else self._live.bridged)
+
     def push(self, time: float, position: ArrayLike, effort: ArrayLike) -> None:
         """Take one sample, drives in order, as it is recorded; effort NaN means no measurement."""
         if self._live is None:
             self._learn(time)
         if self._live is not None:
-            gaps = self._live.gaps
+            lost = self._live.gaps + self._live.bridged
             sample = self._live.push(time, position, np.asarray(effort) * self._model.recorded_gain)
             if sample is not None:
                 self._waiting.append(sample)
-            self._gaps_in_a_row = self._gaps_in_a_row + 1 if self._live.gaps > gaps else 0
-            if self._gaps_in_a_row == STAMPS_TO_LEARN:  # no gaps: another rate
-                self._gaps_before, self._gaps_in_a_row = self.gaps, 0
+            self._lost_in_a_row = (
+                self._lost_in_a_row + 1 if self._live.gaps + self._live.bridged > lost else 0)
+            if self._lost_in_a_row == STAMPS_TO_LEARN:  # nothing is lost: another rate
+                self._gaps_before, self._bridged_before = self.gaps + 1, self.bridged
+                self._lost_in_a_row = 0
                 self._live, self._stamps = None, []
 
     def evaluate(self) -> Compared | None:
@@ -130,8 +145,10 @@ class LiveComparison:
             # Where a joint stands, its gear holds any torque within its static friction.
             moving = np.abs([sample.velocity for sample in samples]) >= self._model.rest_speed
             residual = np.where(moving, residual, np.nan)
-        for moment, error in zip(time, residual, strict=True):
-            self._recent.append((moment, error))
+        speed = np.abs([sample.velocity for sample in samples])
+        moves = speed >= (self._model.rest_speed or self._model.values.get(
+            'friction.reversal_velocity', 0.0))
+        self._recent.extend(zip(time, residual, model, moves, strict=True))
         # Stamps may go back, too: then what came before them is of another stream.
         while not time[-1] - self._span <= self._recent[0][0] <= time[-1]:
             self._recent.popleft()
@@ -148,8 +165,18 @@ class LiveComparison:
         """Return the root of the mean squared residual of the last span, (D,); NaN: none."""
         if not self._recent:
             return np.full(len(self._model.drives), np.nan)
-        errors = np.stack([error for _, error in self._recent])
+        errors = np.stack([error for _, error, _, _ in self._recent])
         return np.array([root_mean_square(of_drive) for of_drive in errors.T])
+
+    def unexplained(self) -> tuple[str, ...]:
+        """Return the drives whose error of the last span is as large as their effort."""
+        if len(self._recent) < FEWEST_JUDGED:
+            return ()
+        errors, models, moves = (np.stack([row[k] for row in self._recent]) for k in (1, 2, 3))
+        return tuple(
+            drive for drive, error, model, moving in zip(
+                self._model.drives, errors.T, models.T, moves.T, strict=True)
+            if _is_unexplained(error, model, moving))
 
     def _learn(self, time: float) -> None:
         if self._stamps and not time > self._stamps[-1]:
@@ -180,3 +207,16 @@ class LiveComparison:
             self._model.robot.geometry, position, velocity, acceleration, self._seed)
         self._seed = found.motion[-1:]
         return found.motion
+
+
+def _is_unexplained(error: Array, model: Array, moving: Mask) -> bool:
+    """Return whether a model explains nothing of a drive's effort; arrays (n,)."""
+    measured = error + model
+    with np.errstate(invalid='ignore'):  # not measured
+        judged = np.isfinite(error) & (moving | (np.abs(model) >= SAYS * np.abs(measured)))
+    if judged.sum() < FEWEST_JUDGED:
+        return False
+    # Of white noise the differences between neighbours have twice the variance.
+    noise = root_mean_square(np.diff(error[judged])) / np.sqrt(2)
+    size = max(root_mean_square(measured[judged]), root_mean_square(model[judged]))
+    return bool(root_mean_square(error[judged]) >= AS_LARGE * size > ABOVE_NOISE * noise)

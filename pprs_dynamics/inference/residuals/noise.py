@@ -223,9 +223,15 @@ class NoiseSpectrum:
 
     @property
     def fast_rms(self) -> float:
-        """Root of the mean square of what has no corner far below the highest [N]."""
-        fast = np.concatenate(([True], self.corners >= SLOW_SHARE * self.corners[-1]))
-        return replace(self, amplitudes=np.where(fast, self.amplitudes, 0.0)).rms
+        """Root of the mean square of what lies at the higher frequencies [N].
+
+        All shapes reach there, also those of slow noise: it is 0 for no noise that is one.
+        """
+        highest = 0.5 / self.period
+        lowest = min(SLOW_SHARE * self.corners[-1], highest)
+        shares = np.concatenate(([1 - lowest / highest], self.corners / highest * (
+            np.arctan(highest / self.corners) - np.arctan(lowest / self.corners))))
+        return float(np.sqrt(self.amplitudes @ shares))
 
 
 def _shapes(corners: Array, frequency: Array) -> Array:

@@ -13,11 +13,15 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES, DriveUnits
+from pprs_dynamics.inference.residuals.mistakes import POSITION_UNIT
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion
 
-POSITION_UNIT = 'position_unit'  # kind of mistake
 LENGTHS = {1e-3: 'millimetres', 1e-2: 'centimetres', 1e-6: 'micrometres'}
 ANGLES = {float(np.pi / 180): 'degrees'}
+POSITION_SIGN = 'position_sign'
+# Many arms weigh the same but for its sign with all positions negated as with all efforts: those
+# are mistaken more often.
+ALL_NEGATED = 1.5
 SLIDES, LIFTS = (0, 1, 2), (3, 4, 5)  # of the six drives, in drive order
 # Columns in the order chain by chain, and last to first, under names in drive order.
 OTHER_ORDERS = ((0, 2, 4, 1, 3, 5), (0, 3, 1, 4, 2, 5), (5, 4, 3, 2, 1, 0))
@@ -37,7 +41,7 @@ class Reading:
         Those it concerns.
     position, effort : (D, D) arrays
         From what is recorded to what is meant, for a row of drives.
-    cost : int
+    cost : float
         How many mistakes it takes.
     backwards : bool
         Whether time runs the other way.
@@ -48,7 +52,7 @@ class Reading:
     drives: tuple[int, ...]
     position: Array
     effort: Array
-    cost: int = 1
+    cost: float = 1.0
     backwards: bool = False
 
     def motion_of(self, motion: DriveMotion) -> DriveMotion:
@@ -70,7 +74,7 @@ class Reading:
 def as_named(drives: tuple[str, ...]) -> Reading:
     """Return the reading by names and units."""
     same = np.eye(len(drives))
-    return Reading('', '', (), same, same, 0)
+    return Reading('', '', (), same, same, 0.0)
 
 
 def readings(drives: tuple[str, ...], units: Sequence[DriveUnits]) -> Iterator[Reading]:
@@ -83,11 +87,11 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits]) -> Iterator[R
         alike = tuple(k for k, one in enumerate(units) if one.turns == turns)
         for unit, name in names.items():
             for group in _groups(drives, alike):
-                yield Reading(POSITION_UNIT, f'the {_position(drives, group)} like {name}', group,
-                              np.diag(_scaled(count, group, unit)), same)
+                yield rescaled(drives, group, unit, name)
     for group in _groups(drives, tuple(range(count))):
-        yield Reading('position_sign', f'the {_position(drives, group)} negated',
-                      group, np.diag(_scaled(count, group, -1.0)), same)
+        yield Reading(POSITION_SIGN, f'the {_position(drives, group)} negated',
+                      group, np.diag(_scaled(count, group, -1.0)), same,
+                      ALL_NEGATED if len(group) == count > 1 else 1.0)
     for order in _orders(drives):
         moved = tuple(k for k in range(count) if order[k] != k)
         listed = ', '.join(f'{drives[order[k]]} like {drives[k]}' for k in moved)
@@ -98,6 +102,13 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits]) -> Iterator[R
                       moved, turned, same)
         yield Reading('drive_order', f'the efforts look recorded in another order: {listed}',
                       moved, same, turned)
+
+
+def rescaled(drives: tuple[str, ...], group: tuple[int, ...], unit: float, name: str) -> Reading:
+    """Return the reading of the positions of some drives in another unit."""
+    count = len(drives)
+    return Reading(POSITION_UNIT, f'the {_position(drives, group)} like {name}', group,
+                   np.diag(_scaled(count, group, unit)), np.eye(count))
 
 
 def named(drives: tuple[str, ...], group: tuple[int, ...]) -> str:

@@ -17,6 +17,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.patterns import Family, Pattern
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE, catalogue
@@ -196,7 +197,8 @@ class UnknownCandidate:
     rows : mapping of drive to (1 or 2, M) array
         In time [1].
     parts : mapping of drive to Block
-    price : float
+    terms : CostTerms
+        Of its price.
     """
 
     components: ClassVar[tuple[Component, ...]] = ()  # none of the catalogue's
@@ -205,7 +207,12 @@ class UnknownCandidate:
     pattern: Pattern
     rows: Mapping[int, Array] = field(repr=False)
     parts: Mapping[int, Block] = field(repr=False)
-    price: float
+    terms: CostTerms
+
+    @property
+    def price(self) -> float:
+        """Of everything that was chosen."""
+        return self.terms.total
 
     @property
     def name(self) -> str:
@@ -244,23 +251,33 @@ class CandidateSet:
     ----------
     candidates : tuple of Candidate
     fit : JointFit
-    total : float
-        Penalised deviance with all prices.
+    terms : CostTerms
+        Of the penalised deviance with all prices.
     blocks : mapping of Component to Block
         Columns of the components.
     nuisance : mapping of Component to tuple of Block
         Columns for what the components leave open, fitted with them.
-    is_admissible : bool
-        False where a body cannot be, a value is beyond its bounds, or a pattern may be the lack
-        of fit of the effects beside it.
+    barred : str
+        Why it may not be: a body cannot be, a value is beyond its bounds, or a pattern may be the
+        lack of fit of the effects beside it; '' where it may.
     """
 
     candidates: tuple[Candidate, ...]
     fit: JointFit
-    total: float
+    terms: CostTerms
     blocks: Mapping[Component, Block] = field(default_factory=dict, repr=False)
     nuisance: Mapping[Component, tuple[Block, ...]] = field(default_factory=dict, repr=False)
-    is_admissible: bool = True
+    barred: str = ''
+
+    @cached_property
+    def total(self) -> float:
+        """What its terms add up to, whether it may be or not."""
+        return self.terms.total
+
+    @property
+    def is_admissible(self) -> bool:
+        """Whether it may be."""
+        return not self.barred
 
     @property
     def cost(self) -> float:
@@ -356,16 +373,15 @@ class Prices:
         return 2 * log(min(D, 3)) + 2 * log(some) + 2 * log(comb(D, count))
 
     def of_candidate(self, candidate: Candidate,
-                     component_price: Callable[[Component], float]) -> float:
+                     of_component: Callable[[Component], CostTerms]) -> CostTerms:
         """Return the price of what was chosen: hypotheses, drives, and each component."""
         if isinstance(candidate, UnknownCandidate):
-            return candidate.price
-        price = len(candidate.hypotheses) * self.of_name()
-        if candidate.drives is not None:
-            price += self.of_drives(len(candidate.components))
-        if candidate.course is not None:
-            price += self.of_course()
-        return price + sum(component_price(one) for one in candidate.components)
+            return candidate.terms
+        terms = CostTerms(
+            names=len(candidate.hypotheses) * self.of_name(),
+            drives=0.0 if candidate.drives is None else self.of_drives(len(candidate.components)),
+            shapes=0.0 if candidate.course is None else self.of_course(candidate.course))
+        return sum((of_component(one) for one in candidate.components), terms)
 
     def of_component(self, effect: type[CatalogueEffect], tried: int) -> float:
         """Return the price of a variant and of a shape among those tried.
@@ -377,19 +393,21 @@ class Prices:
             price += max(len(effect.shape) * log(self.samples), 2 * log(max(tried, 1)))
         return price
 
-    def of_course(self) -> float:
+    def of_course(self, course: Course) -> float:
         """Return the price of a change within the recordings: that there is one, and when."""
-        return 2 * log(COURSE_TIMES) - 2 * log(self.decisions.effect_odds)
+        times = {SINCE: 1, DURING: 2, DRIFT: 0}[course.kind]
+        return 2 * times * log(COURSE_TIMES) - 2 * log(self.decisions.effect_odds)
 
     def of_width(self, tried: int) -> float:
         """Return the price of a width of reversal that is another than the model's, on a drive."""
         return (2 * log(self.drives) - 2 * log(self.decisions.effect_odds)
                 + max(log(self.samples), 2 * log(tried)))
 
-    def of_pattern(self, families: int, patterns: int, drives: int) -> float:
+    def of_pattern(self, families: int, patterns: int, drives: int) -> CostTerms:
         """Return the price of an unknown pattern among those tried on each drive."""
-        return (self.of_name() + self.of_drives(drives) + 2 * log(families) + 2 * log(patterns)
-                - 2 * log(self.decisions.unknown_odds))
+        return CostTerms(names=self.of_name() - 2 * log(self.decisions.unknown_odds),
+                         drives=self.of_drives(drives),
+                         shapes=2 * log(families) + 2 * log(patterns))
 
     def of_right_signs(self, component: Component) -> float:
         """Return the price of physical signs: less than nothing.

@@ -41,6 +41,12 @@ class _Offer:
     gain: float
     candidate: EffectCandidate
 
+    def is_worth_a_fit(self, fits: FittedSets) -> bool:
+        """Return whether it may pay for itself, beyond the margin of rivals."""
+        course = self.candidate.course
+        return course is not None and (
+            self.gain > fits.prices.of_course(course) + fits.decisions.rival_margin)
+
 
 def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[CandidateSet],
                  ) -> tuple[FittedSets, CandidateSet]:
@@ -58,7 +64,7 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
     """
     own = [(kept, one) for one in kept.effects]
     if not kept.unknowns and not any(
-            offer.gain > _least(fits) for offer in _offers(fits, kept, own)):
+            offer.is_worth_a_fit(fits) for offer in _offers(fits, kept, own)):
         return fits, kept
     # Sets of their own: those of the search are of constant forms, and so are its rivals.
     dated = FittedSets(fits.design, fits.decisions, fits.regression.error_scale)
@@ -80,11 +86,6 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
         best = _refined(dated, found)
     best = _simplest(dated, best, [*(one for _, one in own), *(one for _, one in more)])
     return (dated, best) if any(one.course for one in best.effects) else (fits, kept)
-
-
-def _least(fits: FittedSets) -> float:
-    """Return the gain from which on a change in time is worth a fit."""
-    return fits.prices.of_course() + fits.decisions.rival_margin
 
 
 def _courses(fits: FittedSets) -> Iterator[Course]:
@@ -205,6 +206,18 @@ def _simplest(fits: FittedSets, found: CandidateSet, effects: Iterable[EffectCan
         assert changing.course is not None
         best.setdefault((changing.name, changing.course.kind), one)
     # A change that is a hundredth of a second off costs more than patterns that make it good.
-    return min([found, *(fits.pruned(_refined(fits, one))
-                         for one in list(best.values())[:2 * COURSE_TRIALS])],
-               key=lambda one: one.cost)
+    return _lasting(fits, min([found, *(fits.pruned(_refined(fits, one))
+                                        for one in list(best.values())[:2 * COURSE_TRIALS])],
+                              key=lambda one: one.cost))
+
+
+def _lasting(fits: FittedSets, found: CandidateSet) -> CandidateSet:
+    """Return a set in which what is there for a stretch stays, where that costs less."""
+    last = float(fits.design.residuals.time[-1])
+    for candidate in found.effects:
+        course = candidate.course
+        if course is not None and course.kind == DURING:
+            stays = _with_course(candidate, Course(SINCE, course.begin, last))
+            found = min(found, _refined(fits, fits.evaluate((*found.without(candidate), stays))),
+                        key=lambda one: one.cost)
+    return found

@@ -66,12 +66,25 @@ class Decisions:
     scatter_ratio: float = _number(
         1.5, '1', 'ratio of variances in a range and elsewhere that is told as scatter',
         'less does not show in a plot')
+    one_load: float = _number(
+        0.05, '1', 'standard deviation of the load of a drive in motion over its mean, up to which '
+        'friction by load and friction that no load changes are told as one',
+        'dry friction varies by as much along a guide')
     reversal_share: float = _number(
         0.12, '1', 'share of the samples, the slowest, that a pattern of friction may leave out',
         'friction turns over there, in a width that nobody knows')
     statement_share: float = _number(
         0.01, '1', "share of a drive's squared error that a statement of compare must explain",
         'a tenth of the rms; less is no news')
+    explained: float = _number(
+        0.5, '1', "share of a drive's effort, below which that a model explains little comes first",
+        'most of what the drive does is then not in the model, whatever noise is like')
+    noise_seen: float = _number(
+        0.5, '1', 'share of the noise beside all columns that they leave free, for it to be told',
+        'else most of it is extrapolated from frequencies where there is less')
+    negligible: float = _number(
+        0.001, '1', "error over a drive's effort, below which compare looks for no places",
+        'no drive is known, nor needed, to a thousandth')
     noise_accuracy: float = _number(
         0.1, '1', 'relative error of the noise, within which compare calls all of an error noise',
         'a spectrum of a dozen coefficients per octave is known to about that')
@@ -81,6 +94,12 @@ class Decisions:
     poor: float = _number(
         0.2, '1', 'unexplained error over the effort, above which a model is poor',
         'a fifth is more than friction in most robots')
+    most_gain: float = _number(
+        1.5, '1', 'factor of a gain beyond which it is no effect of a drive',
+        'constants of drives are known to 10 %; beyond half as much it is another unit or motor')
+    most_tilt: float = _number(
+        0.35, 'rad', 'lean of a base beyond which it is no effect of how the machine was put up',
+        'a base is levelled to a degree; what leans by 20 stands on a slope or a wall on purpose')
     sure: float = _number(
         2.0, 'deviations', 'by how much a number must have moved to be told as calibrated',
         '95 %')

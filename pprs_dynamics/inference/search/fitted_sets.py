@@ -27,6 +27,7 @@ from pprs_dynamics.inference.search.candidates import (
     UnknownCandidate,
     set_key,
 )
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.library import Library
 from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
@@ -97,7 +98,7 @@ class FittedSets:
     def _fitted(self, candidates: Candidates) -> CandidateSet:
         if not candidates:
             fit = self.regression.fit(())
-            return CandidateSet((), fit, fit.deviance)
+            return CandidateSet((), fit, self._terms(fit))
         start = self.evaluate(()).fit.amplitudes
         # The size of its forces, in proportion to which friction is in doubt, need not be
         # exact: the noise of the empty set does, and steps of it, whose columns are kept.
@@ -107,8 +108,16 @@ class FittedSets:
         bodies = {one: self.library.block(one) for c in candidates for one in c.components
                   if issubclass(one.effect, AddedBody)}
         possible = with_possible_bodies(self.design.given, self.regression, fit, bodies)
-        found = self._set(candidates, possible or fit, nuisance)
-        return replace(found, is_admissible=possible is not None and self._is_admissible(found))
+        found = self._set(candidates, fit, nuisance)
+        if possible is None:
+            return replace(found, barred='no body that can be comes near')
+        if possible is not fit:
+            # What possible bodies cost is told as such, not as a worse fit.
+            feasible = CostTerms(feasibility=possible.deviance - fit.deviance)
+            held = self._set(candidates, possible, nuisance)
+            signs = CostTerms(signs=held.terms.signs - found.terms.signs)
+            found = replace(held, terms=found.terms + signs + feasible)
+        return replace(found, barred=self._barred(found))
 
     def pruned(self, found: CandidateSet) -> CandidateSet:
         """Return a set without the candidates that do not pay in it."""
@@ -134,20 +143,29 @@ class FittedSets:
 
     def _set(self, candidates: Candidates, fit: JointFit, nuisance: Nuisance) -> CandidateSet:
         blocks = {one: self.library.block(one) for c in candidates for one in c.components}
-        found = CandidateSet(candidates, fit, fit.deviance, blocks, nuisance)
-        return replace(found, total=fit.deviance + self.price(found))
+        found = CandidateSet(candidates, fit, self._terms(fit), blocks, nuisance)
+        return replace(found, terms=found.terms + self.price(found))
 
-    def _is_admissible(self, found: CandidateSet) -> bool:
-        """Return whether every value may be, and every pattern is one.
+    def _terms(self, fit: JointFit) -> CostTerms:
+        left = self.regression.misfit(fit)
+        return CostTerms(fit=left, coefficients=fit.deviance - left)
 
-        A value beyond its bounds may not; a pattern has to be more than the lack of fit of the
-        effects beside it.
+    def _barred(self, found: CandidateSet) -> str:
+        """Return why a set may not be: a value beyond its bounds, or a pattern that is none.
+
+        A pattern has to be more than the lack of fit of the effects beside it.
         """
-        if not all(one.is_within(found.coefficients(one), units_of(self.design.given, one.drive))
-                   for one in found.blocks):
-            return False
-        return all(discrepancy_ratio(self.design, self.regression, self.decisions, found,
-                                     candidate)[0] >= 1 for candidate in found.unknowns)
+        beyond = sorted({one.effect.name for one in found.blocks
+                         if not one.is_within(found.coefficients(one),
+                                              units_of(self.design.given, one.drive))})
+        if beyond:
+            return f'a value of {", ".join(beyond)} is beyond its bounds'
+        for candidate in found.unknowns:
+            ratio, names = discrepancy_ratio(self.design, self.regression, self.decisions, found,
+                                             candidate)
+            if ratio < 1:
+                return f'the pattern is within the model error of {", ".join(names)}'
+        return ''
 
     def _nuisance_blocks(self, candidates: Candidates, fit: JointFit) -> Nuisance:
         """Return columns for what effects leave open, in proportion to their fitted force.
@@ -184,11 +202,12 @@ class FittedSets:
         fit = self.regression.at(self.blocks(candidates, nuisance), found.fit.amplitudes)
         return self._set(candidates, fit, nuisance)
 
-    def price(self, found: CandidateSet) -> float:
+    def price(self, found: CandidateSet) -> CostTerms:
         """Return the price of all that was chosen, and of signs that are unphysical."""
-        return sum(map(self.library.price, found.candidates)) + sum(
+        wrong = CostTerms(signs=sum(
             self.prices.of_wrong_signs(one, one.values(found.coefficients(one)))
-            for one in found.blocks)
+            for one in found.blocks))
+        return sum(map(self.library.price, found.candidates), wrong)
 
     def drop_cost(self, found: CandidateSet, component: Component) -> float:
         """Return by how much the deviance rises without a component, at the noise of a fit.

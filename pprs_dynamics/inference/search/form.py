@@ -47,14 +47,15 @@ def without_remainders(search: Search, best: CandidateSet,
     What was best together with them may not be without: then something else may stand for it.
     Where that, with a lack of fit of its own, costs less than the set given, it is the best.
     """
-    fits = search.fits
+    fits, before = search.fits, search.best
     kept, remainders = beyond_lack_of_fit(fits, best)
     while kept.total > best.total + fits.decisions.rival_margin:
         better = search.replaced(kept, lambda one: not _small(fits, one))
         if better is kept:
             break
         kept = better
-    if search.best.cost < best.cost - LEAST_IMPROVEMENT and not search.is_beyond_point:
+    if (search.best is not before and search.best.cost < best.cost - LEAST_IMPROVEMENT
+            and not search.is_beyond_point):
         return without_remainders(search, search.best)
     if remainders:
         # What paid beside them only is not kept for their sake.

@@ -30,6 +30,7 @@ from pprs_dynamics.inference.search.candidates import (
     Prices,
     UnknownCandidate,
 )
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.system.parallel import lazy
@@ -103,7 +104,7 @@ class Library:
         self._centres: dict[Hashable, tuple[float, ...]] = {}
         self._blocks: dict[Component, Block] = {}
         self._nuisance: dict[Component, dict[int, Array]] = {}
-        self._prices: dict[Component, float] = {}
+        self._prices: dict[Component, CostTerms] = {}
         self.local = {d: DriveLibrary(design, regression, d) for d in regression.drives}
         self.spanning = [Component.of(effect, d, {}, names)
                          for effect in searched_in_drives(design) if effect.shifts_positions()
@@ -237,11 +238,11 @@ class Library:
                 if np.any(values) and d in self.regression.series}
         return self._nuisance[component]
 
-    def price(self, candidate: Candidate) -> float:
+    def price(self, candidate: Candidate) -> CostTerms:
         """Return the price of everything that was chosen."""
         return self.prices.of_candidate(candidate, self.component_price)
 
-    def component_price(self, component: Component) -> float:
+    def component_price(self, component: Component) -> CostTerms:
         """Return the price of a component beside that of its candidate's hypotheses and drives.
 
         With signs that are physical; what others cost more is known once they are fitted.
@@ -249,17 +250,18 @@ class Library:
         it costs by how much that narrows the prior, and the odds that it is otherwise at all.
         """
         if component not in self._prices:
-            price = (self.prices.of_component(component.effect, len(self.trials(component)))
-                     + self.prices.of_right_signs(component))
-            usual = self._expected(component)
+            usual, narrowed, odds = self._expected(component), 0.0, 0.0
             if np.any(usual):
                 decisions, both = self.prices.decisions, self.block(component).precision
-                price += float(np.linalg.slogdet(both)[1] - np.linalg.slogdet(both - usual)[1])
+                narrowed = float(np.linalg.slogdet(both)[1] - np.linalg.slogdet(both - usual)[1])
                 if component.drive is not None:
-                    price -= 2 * float(np.log(
+                    odds = -2 * float(np.log(
                         decisions.zero_odds if component.effect.shifts_positions()
                         else decisions.gain_odds))
-            self._prices[component] = price
+            self._prices[component] = CostTerms(
+                coefficients=narrowed, names=odds, shapes=self.prices.of_component(
+                    component.effect, len(self.trials(component))),
+                signs=self.prices.of_right_signs(component))
         return self._prices[component]
 
     def force(self, found: CandidateSet, candidate: Candidate, shape: tuple[int, ...]) -> Array:

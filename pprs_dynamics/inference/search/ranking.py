@@ -5,8 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
@@ -18,20 +18,25 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
+    Component,
     EffectCandidate,
     bends,
 )
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_model import linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder, without_remainders
-from pprs_dynamics.inference.search.relinearisation import around_fitted
+from pprs_dynamics.inference.search.relinearisation import LEAST_CHANGE, around_fitted, exact_cost
 from pprs_dynamics.inference.search.scan import Place
 from pprs_dynamics.inference.search.search import Search, patterns_of
 from pprs_dynamics.inference.search.unknown import PatternLibrary
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.catalogue import catalogue
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 
+SHORTLIST = 4  # sets of different claims that are ranked by exact forces
 SAME = 1e-6  # of a column's square may lie outside the span of others that do the same
 
 
@@ -76,6 +81,8 @@ class Ranking:
         From the patterns of the kept set to all of it, an effect more in each in that order.
     refuted : frozenset of Place
         What took no part in the search, as held-out data did not confirm it.
+    exact : mapping of claims to float
+        What the sets of the shortlist cost by the exact forces of their own fitted models.
     """
 
     first: FittedSets = field(repr=False)
@@ -90,6 +97,8 @@ class Ranking:
     order: tuple[EffectCandidate, ...] = field(repr=False)
     path: tuple[CandidateSet, ...] = field(repr=False)
     refuted: frozenset[Place]
+    exact: Mapping[frozenset[str], float] = field(
+        default_factory=lambda: MappingProxyType({}), repr=False)
 
     @classmethod
     def of(cls, first: FittedSets, last: Search, best: CandidateSet,
@@ -118,8 +127,13 @@ class Ranking:
         if bends(gone) and not places <= self.refuted:
             return _searched(FittedSets(self.first.design, self.first.decisions), refuted)
         kept = self.last.pruned(self.without[gone])
-        return self._keeping(self.first, self.last, self.patterns, self.best, kept,
-                             self.remainders, refuted)
+        return replace(self._keeping(self.first, self.last, self.patterns, self.best, kept,
+                                     self.remainders, refuted), exact=self.exact)
+
+    def claiming_nothing(self) -> Ranking:
+        """Return the ranking with nothing kept, under the noise that the best set leaves."""
+        return self._keeping(self.first, self.last, self.patterns, self.best,
+                             self.last.evaluate(()), (), self.refuted)
 
     @cached_property
     def shares(self) -> tuple[float, ...]:
@@ -148,6 +162,13 @@ class Ranking:
         return (self.best, *_by_cost([one for one in found
                                       if one is not self.best and one.is_admissible]))
 
+    def barred(self, margin: float) -> tuple[CandidateSet, ...]:
+        """Return the sets that would cost less than a margin more than the best, and may not be."""
+        found = [one for one in (*self.of_last, *(
+            self.of_first if self.first is not self.last else ())) if one.barred
+            and one.total < self.best.total + margin]
+        return tuple(sorted(found, key=lambda one: one.total))
+
     @property
     def nothing(self) -> CandidateSet:
         """The empty set around the model as given."""
@@ -165,6 +186,40 @@ class Ranking:
     def fits_of(self, found: CandidateSet) -> FittedSets:
         """Return the fitted sets that a set is of."""
         return self.last if any(one is found for one in self.of_last) else self.first
+
+    def best_with(self, candidate: EffectCandidate) -> CandidateSet:
+        """Return the set of lowest cost with an effect of the kept set."""
+        return min((self.kept, *(one for one in self._judged if _has(one, candidate))),
+                   key=lambda one: self.difference(one, self.best).total)
+
+    def best_without(self, candidate: EffectCandidate) -> CandidateSet:
+        """Return the set of lowest cost without an effect of the kept set, whatever stands in it.
+
+        An effect on other drives or in another shape is the same one; a body on another link is
+        another.
+        """
+        return min((self.without[candidate],
+                    *(one for one in self._judged if not _has(one, candidate))),
+                   key=lambda one: self.difference(one, self.best).total)
+
+    def difference(self, found: CandidateSet, other: CandidateSet) -> CostTerms:
+        """Return the terms of what a set costs more than another, exactly where both are known."""
+        exact = [self._beyond_linear(one) for one in (found, other)]
+        more = [0.0 if None in exact else one or 0.0 for one in exact]
+        return found.terms - other.terms + CostTerms(linearisation=more[0] - more[1])
+
+    def _beyond_linear(self, found: CandidateSet) -> float | None:
+        """Return what a set of the shortlist costs more by its exact forces; None for others."""
+        claims = _claims(found)
+        first = next((one for one in self.sets if _claims(one) == claims), None)
+        return self.exact[claims] - found.total if claims in self.exact and found is first else None
+
+    @property
+    def _judged(self) -> list[CandidateSet]:
+        """Sets without what is within the model error of others, which pays but is not kept."""
+        ignored = {one.candidate.name for one in self.remainders}
+        return [one for one in self.sets
+                if not ignored & {candidate.name for candidate in one.candidates}]
 
     def near(self, margin: float) -> tuple[CandidateSet, ...]:
         """Return the sets of the last search within a margin of the best."""
@@ -186,9 +241,36 @@ class Ranking:
             missing = sorted(name for claim, name in mine.items() if claim not in theirs)
             instead = sorted(claim if name in mine.values() else name
                              for claim, name in theirs.items() if claim not in mine)
-            if missing and instead and not self._is_freer(other, missing, instead):
+            if (missing and instead and not self._is_freer(other, missing, instead)
+                    and not self._is_beaten(other, margin)):
                 rivals.append(Rival(other, tuple(missing), tuple(instead)))
-        return rivals
+        return [*rivals, *self._at_one_load()]
+
+    def _is_beaten(self, other: CandidateSet, margin: float) -> bool:
+        """Return whether a set is no rival by the exact forces of its own model."""
+        mine, theirs = (self.exact.get(_claims(one)) for one in (self.best, other))
+        return mine is not None and theirs is not None and theirs > mine + margin
+
+    def _at_one_load(self) -> Iterator[Rival]:
+        """Yield the kept set with friction by load for one that no load changes, or in its place.
+
+        However exact one of them fits: where the load hardly varies, friction that varies as
+        little along its guide does the same.
+        """
+        design, names = self.last.design, {one.name for one in self.kept.effects}
+        for one in self.kept.effects:
+            other = catalogue().get(one.effect.at_one_load)
+            if (other is None or other.name in names or not issubclass(other, DriveEffect)
+                    or not one.drives or any(
+                        not design.acts_on(other, d)
+                        or design.load_variation(d) > self.last.decisions.one_load
+                        for d in one.drives)):
+                continue
+            instead = EffectCandidate.of(
+                Component.of(other, d, {}, other.variants[0]) for d in one.drives)
+            found = self.last.evaluate((*self.kept.without(one), instead))
+            if found.is_admissible:
+                yield Rival(found, (one.name,), (other.name,))
 
     def _is_freer(self, other: CandidateSet, missing: Sequence[str], instead: Sequence[str],
                   ) -> bool:
@@ -239,6 +321,20 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     return _searched(FittedSets(design, decisions), frozenset(), report)
 
 
+def without_search(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
+                   progress: Callable[[float], None] | None = None) -> Ranking:
+    """Return the ranking of the empty set alone: what the model as given leaves, and its noise.
+
+    Raises
+    ------
+    PprsError
+        As `measure_residuals`.
+    """
+    fits = FittedSets(Design.of(model, recordings, progress), decisions)
+    nothing = fits.evaluate(())
+    return Ranking._keeping(fits, fits, (), nothing, nothing, (), frozenset())
+
+
 def _searched(first: FittedSets, refuted: frozenset[Place],
               report: Callable[[float], None] = lambda share: None) -> Ranking:
     search = Search(first, patterns_of(first), refuted, lambda share: report(0.25 + 0.35 * share))
@@ -251,9 +347,36 @@ def _searched(first: FittedSets, refuted: frozenset[Place],
         if one.effects and not one.unknowns and not _is_bent(one) and _claims(one) not in seen:
             seen.add(_claims(one))
             first.refined(first.evaluate(one.candidates))
-    found = Ranking.of(first, last, best, refuted)
+    found = _by_exact_forces(Ranking.of(first, last, best, refuted), search)
     report(1.0)
     return found
+
+
+def _has(found: CandidateSet, candidate: EffectCandidate) -> bool:
+    return any(one.claim == candidate.claim for one in found.effects)
+
+
+def _by_exact_forces(found: Ranking, first: Search) -> Ranking:
+    """Return a ranking whose best set is that of the shortlist whose exact forces cost least.
+
+    Linear costs around the model as given, and around another set's, are not those of a set
+    around itself: what is near the best by them is ranked by its own model.
+    """
+    near: dict[frozenset[str], CandidateSet] = {}
+    for one in found.sets:
+        if one.cost > found.best.cost + first.fits.decisions.rival_margin:
+            break
+        near.setdefault(_claims(one), one)
+    if len(near) == 1:
+        return found
+    exact = {claims: exact_cost(found.fits_of(one), one)
+             for claims, one in list(near.items())[:SHORTLIST]}
+    best = min(exact, key=lambda claims: exact[claims])
+    fits = found.fits_of(near[best])
+    if exact[best] < exact[_claims(found.best)] - LEAST_CHANGE:
+        found = Ranking.of(found.first, first if fits is first.fits else Search(
+            found.last, found.patterns, found.refuted), near[best], found.refuted)
+    return replace(found, exact=MappingProxyType(exact))
 
 
 def _is_bent(found: CandidateSet) -> bool:

@@ -349,3 +349,21 @@ def settled(fits: FittedSets, found: CandidateSet) -> SettledSet:
         left = fits.regression.residuals.measured - exact_forces(fits.design, one.model)
         return one.found.total + squared(fits, found, left)
     return min(before, after, key=loss)
+
+
+def exact_cost(fits: FittedSets, found: CandidateSet) -> float:
+    """Return what a set costs around its own fitted model, by that model's exact forces.
+
+    J_exact = J + |exact - linear|^2, whitened. However a set was come by, it costs the same;
+    infinite where its values are those of no model.
+    """
+    try:
+        fits, found = linearised(fits, found, alone=True)
+        one = settled(fits, found)
+        # Widths that are not settled are columns yet, and not the model's.
+        model = fitted_model(fits, found) if one.fits is fits else one.model
+        exact = exact_forces(one.fits.design, model)
+    except PprsError:
+        return np.inf
+    return one.found.cost + squared(one.fits, one.found,
+                                    exact - linear_prediction(one.fits, one.found))

@@ -94,7 +94,7 @@ class Scan:
         for one, gain in offers:
             place = (one.effect, one.drive)
             key = (*place, one.effect.places_of(one.names))
-            net = gain - library.component_price(one)
+            net = gain - library.component_price(one).total
             if place not in taken and place not in self.refuted and (
                     key not in best or net > best[key][0]):
                 best[key] = (net, one)

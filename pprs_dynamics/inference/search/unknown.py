@@ -25,6 +25,7 @@ from pprs_dynamics.inference.regression.normal_equations import Block, term_gain
 from pprs_dynamics.inference.residuals.bins import LEAST_SHARE, MOST_SHARE
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import Prices, UnknownCandidate
+from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.patterns import (
     Family,
     Pattern,
@@ -192,7 +193,7 @@ class PatternLibrary:
         return self.regression.transformed_block(
             {self.d: self.series.transform(family.columns.astype(float))})
 
-    def price(self, family: Family, drives: int = 1) -> float:
+    def price(self, family: Family, drives: int = 1) -> CostTerms:
         """Return the price of a pattern of a family: that it is unknown, where, and which."""
         return self.prices.of_pattern(max(len(self._scanned), 1) * family.rivals,
                                       max(len(family.patterns), 1), drives)
@@ -221,7 +222,7 @@ class PatternLibrary:
             block, gain = gains[d]
             more = self.price(candidate.family, len(parts) + 1) - self.price(
                 candidate.family, len(parts))
-            if gain > more:
+            if gain > more.total:
                 rows[d], parts[d] = candidate.rows[self.d], block
         order = sorted(parts)
         return UnknownCandidate(candidate.family, candidate.pattern, {d: rows[d] for d in order},
@@ -245,7 +246,7 @@ class PatternLibrary:
         for scanned in self._scanned:
             gains = scanned.gains(fit, weights)
             best = int(np.argmax(gains))
-            scored.append((float(gains[best]) - self.price(scanned.family), scanned, best))
+            scored.append((float(gains[best]) - self.price(scanned.family).total, scanned, best))
         scored.sort(key=lambda one: -one[0])
         found = []
         for rank, (score, scanned, best) in enumerate(scored):

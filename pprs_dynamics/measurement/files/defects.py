@@ -210,6 +210,7 @@ class Judgement:
             self._tell('no_effort', len(effort), 'there is no effort of any drive')
         else:
             self._tell_missing('effort_not_measured', effort, 'effort')
+            self._leave_out_zeros()
             self._leave_out_saturated()
         velocity = self.samples.velocity
         if velocity is None:
@@ -217,6 +218,20 @@ class Judgement:
             return
         velocity[np.isinf(velocity)] = np.nan
         self._tell_missing('missing_velocity', velocity, 'velocity')
+
+    def _leave_out_zeros(self) -> None:
+        """Take out single zeros amid other efforts: an answer that did not come."""
+        effort, samples = self.samples.effort, self.samples
+        zeros, usual = zip(*(signals.lost_to_zero(effort[:, drive])
+                             for drive in range(len(samples.drives))), strict=True)
+        lost = np.column_stack(zeros)
+        rows = np.any(lost, axis=1)
+        # What is 0 at the same moment was lost with it.
+        lost |= rows[:, None] & (np.abs(effort) <= np.array(usual))
+        drives = self._named(np.any(lost, axis=0))
+        self._tell_samples('effort_zero', rows, f'in which the effort of {", ".join(drives)} is '
+                           '0 and far from it before and after', drives)
+        effort[lost] = np.nan
 
     def _leave_out_saturated(self) -> None:
         """Take out efforts at the limit of a drive, which say only that it is there."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -33,6 +33,7 @@ WORDS = {
     CURRENT: ('current', 'currents', 'cur', 'curr', 'amp', 'amps', 'ampere', 'amperes', 'i', 'iq',
               'ma'),
 }
+PLURALS = {POSITION: 'positions', VELOCITY: 'velocities', EFFORT: 'efforts', CURRENT: 'currents'}
 # Titles with one of these tell of something else than a joint's measured motion or effort.
 OTHERS = frozenset((
     'acc', 'acceleration', 'accelerations', 'ddq', 'qdd', 'qddot', 'temp', 'temperature',
@@ -54,6 +55,7 @@ SCALES = {POSITION: {'deg': math.pi / 180, 'degs': math.pi / 180, 'degree': math
 TIMES = {'ms': 1e-3, 'msec': 1e-3, 'millis': 1e-3, 'milliseconds': 1e-3, 'us': 1e-6, 'usec': 1e-6,
          'micros': 1e-6, 'ns': 1e-9, 'nsec': 1e-9, 'nanoseconds': 1e-9}
 ALIKE = 0.9  # correlation of a series with the derivative of another, from which it is a velocity
+COPY = 0.99  # correlation from which a series is what another was asked to be
 SLOWEST = 0.5  # [s], steps beyond which times of a robot count something else than seconds
 BEYOND = 1.5  # of a limit, from which a position in radians is none
 
@@ -85,7 +87,7 @@ class Guess:
 
 
 def guess_columns(series: Sequence[Series], joints: Sequence[str], limits: Sequence[float],
-                  quantity: str | None = None) -> Guess:
+                  quantity: str | None = None, others: Collection[str] = ()) -> Guess:
     """Return which columns are what.
 
     Parameters
@@ -98,6 +100,8 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], limits: Seque
         Largest absolute positions by the description, infinite where there are none or for slides.
     quantity : str, optional
         What all columns are of, where the file's name says so.
+    others : collection of str
+        Further joints of the robot: columns with their names are no columns of these.
 
     Raises
     ------
@@ -105,20 +109,20 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], limits: Seque
         Where positions of the joints cannot be told.
     """
     time, time_scale, notes = _time(series)
-    others = [one for one in series if time is None or one.column != time.column]
-    titled = [one for one in others if one.title]
+    left = [one for one in series if time is None or one.column != time.column]
+    # pandas numbers rows in a column without a title.
+    titled = [one for one in left if one.title]
     if titled:
-        others = titled  # pandas numbers rows in a column without a title
-        columns, found = _by_names(others, joints, quantity)
+        columns, found = _by_names(titled, joints, quantity, others)
     else:
-        columns, found = _by_blocks(others, joints, time, quantity)
+        columns, found = _by_blocks(left, joints, time, quantity)
     notes += found
     main = quantity or POSITION
     known = [joint for joint in joints if (joint, main) in columns]
     if not known:
         raise GuessError(
-            f'no columns of {main}s are told by their names: {_listed(others)}; write them '
-            f'into columns, e.g. {{{joints[0]}: {{{main}: {_first(others)}}}}}')
+            f'no columns of {main}s are told by their names: {_listed(left)}; write them '
+            f'into columns, e.g. {{{joints[0]}: {{{main}: {_first(left)}}}}}')
     by_column = {one.column: one for one in series}
     scales = {key: scale for key, column in columns.items()
               if (scale := _scale(by_column[column].title, key[1])) is not None}
@@ -183,17 +187,20 @@ def _rises(values: Array) -> bool:
 
 
 def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | None,
-              ) -> tuple[dict[tuple[str, str], Column], list[str]]:
+              others: Collection[str]) -> tuple[dict[tuple[str, str], Column], list[str]]:
     groups: dict[tuple[str, ...], dict[str, Column]] = {}
+    unnamed = []
     for one in series:
         words = words_of(one.title)
-        place = _joint_in(words, joints)
-        if place is not None:
+        place = _joint_in(words, list(dict.fromkeys((*joints, *others))))
+        if place is None:
+            unnamed.append(one)
+        elif place[0] in joints:
             joint, at, length = place
             key = (*words[:at], '*', *words[at + length:])
             groups.setdefault(key, {}).setdefault(joint, one.column)
     notes = []
-    for key, numbers in _numbered(series).items():
+    for key, numbers in _numbered(unnamed).items():
         if key not in groups and (len(numbers) >= len(joints) or len(joints) == 1):
             chosen = [numbers[number] for number in sorted(numbers)][:len(joints)]
             groups[key] = dict(zip(joints, chosen, strict=False))
@@ -287,20 +294,37 @@ def _by_blocks(series: Sequence[Series], joints: Sequence[str], time: Series | N
         speeds = [b for b in range(1, len(blocks)) if _is_derivative(blocks[b], blocks[0], time)]
         if speeds:
             kinds[speeds[0]] = VELOCITY
-        rest = [b for b in range(1, len(blocks)) if b not in speeds]
+        # Accelerations, and what positions and velocities were asked to be, are no efforts.
+        known = [0, *speeds[:1]]
+        rest = [b for b in range(1, len(blocks)) if b not in speeds and not any(
+            _is_derivative(blocks[b], blocks[k], time) or _is_alike(blocks[b], blocks[k])
+            for k in known)]
         if rest:
-            kinds[rest[-1]] = EFFORT
+            kinds[rest[0]] = EFFORT
     columns = {(joint, kind): one.column for b, kind in kinds.items()
                for joint, one in zip(joints, blocks[b], strict=True)}
-    return columns, ['no header: ' + ', '.join(
-        f'columns {blocks[b][0].column} to {blocks[b][-1].column} taken as '
-        f'{kind}{"s" * (kind != VELOCITY)}'.replace('velocity', 'velocities')
-        for b, kind in sorted(kinds.items()))]
+    told = [f'columns {blocks[b][0].column} to {blocks[b][-1].column} taken as {PLURALS[kind]}'
+            for b, kind in sorted(kinds.items())]
+    unused = [f'{blocks[b][0].column} to {blocks[b][-1].column}'
+              for b in range(len(blocks)) if b not in kinds]
+    return columns, ['no header: ' + ', '.join(told) + (
+        f'; {", ".join(unused)} are not used' if unused else '')]
 
 
 def _is_derivative(block: Sequence[Series], of: Sequence[Series], time: Series | None) -> bool:
     return float(np.nanmedian([_slope(rate.values, position.values, time)[1]
                                for rate, position in zip(block, of, strict=True)])) > ALIKE
+
+
+def _is_alike(block: Sequence[Series], other: Sequence[Series]) -> bool:
+    """Return whether two blocks move alike, as what is asked for and what is measured do."""
+    found = []
+    for one, two in zip(block, other, strict=True):
+        known = np.isfinite(one.values) & np.isfinite(two.values)
+        a, b = (each.values[known] - np.mean(each.values[known]) for each in (one, two))
+        size = float(np.linalg.norm(a) * np.linalg.norm(b))
+        found.append(float(a @ b) / size if size > 0 else math.nan)
+    return bool(np.nanmedian(found) > COPY) if np.isfinite(found).any() else False
 
 
 def _slope(rate: Array, position: Array, time: Series | None, scale: float = 1.0,

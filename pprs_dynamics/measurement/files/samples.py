@@ -59,6 +59,7 @@ POLICY = {
     'impossible_position': 'those samples are dropped',
     'impossible_velocity': 'they count as not measured',
     'impossible_effort': 'they count as not measured',
+    'effort_zero': 'they count as not measured',
     'saturated_effort': 'they are left out of every comparison and fit',
     'no_effort': 'compare, diagnose, fit and adopt need them and will refuse it',
     'effort_not_measured': 'the motion is kept and these efforts count as not measured',

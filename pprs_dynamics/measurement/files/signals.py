@@ -27,6 +27,11 @@ FROZEN_SAMPLES = 10
 # An effort that stays the same for so long [s] while its drive visits this many positions.
 STUCK_TIME = 0.5
 STUCK_POSITIONS = 10
+# At most so many zeros in a row are an answer that did not come, where those before and after are
+# this many times as far from 0 as from each other, and as nine steps of ten are large.
+ZERO_SAMPLES = 3
+ZERO_RATIO = 5.0
+ZERO_QUANTILE = 0.9
 
 
 @dataclass(frozen=True)
@@ -94,6 +99,30 @@ def stuck_efforts(samples: Samples, starts: Indices, drive: int) -> list[tuple[i
     stuck = _lasting(samples.time, same, starts, STUCK_TIME, FROZEN_SAMPLES)
     return [(first, last) for first, last in stuck
             if len(np.unique(samples.position[first:last + 1, drive])) > STUCK_POSITIONS]
+
+
+def lost_to_zero(effort: Array) -> tuple[Mask, float]:
+    """Return which efforts of a drive, (N,), fall to 0 and return, and up to what they are 0.
+
+    At most `ZERO_SAMPLES` in a row, between efforts of one sign that differ from each other by much
+    less than from 0. What passes through 0, or rests there, is none. Noise counts as 0, too.
+    """
+    found = np.zeros(len(effort), dtype=bool)
+    known = np.flatnonzero(np.isfinite(effort))
+    steps = np.abs(np.diff(effort[known]))
+    if not np.any(steps):
+        return found, 0.0
+    # Of a coarse converter most steps are 0.
+    usual = float(max(np.quantile(steps, ZERO_QUANTILE), np.min(steps[steps > 0])))
+    for first, last in runs(np.abs(effort) <= usual):
+        before, after = known[known < first][-1:], known[known > last][:1]
+        if last - first >= ZERO_SAMPLES or not (len(before) and len(after)):
+            continue
+        left, right = effort[before[0]], effort[after[0]]
+        far = min(abs(left), abs(right))
+        if left * right > 0 and far > ZERO_RATIO * max(usual, abs(right - left)):
+            found[first:last + 1] = True
+    return found, usual
 
 
 def is_constant(values: Array) -> bool:

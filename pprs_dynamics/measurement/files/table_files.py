@@ -87,6 +87,12 @@ def open_table(path: Path, decimal: str = '.', likely: Sequence[str] = ()) -> Ta
     return open_arrays(path) or CsvTable.open(path, decimal, likely)
 
 
+def read_column(path: Path) -> Array:
+    """Return the first column of a table without a header, (N,)."""
+    table = open_table(path)
+    return table.read([1])[0] if isinstance(table, CsvTable) else np.zeros(0)
+
+
 def _of_one(path: Path, drives: RecordedDrives, columns: RecordedColumns, topic: str | None,
             progress: Progress | None) -> Samples:
     table = _opened(path, columns)
@@ -108,7 +114,9 @@ def _opened(path: Path, columns: RecordedColumns) -> Table:
 
 
 def _source(path: Path, columns: RecordedColumns, prefix: str = '') -> str:
-    kind = 'LeRobot' if path.is_dir() else KINDS.get(path.suffix, 'CSV')
+    position = path / columns.files.get('position', '')
+    kind = ('LeRobot' if path.is_dir() and not columns.files else
+            KINDS.get(position.suffix if columns.files else path.suffix, 'CSV'))
     if columns.time is not None or any(of.names for of in columns.drives.values()):
         return f'{kind} by columns of the model file'
     return f'{kind}, {prefix}' if prefix else kind
@@ -330,10 +338,14 @@ def _of_several(path: Path, drives: RecordedDrives, columns: RecordedColumns,
         chosen = {joint: columns.drives[drive].names[quantity]
                   for joint, drive in zip(joints, drives.names, strict=True)
                   if quantity in columns.drives[drive].names}
-        _require(table, list(chosen.values()))
         time = None if shared is not None else _time_column(table, columns)
-        read = _read(table, [*([] if time is None else [time]), *chosen.values()], time, progress)
-        series = {joint: read[column] for joint, column in chosen.items()}
+        if _is_one_column(table):
+            read, series = {}, _in_turn(table, chosen)
+        else:
+            _require(table, list(chosen.values()))
+            read = _read(table, [*([] if time is None else [time]), *chosen.values()], time,
+                         progress)
+            series = {joint: read[column] for joint, column in chosen.items()}
         count = len(next(iter(series.values()), ()))
         if shared is not None and count != len(shared):
             raise UnreadableFileError(file, f'it has {counted(count, "row")}, but '
@@ -350,6 +362,23 @@ def _of_several(path: Path, drives: RecordedDrives, columns: RecordedColumns,
         arrays.update({(joint, quantity): values for joint, values in series.items()})
     assert stamps is not None
     return Samples.of_columns(joints, stamps, arrays, _source(path, columns), tuple(told), epoch)
+
+
+def _is_one_column(table: Table) -> bool:
+    return isinstance(table, CsvTable) and table.count == 1 and not table.names
+
+
+def _in_turn(table: Table, chosen: Mapping[str, Column]) -> dict[str, Array]:
+    """Return numbers that stand below each other in turn, `1[k]` those of each joint."""
+    assert isinstance(table, CsvTable)
+    elements = {joint: ELEMENT.fullmatch(str(column)) for joint, column in chosen.items()}
+    values = table.read([1])[0]
+    count = 1 + max((int(one[2]) for one in elements.values() if one), default=0)
+    if len(values) % count:
+        raise UnreadableFileError(
+            table.path, f'it has one column of {len(values)} numbers, must have as many for each '
+            f'of {count} joints, as 1[0] to 1[{count - 1}] say')
+    return {joint: values[int(one[2]) if one else 0::count] for joint, one in elements.items()}
 
 
 def files_of(path: Path, names: Mapping[str, str]) -> dict[str, Path]:

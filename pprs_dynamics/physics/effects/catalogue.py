@@ -29,6 +29,7 @@ from pprs_dynamics.physics.effects.laws.effort_offset import EffortOffset
 from pprs_dynamics.physics.effects.laws.external_wrench import ExternalWrench
 from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
 from pprs_dynamics.physics.effects.laws.friction_drift import FrictionDrift
+from pprs_dynamics.physics.effects.laws.gear_efficiency import GearEfficiency
 from pprs_dynamics.physics.effects.laws.homing_error import HomingError
 from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
 from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
@@ -71,6 +72,7 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         ExternalWrench,
         ForceRipple,
         FrictionDrift,
+        GearEfficiency,
         HomingError,
         Hysteresis,
         JointFrictionEffect,

@@ -21,7 +21,11 @@ from pprs_dynamics.physics.three_pprs.state import DriveStates
 
 @dataclass(frozen=True)
 class DriveSamples:
-    """Samples of one drive: all (N,); `time` is None where unknown, `direction` is sgn."""
+    """Samples of one drive: all (N,); `time` is None where unknown, `direction` is sgn.
+
+    `guide_load` is what its guide carries, without a sign; `transmitted` what its gear or screw
+    passes on to the mechanism, without friction, with the sign of the effort [N, N m].
+    """
 
     time: Array | None
     position: Array
@@ -29,6 +33,7 @@ class DriveSamples:
     acceleration: Array
     direction: Array
     guide_load: Array
+    transmitted: Array
     memory: Any = None
 
     @classmethod
@@ -36,7 +41,7 @@ class DriveSamples:
         """Return the samples of one drive of a state."""
         return cls(state.time, state.position[:, drive], state.velocity[:, drive],
                    state.acceleration[:, drive], state.direction[:, drive],
-                   state.guide_load[:, drive], memory)
+                   state.guide_load[:, drive], state.transmitted[:, drive], memory)
 
 
 @dataclass(frozen=True)

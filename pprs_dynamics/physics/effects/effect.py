@@ -231,6 +231,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     is_of_one_place : bool
         True where each variant is at a place of its own, a link or a joint: that a motion does
         not show every one of them is not worth telling.
+    at_one_load : str
+        Name of the effect that does the same where the load of a drive does not vary.
     alike : tuple of tuple of str
         Groups of places at which the effect does the same in every motion.
     """
@@ -251,6 +253,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     idealised: ClassVar[bool] = True
     shows_at_reversals: ClassVar[bool] = False
     is_of_one_place: ClassVar[bool] = False
+    at_one_load: ClassVar[str] = ''
     alike: ClassVar[tuple[tuple[str, ...], ...]] = ()
 
     def __init_subclass__(cls) -> None:

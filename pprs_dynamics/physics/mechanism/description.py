@@ -159,7 +159,9 @@ class Description:
     gravity : (3,) tuple, optional
         In the frame of its root, of a format that has it [m/s^2].
     remarks : tuple of str
-        Sentences on what looks wrong in it, and on what it holds that is not used.
+        Sentences on what it holds that is not used.
+    faults : tuple of str
+        Sentences on bodies in it that cannot be.
     transmissions : tuple of Transmission
     """
 
@@ -171,6 +173,7 @@ class Description:
     gravity: tuple[float, float, float] | None = None
     remarks: tuple[str, ...] = ()
     transmissions: tuple[Transmission, ...] = ()
+    faults: tuple[str, ...] = ()
 
 
 def inertial_in(frame: Frame, parameters: Array) -> Array:

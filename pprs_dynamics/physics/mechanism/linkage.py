@@ -9,6 +9,7 @@ branch that home is on.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
@@ -21,7 +22,6 @@ from pprs_dynamics.physics.mechanism.linkage_equations import (
     Loads,
     Motion,
     Tables,
-    Wrenches,
     apply_bodies,
     gap,
     gradients,
@@ -93,11 +93,10 @@ def predict(t: Tables, one: Motion, goal: Any, start: Any) -> None:
             start[t.passive[c]] += one.T[t.passive[c], d] * moved
 
 
-def _press(t: Tables, m: Motion, inertial: Any, gravity: Any, x: Wrenches, with_reactions: bool,
-           o: Loads) -> None:
+def _press(t: Tables, m: Motion, inertial: Any, gravity: Any, with_reactions: bool, o: Loads,
+           ) -> None:
     for s in range(len(m.q)):
-        applied = Wrenches(x.joint, x.force[s], x.moment[s])
-        apply_bodies(t, motion_at(m, s), inertial, gravity, applied, loads_at(o, s))
+        apply_bodies(t, motion_at(m, s), inertial, gravity, loads_at(o, s))
         if with_reactions:
             react(t, motion_at(m, s), loads_at(o, s))
 
@@ -217,26 +216,32 @@ def openings(t: Tables, m: Motion) -> Array:
     return found
 
 
-def no_wrenches(samples: int) -> Wrenches:
-    """Return no wrenches at so many samples."""
-    return Wrenches(np.zeros(0, dtype=np.int64), *np.zeros((2, samples, 0, 3)))
+def press(t: Tables, m: Motion, inertial: Array, gravity: Array, with_reactions: bool,
+          wrenches: Mapping[int, tuple[Array, Array]] | None = None) -> Loads:
+    """Return the forces that move bodies and apply wrenches.
 
-
-def press(t: Tables, m: Motion, inertial: Array, gravity: Array, wrenches: Wrenches,
-          with_reactions: bool) -> Loads:
-    """Return the forces that move bodies (J + 1, 10) and apply wrenches.
-
-    With or without reactions of closures.
+    Parameters
+    ----------
+    t : Tables
+    m : Motion
+    inertial : (J + 1, 10) array
+    gravity : (3,) array
+    with_reactions : bool
+        Whether those of closures are filled in.
+    wrenches : mapping of int to (force, moment), (N, 3) each, optional
+        That links apply to the world, by the joints that move them, in the base's frame, about
+        the origins of these joints [N, N m].
     """
     o = new_loads(t, m)
+    for joint, (force, moment) in (wrenches or {}).items():
+        o.f[:, joint] += force
+        o.n[:, joint] += moment
     loop = compiled_or_none(_press, len(m.q))
     if loop is not None:
-        loop(t, m, inertial, gravity, wrenches, with_reactions, o)
+        loop(t, m, inertial, gravity, with_reactions, o)
         return o
     views = samples_last(m), samples_last(o)
-    applied = wrenches._replace(force=np.moveaxis(wrenches.force, 0, -1),
-                                moment=np.moveaxis(wrenches.moment, 0, -1))
-    apply_bodies(t, views[0], inertial, gravity, applied, views[1])
+    apply_bodies(t, views[0], inertial, gravity, views[1])
     if with_reactions:
         react(t, *views)
     return o

@@ -458,22 +458,6 @@ def _angle_acceleration(t: Tables, m: Motion, k: int, i: int, j: int) -> Any:
     return dot(dda, b) + dot(a, ddb) + 2.0 * dot(da, db)
 
 
-class Wrenches(NamedTuple):
-    """What links apply to the world beside their bodies, for N samples.
-
-    Parameters
-    ----------
-    joint : (K,) int array
-        Joints that move the links.
-    force, moment : (N, K, 3) arrays
-        In the base's frame, about the origins of these joints [N, N m].
-    """
-
-    joint: Any
-    force: Any
-    moment: Any
-
-
 class Loads(NamedTuple):
     """Forces of N samples; per sample, in the base's frame.
 
@@ -499,11 +483,11 @@ class Loads(NamedTuple):
     rows: Any
 
 
-def apply_bodies(t: Tables, m: Motion, inertial: Any, gravity: Any, x: Wrenches, o: Loads) -> None:
-    """Fill in the forces that move the bodies, `inertial` (J + 1, 10), and apply the wrenches."""
-    for j in range(len(t.parent)):
-        for c in range(3):
-            o.f[j, c] = o.n[j, c] = 0.0
+def apply_bodies(t: Tables, m: Motion, inertial: Any, gravity: Any, o: Loads) -> None:
+    """Add the forces that move the bodies, `inertial` (J + 1, 10), and fill in what follows.
+
+    `o.f` and `o.n` hold what links apply to the world beside them.
+    """
     g = Vector(gravity[0], gravity[1], gravity[2])
     for j in range(1, len(t.parent)):
         mass = inertial[j, 0]
@@ -511,13 +495,10 @@ def apply_bodies(t: Tables, m: Motion, inertial: Any, gravity: Any, x: Wrenches,
             continue
         h = turned(m.R, j, Vector(inertial[j, 1], inertial[j, 2], inertial[j, 3]))
         a, w, wd = minus(vector(m.ud, j), g), vector(m.w, j), vector(m.wd, j)
-        put(o.f, j, plus(plus(times(mass, a), product(wd, h)), product(w, product(w, h))))
+        increase(o.f, j, plus(plus(times(mass, a), product(wd, h)), product(w, product(w, h))))
         spin = plus(_inertia_times(m.R, j, inertial, wd),
                     product(w, _inertia_times(m.R, j, inertial, w)))
-        put(o.n, j, plus(spin, product(h, a)))
-    for k in range(len(x.joint)):
-        increase(o.f, x.joint[k], vector(x.force, k))
-        increase(o.n, x.joint[k], vector(x.moment, k))
+        increase(o.n, j, plus(spin, product(h, a)))
     transmit(t, m, o)
 
 

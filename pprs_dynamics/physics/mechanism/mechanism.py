@@ -25,7 +25,6 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.linkage import (
     follow,
     friction_efforts,
-    no_wrenches,
     openings,
     press,
     twists,
@@ -35,7 +34,6 @@ from pprs_dynamics.physics.mechanism.linkage_equations import (
     JointFriction,
     Loads,
     Motion,
-    Wrenches,
 )
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.structure import Structure
@@ -232,21 +230,19 @@ class Linkage:
         """Angular and linear velocity of links per rate of drives, (N, J + 1, 3, D)."""
         return twists(self.structure.tables, self.motion)
 
-    def loads(self, mechanism: Mechanism, wrenches: Wrenches | None = None,
-              with_reactions: bool = False) -> Loads:
-        """Return the forces that move the bodies and apply wrenches, by default none."""
-        if wrenches is None:
-            wrenches = no_wrenches(len(self.motion.q))
+    def loads(self, mechanism: Mechanism, with_reactions: bool = False,
+              wrenches: Mapping[int, tuple[Array, Array]] | None = None) -> Loads:
+        """Return the forces that move the bodies and apply wrenches; see `press`."""
         return press(self.structure.tables, self.motion, mechanism.by_joint,
-                     np.array(mechanism.gravity, dtype=float), wrenches, with_reactions)
+                     np.array(mechanism.gravity, dtype=float), with_reactions, wrenches)
 
     def efforts(self, mechanism: Mechanism) -> Array:
         """Return the efforts of the drives that move the bodies, (N, D)."""
         efforts: Array = self.loads(mechanism).efforts
         return efforts
 
-    def at_tool(self, wrench: Array) -> Wrenches:
-        """Return wrenches that the tool applies.
+    def at_tool(self, wrench: Array) -> dict[int, tuple[Array, Array]]:
+        """Return wrenches that the tool applies as those of its joint; see `press`.
 
         Parameters
         ----------
@@ -256,8 +252,7 @@ class Linkage:
         row, _ = self.structure.links[self.structure.tool]
         arm = self.frame_of(self.structure.tool).p - self.motion.p[:, row]
         force, moment = wrench[:, :3], wrench[:, 3:] + np.cross(arm, wrench[:, :3])
-        return Wrenches(np.array([row], dtype=np.int64), np.ascontiguousarray(force)[:, None],
-                        np.ascontiguousarray(moment)[:, None])
+        return {row: (force, moment)}
 
     def regressor(self, mechanism: Mechanism) -> Array:
         """Return the derivatives of the efforts by the bodies' parameters, (N, D, 10 B)."""
@@ -332,20 +327,26 @@ class LinkageState(JointMotion):
         efforts: Array = self.reactions.efforts + self.robot.armature * self.acceleration
         return efforts
 
-    @lazy
-    def guide_load(self) -> Array:
-        """What a drive's gear carries [N m, N]: the size of its effort without friction.
+    @property
+    def transmitted(self) -> Array:
+        """Efforts that the drives' gears pass on, without friction [N m, N].
 
         The motor accelerates its rotor on its own side of the gear.
         """
-        load: Array = np.abs(self.reactions.efforts)
+        efforts: Array = self.reactions.efforts
+        return efforts
+
+    @lazy
+    def guide_load(self) -> Array:
+        """What a drive's gear carries [N m, N]: the size of what it passes on."""
+        load: Array = np.abs(self.transmitted)
         return load
 
     @lazy
     def reactions(self) -> Loads:
         """What joints and closures transmit without friction."""
         wrenches = None if self.load is None else self.linkage.at_tool(self.load.wrench)
-        return self.linkage.loads(self.robot, wrenches, with_reactions=True)
+        return self.linkage.loads(self.robot, with_reactions=True, wrenches=wrenches)
 
     def against_friction(self, friction: JointFriction) -> Array:
         """Return the drives' efforts against friction of joints, (N, D)."""

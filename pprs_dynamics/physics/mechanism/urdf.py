@@ -46,6 +46,8 @@ LARGEST_FILE = 20_000_000  # bytes; descriptions of robots without meshes have s
 Item = TypeVar('Item')
 KINDS = (REVOLUTE, CONTINUOUS, PRISMATIC, FIXED, FLOATING)
 # Macros, and expressions in attributes, as xacro has them.
+# What xacro made of a file keeps its comments, with what was commented out.
+COMMENT = re.compile(rb'<!--.*?-->', re.DOTALL)
 XACRO = re.compile(rb'<xacro:|=["\'][^"\']*\$[{(]')
 # Types of <constraint>, as those of joints, and what they are here.
 CLOSURES = {'fixed': 'fixed', 'revolute': 'revolute', 'continuous': 'revolute',
@@ -95,7 +97,7 @@ def expanded(path: str) -> bytes:
         Where the file cannot be read, or holds xacro that cannot be run.
     """
     content = read_content(path)
-    if not XACRO.search(content):
+    if not XACRO.search(COMMENT.sub(b'', content)):
         return content
     try:
         import xacro
@@ -136,9 +138,10 @@ def _described(content: bytes, path: str) -> Description:
             if link not in links:
                 raise UnreadableFileError(path, f'constraint {loop.name} is on {link}, which is '
                                           'no link')
-    remarks = (*_impossible_bodies(links, joints), *_unused(robot, joints, transmissions))
     return Description(path, links, joints, hashlib.sha256(content).hexdigest(), loops,
-                       remarks=remarks, transmissions=transmissions)
+                       remarks=tuple(_unused(robot, joints, transmissions)),
+                       transmissions=transmissions,
+                       faults=tuple(_impossible_bodies(links, joints)))
 
 
 def _transmission(element: ElementTree.Element) -> Transmission:

@@ -36,6 +36,7 @@ from pprs_dynamics.physics.model.keys import ARM as ARM_BLOCK
 from pprs_dynamics.physics.model.keys import GAIN, Key, drives_key, keys_of, mechanism_block
 from pprs_dynamics.physics.model.limits import JointLimits
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
+from pprs_dynamics.physics.model.recorded_names import CURRENT, gravity_in_efforts
 from pprs_dynamics.physics.model.robot_block import (
     described_values,
     joint_radii,
@@ -115,9 +116,15 @@ class ArmModel(ForceModel):
         return self.limits.efforts
 
     @property
+    def faults(self) -> tuple[str, ...]:
+        """Sentences on bodies that cannot be, unless the file has other inertia than the URDF."""
+        return () if self.values['links.inertia'] else self.robot.structure.description.faults
+
+    @property
     def efforts_in_amperes(self) -> bool:
         """Whether efforts of recordings are currents."""
-        return bool(self.values[f'{self.block}.effort_unit'] == 'A')
+        return (self.effort_kind == CURRENT
+                or bool(self.values[f'{self.block}.effort_unit'] == 'A'))
 
     @property
     def rest_speed(self) -> float:
@@ -227,7 +234,7 @@ def _mechanism(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
             name = next(name for name, at in structure.rows.items() if at == row)
             raise ModelError('links.mass', float(mass), f'be greater than 0 for what {name} moves')
     robot = Mechanism(structure, bodies, inertial, np.array(values[f'{block}.armature']),
-                      values[f'{block}.gravity'], joint_radii(values))
+                      gravity_in_efforts(values, f'{block}.gravity'), joint_radii(values))
     if block != ARM_BLOCK:
         _require_driven_bodies(robot)
     return robot

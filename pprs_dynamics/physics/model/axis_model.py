@@ -25,6 +25,7 @@ from pprs_dynamics.physics.model.effects_block import added_effects
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.keys import AXIS_KEYS, is_axis, is_mechanism
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
+from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
 from pprs_dynamics.physics.three_pprs.robot import AXIS
 
 # The motion of an axis is that of its only drive.
@@ -65,8 +66,13 @@ class AxisState(JointMotion):
 
     @property
     def guide_load(self) -> Array:
-        """Unknown, and constant: dry friction is a force here, not a coefficient; (N, 1) [N]."""
-        return np.zeros_like(self.velocity)
+        """What gear or screw carry, (N, 1) [N]; the weight on the guide is constant and unknown."""
+        return np.abs(self.transmitted)
+
+    @property
+    def transmitted(self) -> Array:
+        """Force that gear or screw pass on, without friction, (N, 1) [N]."""
+        return self.rigid_force
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +108,8 @@ class AxisModel(ForceModel):
             friction = AxisFriction(values['axis.viscous'], values['axis.coulomb'])
             effects = (friction, AxisOffset(values['axis.offset']),
                        *added_effects(parameters, cls, cls.drives))
-            return cls(mass=values['axis.mass'], gravity=values['axis.gravity'], effects=effects,
+            return cls(mass=values['axis.mass'], gravity=gravity_in_efforts(values, 'axis.gravity'),
+                       effects=effects,
                        reversal=Reversal(values['friction.reversal_velocity']), values=values,
                        source=source)
 

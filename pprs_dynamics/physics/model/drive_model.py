@@ -33,6 +33,7 @@ from pprs_dynamics.physics.model.limits import Limits
 from pprs_dynamics.physics.model.one_pass import OnePass
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
+from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.robot import Geometry, Masses, Robot
 from pprs_dynamics.physics.three_pprs.state import MechanismState, solve_mechanism
@@ -113,7 +114,8 @@ class DriveModel(ForceModel):
                     raise ModelError(stroke, values[stroke],
                                      'be a lower and a higher position [m]')
             robot = Robot(Geometry(**_group(values, 'geometry.')),
-                          Masses(**_group(values, 'masses.')), values['gravity'])
+                          Masses(**_group(values, 'masses.')),
+                          gravity_in_efforts(values, 'gravity'))
             limits = Limits.of(values)
             effects = (ActiveFriction(**_group(values, 'friction.drives.')),
                        _passive_friction(values, limits),

@@ -31,7 +31,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.keys import FILES, Key, title_of
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
-from pprs_dynamics.physics.model.recorded_names import joint_names, recorded_columns
+from pprs_dynamics.physics.model.recorded_names import effort_kind, joint_names, recorded_columns
 from pprs_dynamics.physics.three_pprs.state import DriveStates
 
 RIGID_BODY = 'rigid_body'
@@ -250,9 +250,19 @@ class ForceModel(ABC):
         return np.full(len(self.drives), np.inf)
 
     @property
+    def faults(self) -> tuple[str, ...]:
+        """Sentences on bodies of the model that cannot be."""
+        return ()
+
+    @property
     def efforts_in_amperes(self) -> bool:
         """Whether efforts of recordings are currents."""
         return False
+
+    @property
+    def effort_kind(self) -> str:
+        """What the efforts of recordings are: one of `EFFORT_KINDS`."""
+        return effort_kind(self.values)
 
     @property
     def recorded_gain(self) -> Array:

@@ -6,7 +6,7 @@
 A model file may hold `joint_prefix`, `joint_map: {DRIVE: JOINT}` and `columns: {time: COLUMN,
 time_scale: NUMBER, rate: NUMBER, decimal: ",", files: {position: FILE, …}, DRIVE: {position:
 COLUMN, velocity: COLUMN, effort: COLUMN or current: COLUMN, scale: NUMBER, position_scale: NUMBER,
-velocity_scale: NUMBER}}`.
+velocity_scale: NUMBER}}`, and `effort_kind`: what efforts are.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any
 
 from pprs_dynamics.drives import Column, DriveColumns, RecordedColumns
 from pprs_dynamics.errors import ModelError, UnknownNameError
+from pprs_dynamics.physics.model.keys import is_gain
 
 PREFIX, MAP, COLUMNS = 'joint_prefix', 'joint_map.', 'columns.'
 TIME, FILES = 'time', 'files.'
@@ -24,6 +25,9 @@ QUANTITIES = ('position', 'velocity', 'effort', 'current')
 SCALES = ('scale', 'position_scale', 'velocity_scale')
 OF_TABLE = (TIME, 'time_scale', 'rate', 'decimal')
 OF_FILES = (TIME, *QUANTITIES)
+EFFORT_KIND = 'effort_kind'
+MEASURED, CURRENT, COMMANDED, WITHOUT_GRAVITY = EFFORT_KINDS = (
+    'measured', 'current', 'commanded', 'without_gravity')
 
 
 def joint_names(values: Mapping[str, Any], drives: Sequence[str]) -> tuple[str, ...]:
@@ -51,6 +55,39 @@ def joint_names(values: Mapping[str, Any], drives: Sequence[str]) -> tuple[str, 
             raise ModelError(f'{MAP}{drives[number]}', name, 'be another name than that of '
                              f'{drives[names.index(name)]}')
     return names
+
+
+def effort_kind(values: Mapping[str, Any]) -> str:
+    """Return what the efforts of recordings are, by a model file: one of `EFFORT_KINDS`.
+
+    Raises
+    ------
+    ModelError
+        For another word, and for currents of a model without a gain.
+    """
+    kind = values.get(EFFORT_KIND, MEASURED)
+    if not isinstance(kind, str) or kind not in EFFORT_KINDS:
+        raise ModelError(EFFORT_KIND, kind, f'be one of {", ".join(EFFORT_KINDS)}')
+    if kind == CURRENT and not any(is_gain(key) for key in values):
+        raise ModelError(EFFORT_KIND, kind, 'be another one: only an arm and a robot with loops '
+                         'have a gain, by which currents become efforts')
+    return kind
+
+
+def gravity_in_efforts(values: Mapping[str, Any], key: str) -> Any:
+    """Return the gravity that the efforts of a model's drives hold [m/s^2].
+
+    Parameters
+    ----------
+    values : mapping
+        Of all keys of a model.
+    key : str
+        That of gravity: a number, or the vector in the base.
+    """
+    gravity = values[key]
+    if effort_kind(values) != WITHOUT_GRAVITY:
+        return gravity
+    return 0.0 if isinstance(gravity, float) else (0.0,) * len(gravity)
 
 
 def recorded_columns(values: Mapping[str, Any], drives: Sequence[str]) -> RecordedColumns | None:

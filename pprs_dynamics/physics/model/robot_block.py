@@ -14,7 +14,12 @@ import numpy as np
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction, friction_rows
-from pprs_dynamics.physics.mechanism.description import Description, Frame, Loop
+from pprs_dynamics.physics.mechanism.description import (
+    Description,
+    Frame,
+    Loop,
+    Transmission,
+)
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
 from pprs_dynamics.physics.model.keys import ARM, POSE, drives_key, mechanism_block
@@ -90,11 +95,17 @@ def _structure(description: Description, block: str, base: str, tool: str,
 
 
 def _require_one_motor_each(description: Description, drives: tuple[str, ...], block: str) -> None:
-    for each in description.transmissions:
-        kind = each.kind.lower()
-        if any(word in kind for word in COUPLED) and set(each.joints) & set(drives):
-            raise ModelError(drives_key(block), list(each.joints), 'have a motor each, but share a '
-                             f'transmission {kind} in the URDF: coupled joints are not covered')
+    for each in coupled(description):
+        if set(each.joints) & set(drives):
+            raise ModelError(
+                drives_key(block), list(each.joints), 'have a motor each, but share a transmission '
+                f'{each.kind.lower()} in the URDF: coupled joints are not covered')
+
+
+def coupled(description: Description) -> list[Transmission]:
+    """Return the transmissions of a description whose motors do not move one joint each."""
+    return [each for each in description.transmissions
+            if any(word in each.kind.lower() for word in COUPLED)]
 
 
 def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[str, Any]:

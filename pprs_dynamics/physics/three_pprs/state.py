@@ -55,6 +55,10 @@ class DriveStates(Protocol):
     def guide_load(self) -> Array:
         """[N], (N, D)."""
 
+    @property
+    def transmitted(self) -> Array:
+        """What gears or screws pass on to the mechanism, without friction [N], (N, D)."""
+
 
 class MechanismKinematics:
     """Kinematics of a mechanism along a motion, independent of its masses; evaluated lazily.
@@ -180,6 +184,11 @@ class MechanismState:
     def guide_load(self) -> Array:
         """Normal forces on the drives' guides [N]."""
         return self.rigid_body.guide_load
+
+    @property
+    def transmitted(self) -> Array:
+        """Forces that the drives' screws pass on, without friction [N]."""
+        return self.rigid_body.force
 
     @property
     def direction(self) -> Array:

@@ -28,7 +28,7 @@ Condition = Literal['OK', 'WAITING', 'CLOCK', 'CONFLICT',
                     'CURVE',
                     'UNCONFIGURED', 'INACTIVE', 'FINALIZED',
                     'HOLD', 'LATE', 'REFUSED', 'SATURATED', 'STOPPED',
-                    'CHANGED',
+                    'CHANGED', 'UNEXPLAINED', 'GAPS',
                     'CONTROLLER']
 Code = RejectionCode | Condition
 

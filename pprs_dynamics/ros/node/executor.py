@@ -28,6 +28,7 @@ from pprs_dynamics.ros.node.rclpy_internals import (
     call_if_due,
     missing,
     take,
+    works,
 )
 
 STOP_SIGNALS = frozenset({signal.SIGINT, signal.SIGTERM})
@@ -61,9 +62,11 @@ class PromptExecutor(StoppableExecutor):
     for each message, which costs more than the model. Here messages and timers are served at
     once, and only services and guard conditions go that way. Event handlers, which tell of QoS
     that does not fit, are looked at once a second. At 500 Hz an echo node takes 0.35 ms of
-    processor time a message with it, 0.76 ms with rclpy's; with the EventsExecutor of rclpy 9.1.2
-    it answers nothing, and takes a quarter of a core while nothing comes. With an rclpy whose
-    internals have changed, everything goes rclpy's way.
+    processor time a message with it, 0.76 ms with rclpy's, and the feedforward node 0.34 ms against
+    0.57 to 0.84; with the EventsExecutor of rclpy 9.1.2
+    it answers nothing, and takes a quarter of a core while nothing comes. Before anything is
+    served a timer is tried. With an rclpy whose internals have changed, raise or do nothing,
+    everything goes rclpy's way.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -82,7 +85,10 @@ class PromptExecutor(StoppableExecutor):
         reason = f'{", ".join(names)} missing' if (names := missing()) else ''
         if not reason:
             try:
-                self._spin_promptly()
+                if all(works(node) for node in self.get_nodes()[:1]):
+                    self._spin_promptly()
+                else:
+                    reason = 'a timer that was due was not served'
             except InternalsChangedError as error:
                 reason = str(error)
         if reason:

@@ -15,6 +15,8 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.lifecycle import LifecycleNode
@@ -31,6 +33,7 @@ except (ImportError, AttributeError):
     rclpy_implementation = None
 
 FOR_EVER = -1  # [ns]
+TRIALS, TRIAL = 20, 50_000_000  # waits for a timer that is due at once; each at most so long [ns]
 # What handles must offer for messages and timers to be served without rclpy's executor.
 NAMES = {
     'WaitSet': ('clear_entities', 'add_subscription', 'add_timer', 'add_guard_condition',
@@ -41,7 +44,8 @@ NAMES = {
 }
 OVERRIDES = '_parameter_overrides'
 STATE_MACHINE = '_state_machine'
-_CHANGED = (AttributeError, TypeError)
+# RuntimeError is the public base of rclpy's own errors.
+_CHANGED = (AttributeError, TypeError, RuntimeError)
 
 
 class InternalsChangedError(Exception):
@@ -132,6 +136,25 @@ def call_if_due(timer: Timer) -> bool:
     except _CHANGED as error:
         raise InternalsChangedError(f'Timer: {error}') from error
     return bool(due)
+
+
+def works(node: Node) -> bool:
+    """Return whether a timer of a node is served, as `WaitSet` and `call_if_due` would.
+
+    Raises
+    ------
+    InternalsChangedError
+    """
+    timer = node.create_timer(0.0001, lambda: None, clock=Clock(clock_type=ClockType.STEADY_TIME))
+    try:
+        wait_set = WaitSet(node.context)
+        for _ in range(TRIALS):
+            wait_set.wait((), [timer], timeout=TRIAL)
+            if wait_set.ready('timer', [timer]) and call_if_due(timer):
+                return True
+        return False
+    finally:
+        node.destroy_timer(timer)
 
 
 def destroy_state_machine(node: LifecycleNode) -> None:

@@ -46,7 +46,8 @@ class StatusReporter:
         self, node: Node, facts: dict[str, Any], counters: dict[str, int],
         hardware: str, refresh: Callable[[], None] | None = None,
     ) -> None:
-        self._node, self.facts, self._counters = node, facts, counters
+        self._node, self._counters = node, counters
+        self.facts = {'robot': hardware, **facts}
         self._hardware, self._refresh = hardware, refresh
         self._publisher = publisher(node, String, '~/status', LATCHED)
         self._diagnostics = None

@@ -127,13 +127,14 @@ class Api:
     def answers(self) -> dict[str, Callable[[Any], Response]]:
         """Return what is asked for by GET, with a query."""
         return {'model.yaml': self.model, 'ledger.json': self.ledger,
-                'experiment.csv': self.experiment_file, **{work.__name__: work for work in (
+                'experiment.csv': self.experiment_file, 'live/machine': self.live_machine,
+                **{work.__name__: work for work in (
                     self.screen, self.curves, self.scatter, self.robot, self.files, self.live)}}
 
     def changes(self) -> dict[str, Callable[[Fields], Response]]:
         """Return what is asked for by POST, with a JSON object."""
-        return {'live/set': self.live_set, 'live/take': self.live_take,
-                **{work.__name__: work for work in (
+        return {'live/set': self.live_set, 'live/restore': self.live_restore,
+                'live/take': self.live_take, **{work.__name__: work for work in (
                     self.tick, self.shares, self.open, self.invite)},
                 **{name: partial(self._change, change) for name, change in CHANGES.items()}}
 
@@ -270,8 +271,17 @@ class Api:
         return JSONResponse(self._live.to_dict())
 
     def live_set(self, body: Fields) -> Response:
-        """Set the model with the ticked effects on the running nodes."""
-        return JSONResponse({'nodes': self._live.set_model(self.hub.the_session.ticked_model())})
+        """Set the model with the ticked effects on the running nodes, all or none."""
+        return JSONResponse(self._live.set_model(
+            self.hub.the_session.ticked_model(), body.text('confirmed')))
+
+    def live_restore(self, body: Fields) -> Response:
+        """Set the running nodes back to what they had before."""
+        return JSONResponse(self._live.restore(body.text('confirmed')))
+
+    def live_machine(self, query: Any) -> Response:
+        """Answer what would be set, for a person to confirm."""
+        return JSONResponse({'machine': self._live.machine()})
 
     def live_take(self, body: Fields) -> Response:
         """Make what came in last a recording of the session."""

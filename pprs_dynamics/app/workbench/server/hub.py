@@ -41,8 +41,14 @@ class LiveSource(Protocol):
     def take(self, path: Path) -> None:
         """Write what the ring buffer holds as a recording."""
 
-    def set_model(self, model: ForceModel) -> dict[str, str]:
-        """Set a model on the running nodes; return what each said, '' where it took it."""
+    def machine(self) -> str:
+        """Return what would be set, in words, for a person to confirm; '' where no node runs."""
+
+    def set_model(self, model: ForceModel, confirmed: str) -> dict[str, Any]:
+        """Set a model on the running nodes, all or none; return what each said."""
+
+    def restore(self, confirmed: str) -> dict[str, Any]:
+        """Set the nodes back to what they had before the last model."""
 
     def close(self) -> None:
         """End it."""

@@ -18,6 +18,7 @@ class CoulombFriction(DriveEffect):
 
     name: ClassVar[str] = 'coulomb_friction'
     is_friction: ClassVar[bool] = True
+    at_one_load: ClassVar[str] = 'load_friction'
     linear = (Parameter('force', 'F', 'N', 'size of the friction force', -1e6, 1e6, scale=0.5),)
     unphysical_below: ClassVar[Mapping[str, float]] = {'force': 0.0}
     card = Card(

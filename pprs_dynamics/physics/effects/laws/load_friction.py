@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
 # Standard deviation of the load's exponent about 1: friction of a Hertzian contact grows with the
@@ -21,9 +21,8 @@ class LoadFriction(DriveEffect):
     """Force against the motion in proportion to the guide's load: mu is not what was assumed."""
 
     name: ClassVar[str] = 'load_friction'
-    # The load of an axis's guide is constant, so that this is coulomb_friction there.
-    acts_in = frozenset({PLATFORM, ARM})
     is_friction: ClassVar[bool] = True
+    at_one_load: ClassVar[str] = 'coulomb_friction'
     linear = (Parameter('coefficient', 'dmu', '1', "friction coefficient beyond the model's",
                         -100.0, 100.0, scale=0.02),)
     unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}
@@ -38,7 +37,7 @@ class LoadFriction(DriveEffect):
         'Hamon, Gautier, Garrec, Dynamic identification of robots with a dry friction model '
         'depending on load and velocity, IROS, 2010')
     arm_card = Card(
-        'dmu |tau| sgn(q_dot), tau the torque of the joint without friction',
+        'dmu |tau| sgn(q_dot), tau what the gear transmits: without friction and the rotor',
         'a step at each reversal that is higher where the joint carries more weight or accelerates '
         'more',
         'every gear has it: teeth and bearings of a harmonic or planetary gear rub in proportion '

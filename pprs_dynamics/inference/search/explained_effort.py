@@ -1,0 +1,89 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""How much of the drives' efforts a model explains, and where that is little.
+
+Whatever a search for effects says: a model that explains less than half of what a drive does is
+not yet a model of that drive, and no noise accounts for the rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.design import LEAST_MOVING, TURNED
+from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+CONSTANT = 1e-9  # of an effort's size, below which a change of it is rounding
+# Third differences of white noise have this many times its variance (1 + 9 + 9 + 1).
+THIRD_DIFFERENCES = 20.0
+
+
+def explained_shares(residuals: Residuals, left: Array | None = None) -> dict[str, float]:
+    """Return the share of the variance of each measured effort that a model explains.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    left : (M, D) array, optional
+        Measured minus model [N]; by default the error of the residuals.
+
+    Returns
+    -------
+    dict of str to float
+        1 - var(left) / var(effort) of the drives that were measured; below 0 where the error is
+        larger than the effort, NaN where that is constant.
+    """
+    error = residuals.error if left is None else left
+    shares = {}
+    for d, name in enumerate(residuals.drives):
+        known = np.isfinite(residuals.measured[:, d])
+        if not known.any():
+            continue
+        effort = residuals.measured[known, d]
+        swing = float(np.std(effort))
+        constant = swing <= CONSTANT * max(float(np.abs(effort).max()), CONSTANT)
+        shares[name] = float('nan') if constant else 1 - float(
+            np.var(error[known, d])) / swing ** 2
+    return shares
+
+
+def little_explained(model: ForceModel, residuals: Residuals, left: Array | None = None,
+                     decisions: Decisions = DECISIONS) -> dict[str, float]:
+    """Return the drives of whose effort a model explains little, with the shares; least first.
+
+    Of drives that move, and whose effort is more than white noise: where a drive stands, static
+    friction holds whatever it is loaded with, and noise is for no model to explain.
+
+    Parameters
+    ----------
+    model : ForceModel
+        Its width of reversal tells motion from rest.
+    residuals : Residuals
+    left : (M, D) array, optional
+        See `explained_shares`.
+    decisions : Decisions, optional
+    """
+    little = {name: share for name, share in explained_shares(residuals, left).items()
+              if share < decisions.explained and _can_be_explained(
+                  model, residuals, residuals.drives.index(name), decisions)}
+    return dict(sorted(little.items(), key=lambda one: one[1]))
+
+
+def _can_be_explained(model: ForceModel, residuals: Residuals, d: int,
+                      decisions: Decisions) -> bool:
+    """Return whether a drive moves, and the variance of its effort is not mostly white noise."""
+    velocity = residuals.variable('velocity', d)
+    width = float(model.reversal.widths(len(residuals.drives))[d])
+    if velocity is not None and np.mean(np.abs(velocity) > TURNED * width) < LEAST_MOVING:
+        return False
+    squares = [np.diff(residuals.measured[part, d], 3) ** 2 for part in residuals.stretches(d)]
+    every = np.concatenate(squares)
+    every = every[np.isfinite(every)]
+    if not len(every):
+        return True
+    white = float(every.mean()) / THIRD_DIFFERENCES
+    return white < decisions.explained * float(np.nanvar(residuals.measured[:, d]))

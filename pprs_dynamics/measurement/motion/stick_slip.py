@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Stick-slip: a slow drive that stands, is loaded until it breaks away, slips, and stands again.
+
+It is no force law of the drive alone but a relaxation oscillation of falling friction, the
+stiffness before the drive and its controller (B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit,
+Automatica 30 (1994) 1083). What tells it from a motion that was meant to pause is the effort: it
+builds up while the drive stands, and falls while it slips.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+
+WINDOWS = (0.5, 1.0, 2.0, 4.0)  # over which a mean speed is taken, of several periods each [s]
+STUCK = 0.25  # of the mean speed, below which a drive stands
+LEAST_STUCK = 0.25  # share of the time in which it stands
+LEAST_SLIPS = 8
+REGULAR = 0.3  # spread of the periods over their median, up to which they are one oscillation
+FASTEST = 0.95  # quantile of the speeds of slips that counts as the fastest
+LARGEST_STEP = 0.1  # of the stroke, in a slip: longer ones are what was asked for
+LEAST_STEP = 5.0  # quanta of the position in a slip: stairs of an encoder are no stick-slip
+
+
+@dataclass(frozen=True)
+class StickSlip:
+    """A relaxation oscillation of one drive.
+
+    Parameters
+    ----------
+    frequency : float
+        [Hz]
+    speed : float
+        Largest mean speed at which it was seen [m/s, rad/s].
+    step : float
+        Travel of a slip [m, rad].
+    slips : int
+    share : float
+        Of the recording's time.
+    """
+
+    frequency: float
+    speed: float
+    step: float
+    slips: int
+    share: float
+
+
+def find_stick_slip(time: Array, position: Array, effort: Array) -> StickSlip | None:
+    """Return the stick-slip of one drive, or None.
+
+    Parameters
+    ----------
+    time, position, effort : (N,) arrays
+        Of one segment without gaps [s; m, rad; N, N m].
+    """
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    moved = np.abs(np.diff(position))
+    if step <= 0 or not np.any(moved) or not np.all(np.isfinite(effort)):
+        return None
+    quantum = float(moved[moved > 0].min())
+    found = [_within(time, position, effort, step, window, quantum) for window in WINDOWS]
+    return max((one for one in found if one is not None), key=lambda one: one.slips, default=None)
+
+
+def _within(time: Array, position: Array, effort: Array, step: float, window: float,
+            quantum: float) -> StickSlip | None:
+    half = round(window / step / 2)
+    if half < 4 or len(time) < 4 * half:
+        return None
+    inner = slice(half, len(time) - half)
+    mean = (position[2 * half:] - position[:-2 * half]) / (2 * half * step)
+    velocity = np.gradient(position, step)[inner]
+    moving = np.abs(mean) > LEAST_STEP * quantum / window
+    stuck = moving & (velocity * np.sign(mean) < STUCK * np.abs(mean))
+    slipping = moving & ~stuck
+    begins = np.flatnonzero(stuck[:-1] & slipping[1:]) + 1
+    if len(begins) < LEAST_SLIPS or stuck.sum() < LEAST_STUCK * max(moving.sum(), 1):
+        return None
+    direction, level = np.sign(mean), effort[inner]
+    # From one slip to the next in the same direction, without a turn between.
+    pairs = [(a, b) for a, b in pairwise(begins)
+             if np.all(direction[a:b] == direction[a]) and np.all(moving[a:b])]
+    if len(pairs) < LEAST_SLIPS:
+        return None
+    periods = np.array([(b - a) * step for a, b in pairs])
+    period = float(np.median(periods))
+    if np.median(np.abs(periods - period)) > REGULAR * period / 2 or period > window * 1.5:
+        return None
+    rises, falls, travels = [], [], []
+    for a, b in pairs:
+        end = a + int(np.argmax(stuck[a:b]))  # where the slip ends
+        rises.append((level[b - 1] - level[min(end, b - 1)]) * direction[a])
+        falls.append((level[min(end, b - 1)] - level[a]) * direction[a])
+        travels.append(abs(position[inner][b] - position[inner][a]))
+    travel = float(np.median(travels))
+    if (not np.median(rises) > 0 > np.median(falls)
+            or not LEAST_STEP * quantum < travel < LARGEST_STEP * np.ptp(position)):
+        return None
+    speed = float(np.quantile(np.array(travels) / periods, FASTEST))
+    covered = sum(b - a for a, b in pairs)
+    return StickSlip(1 / period, speed, travel, len(pairs), float(covered / len(time)))

@@ -1,0 +1,55 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Loss of a gear or screw in two quadrants: mu_d |tau| driving, mu_b |tau| driven back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.open_exponent import other_exponent
+
+
+class GearEfficiency(DriveEffect):
+    """A share of what a gear passes on is lost, another one where the load drives the motor."""
+
+    name: ClassVar[str] = 'gear_efficiency'
+    is_friction: ClassVar[bool] = True
+    linear = (Parameter('driving', 'mu_d', '1', 'share that is lost where the motor drives the '
+                        'load: 1 / efficiency - 1', -100.0, 100.0, scale=0.05),
+              Parameter('driven_back', 'mu_b', '1', 'share that is lost where the load drives the '
+                        'motor: 1 - efficiency', -100.0, 100.0, scale=0.05))
+    unphysical_below: ClassVar[Mapping[str, float]] = {'driving': 0.0, 'driven_back': 0.0}
+    card = Card(
+        'mu_d |tau| sgn(q_dot) for tau q_dot > 0, mu_b |tau| sgn(q_dot) else, tau what gear or '
+        'screw pass on',
+        'a step at each reversal that grows with the load, like load_friction, but another one '
+        'where a load is lifted than where it is let down: as if it were heavier and rubbed',
+        'every worm, screw, harmonic and planetary gear: teeth slide in proportion to what they '
+        'transmit, and more so while the motor drives; no value, with grease, wear and preload, is '
+        "the maker's for long",
+        'lift a load slowly, hold it, let it down slowly, then with twice the load: both steps '
+        'from the held effort must double, each in its own size; where they are alike it is '
+        'load_friction, where the middle of both is off it is a mass or the current gain',
+        'Wang, Kim, Directional efficiency in geared transmissions: characterization of '
+        'backdrivability towards improved proprioceptive control, ICRA, 2015')
+
+    @classmethod
+    def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return what is lost per share, driving and driven back.
+
+        With a smooth sgn s both turn over as |tau| s does: (|tau| s + tau s^2) / 2 and
+        (|tau| s - tau s^2) / 2.
+        """
+        size = abs(drive.transmitted) * drive.direction
+        turned = drive.transmitted * drive.direction ** 2
+        return ((size + turned) / 2, (size - turned) / 2)
+
+    @classmethod
+    def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
+        """Return what another exponent of the load adds, as to `load_friction`."""
+        return (tuple(other_exponent(drive.transmitted, one) for one in cls.columns(drive)),)

@@ -1,0 +1,105 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A model that explains little is told before all else, and never called adequate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_up_arm import JOINTS, motion, real_arm, record, write_arm
+
+from pprs_dynamics import ArmModel, compare, diagnose, fit
+from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.search.explained_effort import explained_shares, little_explained
+from pprs_dynamics.measurement.files.recording import Recording
+
+UNRELATED = 12.0  # [N m] of an effort that is no force of this machine
+
+
+def unrelated(model: ArmModel, seed: int = 5) -> Recording:
+    """Return a recording whose first effort follows nothing that the drives do."""
+    made = record(model, motion())
+    rng = np.random.default_rng(seed)
+    knots = rng.normal(size=len(made.time) // 40 + 2) * UNRELATED
+    effort = made.effort.copy()
+    effort[:, 0] = np.interp(np.arange(len(made.time)) / 40, np.arange(len(knots)), knots)
+    return replace(made, effort=effort)
+
+
+def test_shares_are_those_of_the_variance(tmp_path: Path) -> None:
+    model = real_arm(tmp_path)
+    residuals, _ = measure_residuals(model, [record(model, motion())])
+    left = residuals.measured * np.array([0.5, 1.0, 2.0])
+    shares = explained_shares(residuals, left + 7.0)
+    assert [shares[name] for name in JOINTS] == pytest.approx([0.75, 0.0, -3.0])
+
+
+def test_compare_says_first_that_a_model_explains_little(tmp_path: Path) -> None:
+    model = real_arm(tmp_path)
+    found = compare(model, unrelated(model))
+    share = found.comparison.drives['turn'].explained_variance
+    assert share < 0.5
+    assert found.verdict.startswith('the model explains')
+    assert 'of the effort of turn' in found.verdict
+    assert found.comparison.drives['turn'].grade == 'poor'
+    assert 'accounts for' not in found.verdict
+    assert found.to_dict()['explained']['turn'] == pytest.approx(share)
+    said = str(found)
+    assert 'pprs diagnose' not in said
+    assert 'pprs fit' in said
+
+
+def test_diagnose_calls_no_model_adequate_that_explains_little(tmp_path: Path) -> None:
+    model = real_arm(tmp_path)
+    found = diagnose(model, unrelated(model)).diagnosis
+    assert found.verdict == 'unknown'
+    assert 'turn' in found.little
+    words = word_diagnosis(found)
+    assert words.headline.startswith('The model')
+    assert 'of the effort of turn' in words.headline
+    assert 'Nothing to add' not in words.following
+    assert found.to_dict()['explained']['turn'] < 0.5
+
+
+def test_a_description_alone_is_fitted_first_and_explains_then(tmp_path: Path) -> None:
+    real = real_arm(tmp_path)
+    bare = ArmModel.load(write_arm(tmp_path))
+    made = record(real, motion())
+    before = compare(bare, made)
+    assert before.comparison.little
+    assert 'no friction yet' in str(before)
+    fitted = fit(bare, made)
+    assert not fitted.fit.little
+    assert min(fitted.to_dict()['explained'].values()) > 0.9
+    assert compare(fitted.model, made).comparison.little == {}
+
+
+def test_a_fit_that_explains_little_says_so_first(tmp_path: Path) -> None:
+    model = real_arm(tmp_path)
+    found = fit(model, unrelated(model))
+    assert 'turn' in found.fit.little
+    assert str(found).lstrip().startswith('the model explains')
+
+
+@pytest.mark.parametrize('size', [0.0, 0.05])
+def test_a_drive_that_stands_or_whose_effort_is_noise_has_nothing_to_explain(
+    tmp_path: Path, size: float,
+) -> None:
+    model = real_arm(tmp_path)
+    residuals, _ = measure_residuals(model, [record(model, motion())])
+    rng = np.random.default_rng(2)
+    noise = size * rng.normal(size=len(residuals))
+    quiet = replace(residuals, measured=residuals.measured.copy(), model=residuals.model.copy())
+    quiet.measured[:, 0], quiet.model[:, 0] = 3.0 + noise, 3.0
+    assert little_explained(model, quiet) == {}
+    still = replace(residuals, measured=residuals.measured.copy(), variables={
+        **residuals.variables, 'velocity': residuals.variables['velocity'] * [0.0, 1.0, 1.0]})
+    still.measured[:, 0] = 5 * np.sin(np.arange(len(residuals)) / 50)
+    assert little_explained(model, still) == {}
+    moving = replace(residuals, measured=still.measured)
+    assert set(little_explained(model, moving)) == {'turn'}

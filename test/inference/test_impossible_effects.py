@@ -1,0 +1,106 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What no machine can have is no finding, however well it fits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.possible import why_impossible, why_nothing
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.estimates import Estimate
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.catalogue import catalogue
+from pprs_dynamics.physics.model.axis_model import AxisModel, AxisMotion
+from pprs_dynamics.physics.model.model_file import build_model
+
+MODEL = AxisModel.load()
+MASS, VISCOUS, COULOMB = (MODEL.values[f'axis.{key}'] for key in ('mass', 'viscous', 'coulomb'))
+TIME = np.arange(0, 20, 0.005)
+
+
+def motion() -> AxisMotion:
+    q = np.zeros((3, len(TIME), 1))
+    for rate, size in ((0.2, 0.1), (0.5, 0.05), (1.3, 0.01)):
+        w = 2 * np.pi * rate
+        q[:, :, 0] += size * np.array([np.sin(w * TIME), w * np.cos(w * TIME),
+                                       -w * w * np.sin(w * TIME)])
+    return AxisMotion(*q, TIME)
+
+
+def recorded(effort: Array) -> Recording:
+    random = np.random.default_rng(5)
+    return Recording.from_arrays('run', TIME, motion().position, None,
+                                 effort + random.normal(0, 1.0, effort.shape), ('axis',))
+
+
+@pytest.fixture(scope='module')
+def design() -> Design:
+    return Design.of(MODEL, [recorded(MODEL.drive_forces(motion()).total)])
+
+
+IMPOSSIBLE: list[tuple[str, dict[str, float], str]] = [
+    ('drive_inertia', {'axis.mass': -1.2 * MASS}, 'inertia of -'),
+    ('drive_inertia', {'axis.mass': -0.8 * MASS}, ''),
+    ('viscous_friction', {'axis.coefficient': -1.2 * VISCOUS}, 'viscous friction of -'),
+    ('viscous_friction', {'axis.coefficient': -0.8 * VISCOUS}, ''),
+    ('coulomb_friction', {'axis.force': -1.2 * COULOMB}, 'dry friction of -'),
+    ('coulomb_friction', {'axis.force': -0.8 * COULOMB}, ''),
+    ('asymmetric_friction', {'axis.force_forward': 2 * COULOMB,
+                             'axis.force_backward': -2 * COULOMB}, 'dry friction of -'),
+    ('effort_gain', {'axis.gain': 0.6}, '1.6 times too large'),
+    ('effort_gain', {'axis.gain': -0.4}, '0.6 times too large'),
+    ('effort_gain', {'axis.gain': 0.4}, ''),
+    ('base_tilt', {'x': 1.57, 'y': 0.01}, 'leans by 90 degrees'),
+    ('base_tilt', {'x': 0.1, 'y': -0.2}, '')]
+
+
+@pytest.mark.parametrize(('name', 'values', 'clause'), IMPOSSIBLE)
+def test_what_no_machine_can_have_is_told(name: str, values: dict[str, float], clause: str,
+                                          design: Design) -> None:
+    known = {key: Estimate(value, 0.02 * abs(value), '') for key, value in values.items()}
+    said = why_impossible(catalogue()[name], known, design, DECISIONS)
+    assert clause in said
+    assert bool(said) == bool(clause)
+    assert not why_nothing(catalogue()[name], known)
+    # Within twice its uncertainty anything may be nothing, or what the model has.
+    unknown = {key: Estimate(value, abs(value), '') for key, value in values.items()}
+    assert 'holds 0' in why_nothing(catalogue()[name], unknown)
+
+
+def test_one_number_of_several_may_be_nothing() -> None:
+    known = {'axis.force_forward': Estimate(5.0, 0.2, 'N'),
+             'axis.force_backward': Estimate(0.1, 0.2, 'N')}
+    assert not why_nothing(catalogue()['asymmetric_friction'], known)
+
+
+def test_a_drive_constant_that_is_another_unit_is_no_effect() -> None:
+    """Told apart from mass and friction that all are too small only where gains may be large."""
+    loose = build_model({**MODEL.values, 'tolerances.effort_gain.gain': 1.0})
+    found = diagnose(loose, [recorded(1.9 * MODEL.drive_forces(motion()).total)])
+    assert found.verdict == 'unknown'
+    assert found.effects == ()
+    (gain,) = [one for one in found.unconfirmed if one.name == 'effort_gain']
+    assert gain.is_impossible
+    assert 'times too large, which is another unit' in gain.objection
+
+
+def test_a_gain_that_a_drive_may_have_is_one() -> None:
+    found = diagnose(MODEL, [recorded(1.2 * MODEL.drive_forces(motion()).total)])
+    assert [one.name for one in found.effects] == ['effort_gain']
+    assert found.effects[0].parameters['axis.gain'].value == pytest.approx(0.2, abs=0.02)
+
+
+def test_less_inertia_than_none_is_no_effect() -> None:
+    """Efforts that decelerate where they should accelerate, with the friction that there is."""
+    moved = motion()
+    light = build_model({**MODEL.values, 'axis.mass': 1e-6})
+    effort = light.drive_forces(moved).total - 0.3 * MASS * moved.acceleration
+    found = diagnose(MODEL, [recorded(effort)], as_it_is=True)
+    assert found.verdict != 'effect'
+    assert 'drive_inertia' not in [one.name for one in found.effects]

@@ -1,0 +1,258 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Efforts that are no measurement are told as what they look like; what is measured never is.
+
+Recordings are made here from what each kind is by definition: a controller's law of gravity, an
+error of position, a measurement without weight; the truth is known by how they were made.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import made_up_arm as arm
+import numpy as np
+import pytest
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.residuals.measured_effort import (
+    find_no_measurements,
+    kinds_of,
+    looks_like,
+)
+from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.axis_model import AxisModel, AxisMotion
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.model_file import build_model, load_model
+
+CASES = Path(__file__).resolve().parents[3] / 'shared' / 'cases'
+RATE = 200.0  # [Hz]
+DURATION = 20.0  # [s]
+# The first joint of the arm is upright, and carries none.
+WITHOUT_GRAVITY = {'swing': 'without_gravity', 'reach': 'without_gravity'}
+
+
+@dataclass
+class Run:
+    """A machine, its motion and the parts of what its drives apply, (N, D) each."""
+
+    model: ForceModel
+    time: Array
+    position: Array
+    velocity: Array
+    inertia: Array
+    gravity: Array
+    friction: Array
+
+    @property
+    def total(self) -> Array:
+        return self.inertia + self.gravity + self.friction
+
+    def of(self, effort: Array, noise: float = 0.005, seed: int = 0) -> Recording:
+        """Return a recording of an effort, with noise as a share of each drive's largest."""
+        random = np.random.default_rng(seed)
+        size = noise * np.abs(effort).max(axis=0)
+        return Recording.from_arrays(
+            'run', self.time, self.position + random.normal(0, 1e-6, self.position.shape), None,
+            effort + size * random.normal(size=effort.shape), self.model.drives)
+
+    def kinds(self, effort: Array, noise: float = 0.005) -> dict[str, str] | None:
+        return kinds_of(looks_like(self.model, [self.of(effort, noise)]))
+
+
+def run_of(model: ForceModel, motion: Any, still: Any) -> Run:
+    forces, rest = model.drive_forces(motion), model.drive_forces(still)
+    position, velocity, _ = forces.drive_motion
+    rigid, gravity = (one.parts['rigid_body'] for one in (forces, rest))
+    return Run(model, motion.time, position, velocity, rigid - gravity, gravity,
+               forces.total - rigid)
+
+
+def arm_run(folder: Path, **changes: Any) -> Run:
+    model, moved = arm.real_arm(folder, **changes), arm.motion(DURATION, RATE)
+    rest = np.zeros_like(moved.velocity)
+    return run_of(model, moved, type(moved)(moved.position, rest, rest, moved.time))
+
+
+def platform_run() -> Run:
+    moved = Excitation(DURATION, 1).motion(np.arange(0, DURATION, 1 / RATE))
+    rest = np.zeros_like(moved.linear_velocity)
+    still = type(moved)(moved.position, moved.orientation, rest, rest, rest, rest, moved.time)
+    return run_of(DriveModel.load(), moved, still)
+
+
+def axis_run(gravity: float) -> Run:
+    model = build_model({**AxisModel.load().values, 'axis.gravity': gravity})
+    time = np.arange(0, DURATION, 1 / RATE)
+    q = np.zeros((3, len(time), 1))
+    for rate, size in ((0.2, 0.1), (0.5, 0.05), (1.3, 0.01)):
+        w = 2 * np.pi * rate
+        for k, part in enumerate((np.sin(w * time), w * np.cos(w * time),
+                                  -w * w * np.sin(w * time))):
+            q[k, :, 0] += size * part
+    rest = np.zeros_like(q[0])
+    return run_of(model, AxisMotion(*q, time), AxisMotion(q[0], rest, rest, time))
+
+
+MACHINES = {'arm': arm_run, 'platform': lambda folder: platform_run(),
+            'axis': lambda folder: axis_run(0.0), 'upright axis': lambda folder: axis_run(-9.81)}
+
+
+@pytest.fixture(params=MACHINES)
+def run(request: pytest.FixtureRequest, tmp_path: Path) -> Run:
+    made: Run = MACHINES[request.param](tmp_path)
+    return made
+
+
+def every(run: Run, kind: str) -> dict[str, str]:
+    return dict.fromkeys(run.model.drives, kind)
+
+
+def test_what_is_measured_is_called_so(run: Run) -> None:
+    for noise in (1e-3, 0.01, 0.03):
+        assert run.kinds(run.total, noise) is None
+
+
+def test_a_model_that_is_off_makes_no_measurement_a_command(run: Run) -> None:
+    """Masses by a quarter, friction by half, a constant: what models are off by."""
+    assert run.kinds(1.25 * run.inertia + 0.8 * run.gravity + 1.5 * run.friction
+                     + 0.1 * np.abs(run.total).max(axis=0)) is None
+
+
+@pytest.mark.parametrize('gain', [0.05, 0.4, -1.0, 3.0])
+def test_a_gain_and_a_sign_are_no_command(run: Run, gain: float) -> None:
+    assert run.kinds(gain * run.total) is None
+
+
+def test_a_law_of_gravity_is_a_command(run: Run) -> None:
+    size = np.abs(run.total).max(axis=0)
+    effort = 1.1 * run.gravity + 1e-3 * size * np.random.default_rng(3).normal(
+        size=run.total.shape)
+    found = run.kinds(effort, 0.0)
+    assert found is not None
+    assert set(found.values()) == {'command'}
+
+
+def test_what_drives_lag_behind_is_an_error_of_position(run: Run) -> None:
+    assert run.kinds(0.05 * run.velocity) == every(run, 'position_error')
+
+
+def test_what_a_stiff_controller_lags_behind_under_the_effort_is_one_too(run: Run) -> None:
+    assert run.kinds(run.total / 2000) == every(run, 'position_error')
+
+
+def test_no_noise_at_all_is_computed(run: Run) -> None:
+    found = run.kinds(run.total, 0.0)
+    assert found is not None
+    assert set(found.values()) == {'noise_free'}
+
+
+@pytest.mark.parametrize('machine', ['arm', 'platform', 'upright axis'])
+def test_efforts_without_gravity_are_told_so(machine: str, tmp_path: Path) -> None:
+    run = MACHINES[machine](tmp_path)
+    found = run.kinds(run.total - run.gravity)
+    assert found is not None
+    assert set(found.values()) == {'without_gravity'}
+    # With half of it there is gravity, and a payload or a mass may be missing.
+    assert run.kinds(run.total - 0.7 * run.gravity) is None
+
+
+def test_a_motion_that_shows_nothing_tells_nothing(tmp_path: Path) -> None:
+    """So slowly that inertia is far below the noise."""
+    model, moved = arm.real_arm(tmp_path), arm.motion(DURATION, RATE)
+    slow = type(moved)(moved.position, moved.velocity / 30, moved.acceleration / 900,
+                       moved.time * 30)
+    forces = model.drive_forces(slow).total
+    recording = Recording.from_arrays(
+        'slow', slow.time, slow.position, slow.velocity,
+        forces + np.random.default_rng(0).normal(0, 0.5, forces.shape), model.drives)
+    assert find_no_measurements(model, recording) == ()
+
+
+def test_nothing_is_claimed_of_what_is_no_measurement(tmp_path: Path) -> None:
+    run = arm_run(tmp_path)
+    found = diagnose(run.model, [run.of(run.total - run.gravity)])
+    assert found.verdict == 'unknown'
+    assert found.effects == found.suspects == found.depends_on == ()
+    assert found.to_dict()['effort_looks_like'] == WITHOUT_GRAVITY
+
+
+def test_effort_kind_says_that_gravity_was_taken_out(tmp_path: Path) -> None:
+    run = arm_run(tmp_path)
+    model = build_model({**run.model.values, 'effort_kind': 'without_gravity'}, run.model.source)
+    recording = run.of(run.total - run.gravity)
+    assert looks_like(model, [recording]) == {}
+    motion = arm.motion(DURATION, RATE)
+    np.testing.assert_allclose(model.drive_forces(motion).total, run.total - run.gravity,
+                               atol=1e-9)
+
+
+def test_effort_kind_says_that_efforts_are_commands(tmp_path: Path) -> None:
+    run = arm_run(tmp_path)
+    model = build_model({**run.model.values, 'effort_kind': 'commanded'}, run.model.source)
+    assert kinds_of(looks_like(model, [run.of(run.total)])) == every(run, 'command')
+
+
+def test_effort_kind_says_that_efforts_are_currents(tmp_path: Path) -> None:
+    run = arm_run(tmp_path)
+    values = {**run.model.values, 'arm.gain': (2.0, 3.0, 4.0), 'effort_kind': 'current'}
+    model = build_model(values, run.model.source)
+    write_recording(tmp_path / 'run.csv', run.of(run.total))
+    read = [read_recording(tmp_path / 'run.csv', one.recorded) for one in (run.model, model)]
+    np.testing.assert_allclose(read[1].effort, read[0].effort * (2.0, 3.0, 4.0))
+    with pytest.raises(ModelError, match='only an arm and a robot with loops have a gain'):
+        build_model({**AxisModel.load().values, 'effort_kind': 'current'})
+
+
+def test_another_kind_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match=r'effort_kind is .*torque.*, must be one of measured, '):
+        build_model({**AxisModel.load().values, 'effort_kind': 'torque'})
+
+
+def test_commands_stop_or_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = arm_run(tmp_path)
+    write_recording(tmp_path / 'run.csv', run.of(run.total - run.gravity))
+    given = [str(tmp_path / 'run.csv'), '--model', str(tmp_path / 'arm.yaml')]
+    for command in ('info', 'compare'):
+        assert main([command, *given, '--json', str(tmp_path / 'said.json')]) == 0
+        said = json.loads((tmp_path / 'said.json').read_text())
+        assert said['effort_looks_like'] == WITHOUT_GRAVITY
+        told = ' '.join(capsys.readouterr().out.split())
+        assert 'as if gravity was taken out' in told
+    assert 'Next Record the effort that is measured' in told
+    for command in (('adopt', 'payload_mass'), ('fit',)):
+        assert main([*command, *given, '--output', str(tmp_path / 'x.yaml')]) == 1
+        assert 'effort_kind: without_gravity' in capsys.readouterr().err
+        assert not (tmp_path / 'x.yaml').exists()
+
+
+CASES_OF = {
+    'controller_echo_real': [('gc.csv.gz', 'pend.yaml', {'command'})],
+    'echo': [('v4a.csv.gz', 'arm2.yaml', {'position_error'}),
+             ('v4b.csv.gz', 'arm2.yaml', {'noise_free'}), ('v4c.csv.gz', 'arm2.yaml', {'command'})],
+    'gravity_free': [('v11.csv.gz', 'arm2.yaml', {'without_gravity'})],
+    'adopt_traceback': [('run.csv.gz', 'pend.yaml', set())],
+    'kuka_lag': [('j4_1_half.csv.gz', 'j4.yaml', set())],
+    'payload_adopt': [('run.csv.gz', 'arm2.yaml', set())],
+    'two_quadrant': [('v7b.csv.gz', 'arm2.yaml', set())],
+    'stick_slip': [('v16.csv.gz', 'arm2.yaml', set())]}
+
+
+@pytest.mark.parametrize('case', CASES_OF)
+def test_other_peoples_recordings(case: str) -> None:
+    if not CASES.is_dir():
+        pytest.skip('no recordings in ../shared/cases')
+    for recording, model, kinds in CASES_OF[case]:
+        read = load_model(CASES / case / model)
+        found = find_no_measurements(read, read_recording(CASES / case / recording,
+                                                          read.recorded))
+        assert {one.kind for one in found} == kinds, recording

@@ -1,0 +1,100 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The noise beside all columns against the noise that was put in, whatever the model lacks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+
+import numpy as np
+import pytest
+from made_up_arm import motion, real_arm, record
+from scipy.signal import lfilter
+
+from pprs_dynamics import compare
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.residuals import long_recordings
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.inference.search.noise_floors import measure_columns, noise_floors
+
+NOISE = 0.2  # [N m] of a sample
+LOAD = {'effects.active': ('payload_mass',), 'effects.payload_mass.mass': 2.0}
+
+
+@cache
+def design() -> Design:
+    arm = real_arm(Path(mkdtemp()))
+    return Design.of(arm, [record(arm, motion(), NOISE)])
+
+
+def ar1(phi: float, shape: tuple[int, int], seed: int) -> Array:
+    white = np.random.default_rng(seed).normal(size=(shape[0] + 3000, shape[1]))
+    found: Array = lfilter([(1 - phi ** 2) ** 0.5], [1, -phi], white, axis=0)[3000:]
+    return found
+
+
+@pytest.mark.parametrize(('phi', 'off'), [(0.0, 0.06), (0.9, 0.12), (0.99, 0.35)])
+def test_the_noise_is_that_which_was_put_in_beside_all_columns(phi: float, off: float) -> None:
+    made = design()
+    noise = NOISE * ar1(phi, made.residuals.measured.shape, 3)
+    fits = FittedSets(replace(made, residuals=replace(
+        made.residuals, measured=made.residuals.model + noise)), DECISIONS)
+    found = noise_floors(fits)
+    put_in = dict(zip(made.drives, noise.std(axis=0), strict=True))
+    assert len(found) >= 2  # of noise as slow as the motion little is seen beside it
+    assert found == pytest.approx({name: put_in[name] for name in found}, rel=off)
+
+
+def test_what_a_model_lacks_is_no_noise(tmp_path: Path) -> None:
+    model, moved = real_arm(tmp_path), motion()
+    loaded = compare(model, record(real_arm(tmp_path, **LOAD), moved, NOISE)).comparison.drives
+    plain = compare(model, record(model, moved, NOISE)).comparison.drives
+    for name in ('swing', 'reach'):  # those that carry the load
+        assert loaded[name].rms > 5 * plain[name].rms
+        assert loaded[name].noise_floor == pytest.approx(plain[name].noise_floor, rel=0.15)
+        assert plain[name].grade == 'noise'
+        assert loaded[name].grade != 'noise'
+
+
+def test_a_vibration_that_compare_names_is_no_noise(tmp_path: Path) -> None:
+    model = real_arm(tmp_path)
+    made = record(model, motion(), NOISE)
+    shaken = made.effort + np.array([0.0, 3.0, 0.0]) * np.sin(
+        2 * np.pi * 6.1 * made.time)[:, None]
+    found = compare(model, replace(made, effort=shaken)).comparison.drives
+    quiet = compare(model, made).comparison.drives
+    assert found['swing'].noise_floor == pytest.approx(quiet['swing'].noise_floor, rel=0.3)
+
+
+def test_a_noise_that_cannot_be_told_is_not_printed(tmp_path: Path) -> None:
+    model = real_arm(tmp_path)
+    found = compare(model, record(model, motion(0.9), NOISE)).comparison
+    assert found.drives
+    assert all(one.noise_floor is None for one in found.drives.values())
+    assert 'cannot be told' in found.verdict
+    assert 'accounts for' not in found.verdict
+
+
+def test_the_noise_of_a_long_recording_is_that_of_stretches(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model = real_arm(tmp_path)
+    made = record(model, motion(), NOISE)
+    whole, residuals, _ = measure_columns(model, [made])
+    monkeypatch.setattr(long_recordings, 'MOST_WHOLE', 200)
+    monkeypatch.setattr(long_recordings, 'MOST_BLOCKS', 150)
+    monkeypatch.setattr(long_recordings, 'SHORTEST_STRETCH', 1.0)
+    piece, same, _ = measure_columns(model, [made])
+    assert whole is not None
+    assert piece is not None
+    assert len(piece.design.residuals) < 0.6 * len(whole.design.residuals)
+    assert len(same) == len(residuals)
+    found = noise_floors(piece, period=residuals.period)
+    assert found
+    assert found == pytest.approx({name: noise_floors(whole)[name] for name in found}, rel=0.2)
