@@ -33,8 +33,10 @@ Neither was run from a distribution's packages, nor with another middleware.
 Names of rclpy that are not public stand in `pprs_dynamics/ros/node/rclpy_internals.py` and nowhere
 else: `rclpy_implementation.WaitSet` with what it waits for and takes, and
 `Node._parameter_overrides`. Both releases have them, and so has the source of rclpy 8.0.0. Where
-one is missing, or takes other arguments, rclpy's own executor serves the node, which says so in
-the log and answers more slowly; and parameters are asked for one by one, by the names in the
+one is missing, takes other arguments, raises, or leaves a timer unserved that is tried at the
+start, rclpy's own executor serves the node, which says so in the log and answers more slowly: it
+takes 0.57 to 0.84 ms of processor time a message at 500 Hz instead of 0.34 ms (two rounds, on a
+busy machine); and parameters are asked for one by one, by the names in the
 model's table, the parameter files and the command line. `test/ros/test_rclpy_internals.py` and
 `test/ros/test_executor.py` take the names away and talk to the node.
 """

@@ -33,7 +33,7 @@ from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 
-pytestmark = [pytest.mark.nodes, needs_browser]
+pytestmark = pytest.mark.nodes
 
 START = 1_700_000_000_000_000_000  # [ns]
 THINNED = 5  # of the recorded samples one is published: 100 Hz
@@ -132,11 +132,18 @@ def test_an_arm_is_compared_and_set_in_its_own_window_names_and_units(
         bench.settled()
         assert bench.post('/api/live/set', confirmed='the other arm').status != 200
         machine = bench.get('/api/live/machine').json['machine']
-        assert machine.startswith('nodes /left/watch; robot arm')
+        assert machine.startswith('nodes /left/watch; robot serial arm made_up')
         assert bench.post('/api/live/set', confirmed=machine).json == {
             'is_set': True, 'nodes': {'watch': ''}}
-        awaited(lambda found: found['error'][0] and max(
+        found = awaited(lambda found: found['error'][0] and max(
             found['error'][0], found['monitor_error'][0]) < 0.5)
+        # The way back: the error is there again.
+        assert found['can_restore']
+        assert bench.post('/api/live/restore', confirmed=machine).json == {
+            'is_set': True, 'nodes': {'watch': ''}}
+        found = awaited(lambda found: found['monitor_error'] and min(
+            found['error'][0] or 0.0, found['monitor_error'][0] or 0.0) > 0.5)
+        assert not found['can_restore']
 
 
 @contextmanager
@@ -152,6 +159,7 @@ def diagnosis(content: dict[str, Any]) -> Iterator[None]:
     context.try_shutdown()
 
 
+@needs_browser
 def test_ticked_effects_go_to_running_nodes_and_the_error_falls(bench: Workbench) -> None:
     with chromium() as browser:
         page = Page(browser, bench)

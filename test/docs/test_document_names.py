@@ -20,6 +20,7 @@ from documents import FENCE, PROJECT, code, pages, text_of
 from pprs_dynamics.app.commands.pprs import COMMANDS, _parser
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.keys import NAMES
+from pprs_dynamics.physics.model.parameter_values import is_known
 from pprs_dynamics.ros.messages.status_codes import CODES, LEVELS
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE, NOT_IN_CATALOGUE
 
@@ -110,7 +111,7 @@ def wrong_names(line: str) -> Iterator[str]:
         if f'~/{topic}' not in ros_sources() and f"'{topic}'" not in ros_sources():
             yield f'/{node}/{topic}'
     for parameter in re.findall(r'-p (\w+):=', line):
-        if f"'{parameter}'" not in ros_sources():
+        if f"'{parameter}'" not in ros_sources() and not is_known(parameter):
             yield parameter
     for found in re.findall(r'(?<![\w/])(?:geometry|masses|friction|limits)\.\w+(?:\.\w+)*', line):
         # A sentence about an unknown key shows one.

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from model_recordings import EXCITATION, TIME, record
 from scipy.signal import butter, lfilter, lfilter_zi
 
 from benchmarks.hidden.recordings import Case, make_case
@@ -34,21 +35,8 @@ from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 from pprs_dynamics.physics.model.model_file import build_model
 
 MODEL = DriveModel.load()
-TIME = np.arange(6000) * 0.002
-EXCITATION = Excitation()
 TOLERANCES = {'tolerances.masses.payload': 0.05, 'tolerances.masses.slides': 0.05,
               'tolerances.friction.drives.coulomb': 0.05}
-
-
-def record(model: DriveModel, noise: float = 0.0, seed: int = 0,
-           motion: Excitation | FourierPath = EXCITATION) -> Recording:
-    """Return a recording of what a model says about a motion."""
-    forces = model.drive_forces(motion.motion(TIME).with_time(TIME))
-    said = model.measured(forces)
-    rng = np.random.default_rng(seed)
-    return Recording.from_arrays(
-        'made', TIME, forces.mechanism.position + model.position_error,
-        effort=said.total + noise * rng.normal(size=said.total.shape))
 
 
 @pytest.fixture(scope='module')
@@ -193,17 +181,6 @@ def test_what_another_recording_refutes_is_unknown_and_not_adequate() -> None:
     assert [one.name for one in found.unconfirmed] == ['coulomb_friction']
     assert found.verdict == 'unknown'
     assert not found.depends_on
-
-
-def test_what_is_in_the_model_is_moved_and_not_claimed_again() -> None:
-    values = {'effects.active': ['coulomb_friction'],
-              'effects.coulomb_friction.slide_2.force': 0.5}
-    true = build_model({**MODEL.values, **values})
-    wrong = build_model({**MODEL.values, **values, 'effects.coulomb_friction.slide_2.force': 0.3})
-    found = diagnose(wrong, [record(true, 0.05)])
-    assert found.verdict == 'adequate'
-    assert found.adopted.values['effects.coulomb_friction.slide_2.force'] == pytest.approx(
-        0.5, abs=0.02)
 
 
 OFFSETS = dict(zip(DRIVES, (0.44, -0.32, 0.89, -0.63, -0.88, -0.43), strict=True))

@@ -137,7 +137,7 @@ def fit(effect: str, drives: tuple[str, ...] | None = ('lift_2',), evidence: flo
     """Return what the gates look at of a fit."""
     return SimpleNamespace(request=EffectRequest(CATALOGUE[effect], drives), drives=drives,
                            evidence=evidence, own_share=own_share, parameters=parameters or {},
-                           model=model)
+                           model=model, plain=model, nothing_left=())
 
 
 def others(effect: str, diagnosis: Any, **options: Any) -> list[str]:

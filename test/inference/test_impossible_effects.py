@@ -67,16 +67,16 @@ def test_what_no_machine_can_have_is_told(name: str, values: dict[str, float], c
     said = why_impossible(catalogue()[name], known, design, DECISIONS)
     assert clause in said
     assert bool(said) == bool(clause)
-    assert not why_nothing(catalogue()[name], known)
+    assert not why_nothing(catalogue()[name], known, {})
     # Within twice its uncertainty anything may be nothing, or what the model has.
     unknown = {key: Estimate(value, abs(value), '') for key, value in values.items()}
-    assert 'holds 0' in why_nothing(catalogue()[name], unknown)
+    assert 'holds 0' in why_nothing(catalogue()[name], unknown, {})
 
 
 def test_one_number_of_several_may_be_nothing() -> None:
     known = {'axis.force_forward': Estimate(5.0, 0.2, 'N'),
              'axis.force_backward': Estimate(0.1, 0.2, 'N')}
-    assert not why_nothing(catalogue()['asymmetric_friction'], known)
+    assert not why_nothing(catalogue()['asymmetric_friction'], known, {})
 
 
 def test_a_drive_constant_that_is_another_unit_is_no_effect() -> None:

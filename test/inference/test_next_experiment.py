@@ -126,7 +126,12 @@ EFFECTS = {'effects.active': ['viscous_friction', 'stribeck_friction', 'payload_
            'effects.viscous_friction.lift_2.coefficient': 1.5,
            'effects.stribeck_friction.slide_2.force': 0.6,
            'effects.stribeck_friction.slide_2.velocity': 0.02,
-           'effects.payload_mass.mass': 0.1}
+           'effects.payload_mass.mass': 0.1,
+           'uncertainties.time_delay.lift_3.delay': 0.001,
+           'uncertainties.viscous_friction.lift_2.coefficient': 1.0,
+           'uncertainties.stribeck_friction.slide_2.force': 1.0,
+           'uncertainties.stribeck_friction.slide_2.velocity': 0.01,
+           'uncertainties.payload_mass.mass': 0.1}
 
 
 @pytest.fixture(scope='module')

@@ -10,14 +10,14 @@ forces are linear in, whose errors are Gaussian even where the effect is not the
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.app.fleet.store import OWN
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.regression.base_columns import ModelNumber
+from pprs_dynamics.inference.regression.base_columns import ModelNumber, PresentCoefficient
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
@@ -25,6 +25,7 @@ from pprs_dynamics.inference.regression.terms import Term
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 
@@ -33,7 +34,8 @@ def fit_named_effects(model: ForceModel, recording: Recording,
                       ) -> tuple[list[dict[str, Any]], Residuals, dict[str, float]]:
     """Return the values of named effects and of the model's numbers.
 
-    An effect that the model has already, or that cannot act on a drive, gives no row there.
+    Of an effect that the model has, what the recording says that it is, not what it changes. One
+    that cannot act on a drive gives no row there.
 
     Returns
     -------
@@ -73,7 +75,11 @@ def _terms(design: Design, regression: Regression, request: EffectRequest) -> It
             continue
         if not design.acts_on(effect, d):
             continue
-        shapes = list(effect.trials(design.covered[d])) if effect.shape else [{}]
+        there = design.present(effect, d)
+        shapes: list[Mapping[str, float]] = [{}]
+        if effect.shape:
+            shapes = (list(effect.trials(design.covered[d])) if there is None
+                      else [{p.name: there[p.name] for p in effect.shape}])
         terms = [design.term(effect, d, shape) for shape in shapes]
         if len(terms) == 1:
             yield terms[0]
@@ -96,13 +102,31 @@ def _rows(design: Design, regression: Regression, fit: JointFit, term: Term, blo
         values, covariance = fit.coefficients[at], fit.covariance[at, at]
         # What the deviance rises by without the effect, at the noise of the fit.
         evidence = float(values @ np.linalg.solve(covariance, values))
+        there = design.present(term.effect, term.drive)
+        given = {} if there is None else term.effect.to_coefficients(there)
         for k, coefficient in enumerate(term.effect.coefficients):
-            yield {**place, 'parameter': coefficient.name, 'value': float(values[k]),
-                   'std': float(np.sqrt(covariance[k, k])), 'unit': coefficient.unit,
+            value, variance = _with_present(design, fit, term, coefficient, at.start + k)
+            yield {**place, 'parameter': coefficient.name,
+                   'value': given.get(coefficient.name, 0.0) + value,
+                   'std': float(np.sqrt(variance)), 'unit': coefficient.unit,
                    'evidence': evidence}
     for parameter in term.effect.shape:
         yield {**place, 'parameter': parameter.name, 'value': float(term.shape[parameter.name]),
                'unit': parameter.unit}
+
+
+def _with_present(design: Design, fit: JointFit, term: Term, coefficient: Parameter, place: int,
+                  ) -> tuple[float, float]:
+    """Return a coefficient with its variance, what moves that of the model among it."""
+    drive = None if term.drive is None else design.drives[term.drive]
+    weights = np.zeros(len(fit.coefficients))
+    weights[place] = 1.0
+    for k, column in enumerate(design.base):
+        if isinstance(column, PresentCoefficient) and (
+                column.effect, column.drive, column.coefficient) == (
+                term.effect, drive, coefficient):
+            weights[k] = coefficient.scale
+    return float(weights @ fit.coefficients), float(weights @ fit.covariance @ weights)
 
 
 def _own_numbers(design: Design, fit: JointFit) -> Iterator[dict[str, Any]]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -29,11 +29,14 @@ from pprs_dynamics.app.fleet.store import AUTO, OWN, key_of
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.residuals.conventions import find_mistakes
 from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.search.estimates import estimate_present
 from pprs_dynamics.measurement.files.fingerprint import fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, describe, read_recording
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.system.plain_text import displayed
@@ -190,7 +193,9 @@ def _model(fingerprint: str, values: tuple[tuple[str, Any], ...]) -> ForceModel:
 
 
 def _examined(job: SurveyJob, path: str, common: dict[str, Any]) -> list[dict[str, Any]]:
-    model = _model(job.model, tuple(job.values.items()))
+    model = _model(job.model, tuple(
+        (key, tuple(value) if isinstance(value, list) else value)  # as files have lists
+        for key, value in job.values.items()))
     recording = read_recording(path, model.recorded, job.topic)
     summary = describe(recording)
     if common['time'] is None:
@@ -252,6 +257,22 @@ def _diagnosed(model: ForceModel, recording: Recording) -> Examined:
             rows.append({'drive': drive or None, 'effect': effect.name, 'parameter': parameter,
                          'value': one.value, 'std': one.std, 'unit': one.unit,
                          'evidence': effect.evidence})
+    rows += _as_in_model(diagnosis, {(row['drive'], row['effect']) for row in rows})
     rows += [{'effect': OWN, 'parameter': one.label, 'value': one.after, 'std': one.std,
               'unit': one.unit} for one in diagnosis.calibrated]
     return rows, _drives(diagnosis.residuals, diagnosis.noise_floors), diagnosis.verdict
+
+
+def _as_in_model(diagnosis: Diagnosis, told: Container[tuple[str | None, str]],
+                 ) -> Iterator[dict[str, Any]]:
+    """Yield what the model's effects are, where a recording says nothing else of them."""
+    selection = diagnosis.selection
+    assert selection is not None
+    for effect in diagnosis.model.effects:
+        if not isinstance(effect, (DriveEffect, StructureEffect)):
+            continue
+        for key, one in estimate_present(selection.last, selection.kept, effect).items():
+            drive, parameter = effect.place_and_parameter(key)
+            if (drive or None, effect.name) not in told:
+                yield {'drive': drive or None, 'effect': effect.name, 'parameter': parameter,
+                       'value': one.value, 'std': one.std, 'unit': one.unit}

@@ -80,7 +80,7 @@ def _parts(steps: Sequence[Step], unit: str) -> Iterator[Any]:
         again = f' (on other recordings {step.error_before:.3f} before)' if number > 1 and (
             step.sha256 != steps[number - 2].sha256) else ''
         on = f' on {", ".join(step.drives)}' if step.drives else ''
-        rows.append((f'{number}', escape(f'+ {step.effect}{on}{again}'),
+        rows.append((f'{number}', escape(f'{_sign(step)} {step.effect}{on}{again}'),
                      f'{step.error_after:.3f}', f'{step.held_out_after:.3f}',
                      _bar(step.error_after, largest, 'green')))
     noise = steps[-1].noise_floor
@@ -92,6 +92,11 @@ def _parts(steps: Sequence[Step], unit: str) -> Iterator[Any]:
         yield f'[bold]{number}. {escape(step.effect)}[/]'
         for line in details(step):
             yield f'   {escape(line)}'
+
+
+def _sign(step: Step) -> str:
+    """Return what a step did to an effect: added or set it, or took it out."""
+    return '-' if step.removed else '+'
 
 
 def _bar(value: float, largest: float, colour: str) -> str:
@@ -112,8 +117,8 @@ def history_page(name: str, steps: Sequence[Step], unit: str = 'N') -> Page:
               f'{in_unit(noise, unit)}.',
               'lead')
     page.errors([ErrorRow('as given', first.error_before, first.held_out_before, noise),
-                 *(ErrorRow(f'+ {step.effect}', step.error_after, step.held_out_after, noise)
-                   for step in steps)],
+                 *(ErrorRow(f'{_sign(step)} {step.effect}', step.error_after,
+                            step.held_out_after, noise) for step in steps)],
                 f'Error, rms [{unit}], after each step. Grey: on the recordings; blue: on '
                 'held-out data; dotted: the noise.', ('recordings', 'held out'))
     page.table(*steps_table(steps, unit))

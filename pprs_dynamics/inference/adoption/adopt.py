@@ -29,20 +29,13 @@ from pprs_dynamics.inference.adoption.fit_curve import (
 from pprs_dynamics.inference.adoption.fit_effect import StandingError, fit_effect
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
-from pprs_dynamics.inference.regression.base_columns import PresentCoefficient, PresentShape
-from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import block_gains, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.estimates import Calibration, Estimate, estimate_present
+from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.inference.search.fitted_model import linear_error
-from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.held_out import hold_out
-from pprs_dynamics.inference.search.relinearisation import SettledSet
-from pprs_dynamics.inference.search.reversal_widths import estimate_widths
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.ledger import original_values
@@ -100,8 +93,6 @@ def adopt(
     if diagnosis is None:
         diagnosis = diagnose(start, recordings, (), lambda share: report(DIAGNOSIS * share))
     case = _Case(model, start, request, recordings, validate, force, diagnosis)
-    if request.present(model):
-        return _fit_anew(case, report)
     named = next((one for one in diagnosis.effects if one.name == request.name), None)
     # Where the recordings call for it, beside what else they call for, is known by now.
     placed = replace(request, drives=named.drives) if named and not request.drives else request
@@ -112,7 +103,7 @@ def adopt(
     except (ModelError, StandingError) as error:
         return case.without_model(str(error))
     if fitted is None:
-        return _fit_anew(case, report)
+        return case.without_model(f'{request.name} cannot act on what the recordings show')
     before, after = case.residuals(fitted.model)
     found = [*objections.of_other_effects(request, fitted, diagnosis),
              *objections.of_identifiability(fitted), *objections.of_physics(fitted, after)]
@@ -122,6 +113,10 @@ def adopt(
     remarks += [f'{", ".join(fitted.at_bound)} stands at the edge of what was tried'
                 ] if fitted.at_bound else []
     others = [one.name for one in diagnosis.effects if one.name != request.name]
+    if fitted.nothing_left:
+        where = ', '.join(filter(None, (one.rstrip('.') for one in fitted.nothing_left)))
+        what = f'{request.name} of {where}' if where else request.name
+        remarks.append(f'{what} is taken out of the model: these recordings leave nothing of it')
     if others and named:
         remarks.append(f'the recordings call for {", ".join(others)}, too')
     if validate:
@@ -211,40 +206,6 @@ class _Case:
             residuals_after, rms(residuals_before), rms(residuals_after), *held_out,
             VALIDATION if self.validate else BLOCKS, self.diagnosis.noise_floor,
             self.diagnosis.noise_floors, curve)
-
-
-def _fit_anew(case: _Case, report: Callable[[float], None]) -> Adoption:
-    """Return the model with what it has fitted anew, where that gains anything."""
-    design = Design.of(case.start, case.recordings,
-                       lambda share: report(DIAGNOSIS + (FIT - DIAGNOSIS) * share))
-    fits, name = FittedSets(design, case.diagnosis.decisions), case.request.name
-    found = fits.evaluate(())
-    try:
-        fitted = SettledSet(fits, found, estimate_widths(fits, found)).model
-    except ModelError as error:
-        return case.without_model(str(error))
-    before, after = case.residuals(fitted)
-    noises = case.diagnosis.noise
-    gains = block_gains(before, after, noises)
-    free = sum(isinstance(column, (PresentCoefficient, PresentShape)) for column in design.base)
-    evidence = float(gains.sum() - free * np.log(fits.regression.samples)
-                     - fits.library.prices.of_name())
-    refused = [] if evidence > 0 else [
-        f'{name} is in the model already, and to fit it anew would gain nothing: the error would '
-        f'go from {rms(before):.4g} to {rms(after):.4g} {before.unit} (evidence {evidence:.3g}, '
-        'where 0 is the threshold)']
-    held_out = rms(before), hold_out(fits, found).error
-    if case.validate:
-        held_out, gains = case.validated(case.model, fitted, noises)
-    if not refused:
-        refused = [*objections.of_linearity(linear_error(fits, found), rms(after), after.unit),
-                   *objections.of_held_out_error(*held_out, gains, case.model, case.held_out)]
-    report(1.0)
-    effect = next(one for one in fitted.effects if one.name == name)
-    return case.answer(
-        fitted, tuple(effect.drives) if isinstance(effect, DriveEffect) else None, refused,
-        case.weakness(refused), before, after, held_out,
-        estimate_present(fits, found, fitted, name))
 
 
 def _adopt_curve(case: _Case, request: CurveRequest, report: Callable[[float], None]) -> Adoption:

@@ -5,17 +5,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.search.candidates import CandidateSet
+from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
-from pprs_dynamics.inference.search.estimates import Calibration, Estimate, calibrations, estimate
+from pprs_dynamics.inference.search.estimates import (
+    Calibration,
+    Estimate,
+    calibrations,
+    estimate,
+    estimate_present,
+)
 from pprs_dynamics.inference.search.fitted_model import fitted_model
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import hold_out
@@ -23,10 +31,15 @@ from pprs_dynamics.inference.search.relinearisation import SettledSet, relineari
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.added_body import AddedBody
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.keys import set_number
 from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.uncertainties import UNCERTAINTIES, with_uncertainties
 
+SURE = 2.0  # standard deviations, by which a number that is something differs from 0
 LEAST_MOVE = 0.02  # of a number's deviation; less is left as the file has it
 
 
@@ -53,7 +66,7 @@ class EffectFit:
     evidence : float
         By which the cost falls with the effect.
     own_share : float
-        The least share of a column's square that nothing else in the model explains.
+        The least share of its force's square on a place that nothing else in the model explains.
     fits : FittedSets
         Around the model with the effect.
     found : CandidateSet
@@ -61,6 +74,9 @@ class EffectFit:
         Over blocks, each predicted from the others [N].
     block_gains : (B,) array
         What the effect takes off the whitened squared error of each held-out block.
+    nothing_left : tuple of str
+        What keys of parameters begin with where the model had the effect and recordings leave
+        nothing of it: a drive, a link, or nothing for all of it. `model` has it there no more.
     """
 
     request: EffectRequest
@@ -77,13 +93,14 @@ class EffectFit:
     held_out_before: float
     held_out_after: float
     block_gains: Array
+    nothing_left: tuple[str, ...] = ()
 
 
 def fit_effect(
     model: ForceModel, request: EffectRequest, recordings: Sequence[Recording],
     progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
 ) -> EffectFit | None:
-    """Return the model with an effect that it does not have yet; None where it has it all.
+    """Return the model with an effect, new or with other numbers; None where it cannot act.
 
     Raises
     ------
@@ -95,7 +112,7 @@ def fit_effect(
         As `measure_residuals`.
     """
     report = progress or (lambda share: None)
-    design = Design.of(model, recordings, lambda share: report(0.3 * share))
+    design = Design.of(model, recordings, lambda share: report(0.3 * share), request.name)
     _require_motion(design, request)
     fits = FittedSets(design, decisions)
     without = fits.evaluate(())
@@ -103,7 +120,7 @@ def fit_effect(
     report(0.6)
     if found is None:
         return None
-    share = min((fits.regression.own_share(without.fit, block)
+    share = min((fits.regression.own_share(without.fit, block, found.fit.of(block))
                  for block in found.blocks.values() if block.mean is None), default=1.0)
     before = hold_out(fits, without)
     # At the noise of the fit with the effect, so that losses of both are comparable.
@@ -121,11 +138,15 @@ def fit_effect(
     prefix = f'effects.{request.name}.'
     parameters = {key: Estimate(float(final.values[prefix + key]), one.std, one.unit)
                   for key, one in said.parameters.items() if prefix + key in final.values}
+    beside = {one.name: estimate_present(last, found, one) for one in model.effects
+              if isinstance(one, (DriveEffect, StructureEffect)) and one.name != request.name}
+    nothing = _nothing_left(design, candidate, parameters)
+    final = _with_uncertainties(final, {**beside, request.name: parameters}, nothing)
     report(1.0)
     return EffectFit(
         request, design.named(candidate.drives), final, fitted_model(fits, plain_set), parameters,
         said.at_bound, moved, evidence, share, last, found, before.error, after.error,
-        plain_losses - after.losses)
+        plain_losses - after.losses, nothing)
 
 
 def _numbers(design: Design, request: EffectRequest) -> tuple[int, ...] | None:
@@ -158,4 +179,54 @@ def _with_numbers(fitted: ForceModel, start: ForceModel, moved: Sequence[Calibra
     values = {**fitted.values, **{key: start.values[key] for key in start.keys}}
     for one in moved:
         set_number(values, one.key, one.element, one.after)
+    return replace(build_model(values), source=fitted.source)
+
+
+def _nothing_left(design: Design, candidate: EffectCandidate,
+                  parameters: Mapping[str, Estimate]) -> tuple[str, ...]:
+    """Return where the given model has an effect of which the recordings leave nothing.
+
+    As what keys of its parameters begin with: `drive.`, `link.`, or '' for all of it.
+    """
+    effect = candidate.effect
+    sizes = {p.name for p in effect.linear or effect.shape if not p.is_angle and (
+        p.name.endswith('mass') or not issubclass(effect, AddedBody))}
+    found = []
+    for one in candidate.components:
+        if design.present(effect, one.drive) is None:
+            continue
+        places = {name.rpartition('.')[0] for name in one.names if effect.is_of_one_place}
+        prefix = (f'{design.drives[one.drive]}.' if one.drive is not None
+                  else ''.join(f'{place}.' for place in places))
+        mine = [estimate for key, estimate in parameters.items() if key.startswith(prefix)
+                and effect.place_and_parameter(key)[1] in sizes]
+        if mine and all(abs(one.value) <= SURE * one.std for one in mine):
+            found.append(prefix)
+    return tuple(found)
+
+
+def _with_uncertainties(fitted: ForceModel, known: Mapping[str, Mapping[str, Estimate]],
+                        nothing: Sequence[str]) -> ForceModel:
+    """Return a fitted model with what is known of its effects' parameters.
+
+    Parameters
+    ----------
+    fitted : ForceModel
+    known : mapping of str to mapping of str to Estimate
+        By effect, the one that was asked for last.
+    nothing : sequence of str
+        See `_nothing_left`, of the last: it goes there, and all of it where that is everywhere.
+    """
+    values = dict(fitted.values)
+    for name, parameters in known.items():
+        values = with_uncertainties(values, name, {
+            key: float(f'{one.std:.3g}') for key, one in parameters.items()
+            if np.isfinite(one.std) and one.std > 0 and f'effects.{name}.{key}' in values})
+    if nothing:
+        name = list(known)[-1]
+        gone = tuple(f'{block}.{name}.{prefix}' for block in ('effects', UNCERTAINTIES)
+                     for prefix in nothing)
+        values = {key: value for key, value in values.items() if not key.startswith(gone)}
+        if not any(key.startswith(f'effects.{name}.') for key in values):
+            values['effects.active'] = [one for one in values['effects.active'] if one != name]
     return replace(build_model(values), source=fitted.source)

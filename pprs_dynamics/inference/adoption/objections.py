@@ -11,7 +11,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_effort
-from pprs_dynamics.inference.adoption.fit_effect import EffectFit
+from pprs_dynamics.inference.adoption.fit_effect import SURE, EffectFit
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.quantities import with_uncertainty
@@ -25,7 +25,6 @@ from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.laws.passive_friction import PassiveFriction
 from pprs_dynamics.physics.model.force_model import ForceModel
 
-SURE = 2.0  # standard deviations
 MOVING = 5.0  # widths in which friction turns over
 BENT = 1.5  # error of a fitted model over that of its linear fit
 PUSHES = 0.1  # of the moving time, in which a drive's friction may give power back
@@ -53,6 +52,9 @@ def of_other_effects(request: EffectRequest, fitted: EffectFit, diagnosis: Diagn
     if diagnosis.depends_on:
         return [f'no effect of the catalogue has the form of the error: '
                 f'{diagnosis.depends_on[0].text}']
+    if request.present(fitted.plain):
+        return [f'{request.name} is in the model already, and these recordings call for no other '
+                f'numbers: evidence {fitted.evidence:.3g}, where 0 is the threshold']
     suspect = any(one.name == request.name for one in diagnosis.suspects)
     if fitted.evidence > 0 and not suspect:
         return ['it does not predict parts of the recordings that it was not fitted to']
@@ -122,6 +124,8 @@ def of_identifiability(fitted: EffectFit) -> list[str]:
     if fitted.own_share < OWN_SHARE:
         return [f'these recordings cannot tell {fitted.request.name} from what the model has: of '
                 f'its square only {fitted.own_share:.1e} is its own']
+    if fitted.nothing_left:
+        return []  # that is what they tell
     effect = fitted.request.effect
     angles = {p.name for p in fitted.request.effect.parameters if p.is_angle}
 
@@ -141,7 +145,7 @@ def of_identifiability(fitted: EffectFit) -> list[str]:
 
 def of_physics(fitted: EffectFit, after: Residuals) -> list[str]:
     """Return whether friction would push, or a stiffness or inertia be negative."""
-    bounds = fitted.request.effect.unphysical_below
+    bounds = {} if fitted.nothing_left else fitted.request.effect.unphysical_below
     low = {}
     for key, one in fitted.parameters.items():
         bound = bounds.get(fitted.request.effect.place_and_parameter(key)[1])

@@ -91,12 +91,10 @@ class EffectRequest:
         return self.effect.name
 
     def present(self, model: ForceModel) -> bool:
-        """Return whether the model has it already, on every drive that is asked for."""
-        for effect in model.effects:
-            if effect.name == self.name:
-                return not isinstance(effect, DriveEffect) or (
-                    self.drives is not None and set(self.drives) <= set(effect.drives))
-        return False
+        """Return whether the model has it already, on every drive that is asked for if any is."""
+        return any(effect.name == self.name and (
+            not isinstance(effect, DriveEffect) or set(self.drives or ()) <= set(effect.drives))
+            for effect in model.effects)
 
 
 def requested(text: str, model: ForceModel) -> EffectRequest | CurveRequest:

@@ -87,7 +87,8 @@ def _unexcited(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
     adopted = {candidate.name for candidate in best.effects}
     weak = []
     for term in fits.design.structure:
-        if term.effect.name in adopted or term.effect.is_of_one_place:
+        if (term.effect.name in adopted or term.effect.is_of_one_place
+                or fits.design.present(term.effect, None) is not None):
             continue
         own = regression.own_information(best.fit, regression.block(term.rows))
         scales = np.array([c.scale for c in term.effect.coefficients])

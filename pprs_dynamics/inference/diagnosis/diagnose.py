@@ -24,7 +24,11 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
 from pprs_dynamics.inference.diagnosis.localisation import levels
 from pprs_dynamics.inference.diagnosis.possible import why_impossible, why_nothing
 from pprs_dynamics.inference.diagnosis.quantities import listed, plain
-from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
+from pprs_dynamics.inference.diagnosis.statements import (
+    Statement,
+    word_statement,
+    word_stick_slip,
+)
 from pprs_dynamics.inference.residuals.measured_effort import kinds_of, looks_like
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
@@ -68,6 +72,7 @@ from pprs_dynamics.inference.search.ranking import Ranking, select, without_sear
 from pprs_dynamics.inference.search.relinearisation import settled
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
+from pprs_dynamics.measurement.motion.stick_slip import StickSlip, sticking_drives
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.system.numbers import finite
 
@@ -124,6 +129,8 @@ class Diagnosis:
     held_out_on : {'blocks', 'validation'}
     effort_looks_like : mapping of str to NoMeasurement
         Drives whose efforts are no measurement: then nothing is claimed.
+    stick_slip : mapping of str to StickSlip
+        Drives that stick and slip for much of the time: then nothing else is claimed.
     selection : Ranking, optional
         All that was tried, for looking closer.
     decisions : Decisions
@@ -155,6 +162,7 @@ class Diagnosis:
     unseen_noise: tuple[str, ...] = ()
     held_out_on: str = 'blocks'
     effort_looks_like: Mapping[str, NoMeasurement] = field(default_factory=dict)
+    stick_slip: Mapping[str, StickSlip] = field(default_factory=dict)
     selection: Ranking | None = field(default=None, repr=False, compare=False)
     decisions: Decisions = DECISIONS
 
@@ -177,6 +185,9 @@ class Diagnosis:
             'calibrated': [one.to_dict() for one in self.calibrated],
             'held_out_on': self.held_out_on, 'above_noise': dict(self.above_noise),
             'effort_looks_like': kinds_of(self.effort_looks_like),
+            'stick_slip': {drive: {'frequency': one.frequency, 'speed': one.speed,
+                                   'step': one.step, 'share_of_time': one.share}
+                           for drive, one in self.stick_slip.items()},
             'explained': _for_json(explained_shares(self.residuals)),
             'little_explained': dict(self.little),
             'explained_after': _for_json(explained_shares(self.residuals, self.remaining)),
@@ -220,6 +231,15 @@ def diagnose(
                          claims=False)
         return replace(answer.diagnosis(()), verdict='unknown', depends_on=(), warnings=(),
                        effort_looks_like=other)
+    sticking = {drive: one for drive, one in sticking_drives(recordings).items()
+                if one.share > decisions.stick_slip}
+    if sticking and not as_it_is:
+        # No law of the drive's own motion describes what its controller and its elasticity do.
+        answer = _Answer(without_search(model, recordings, decisions, report), validate, decisions,
+                         claims=False)
+        bare = answer.diagnosis(())
+        return replace(bare, verdict='unknown', warnings=(), stick_slip=sticking, depends_on=tuple(
+            word_stick_slip(drive, one, bare.residuals) for drive, one in sticking.items()))
     answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share)),
                      validate, decisions)
     unconfirmed: list[FoundEffect] = []
@@ -326,6 +346,7 @@ class _Answer:
             said = averaged(estimate(final.fits, final.found, last), self._nearly(candidate))
             without = self._told(self.ranking.best_without(candidate),
                                  self.ranking.best_with(candidate))
+            in_model = self._in_model(candidate, said.parameters)
             impossible = why_impossible(
                 candidate.effect, said.parameters, self.design, self.decisions)
             found.append(FoundEffect(
@@ -337,8 +358,9 @@ class _Answer:
                     held_out[k + 1] < held_out[k]
                     or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
                 or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1]),
-                impossible or why_nothing(candidate.effect, said.parameters), bool(impossible),
-                without))
+                impossible or why_nothing(candidate.effect, said.parameters, in_model),
+                bool(impossible),
+                without, in_model))
         return found
 
     def _dated_effects(self) -> list[FoundEffect]:
@@ -361,6 +383,7 @@ class _Answer:
                 fits.evaluate(found.without(candidate)).total - found.total, errors[k],
                 errors[k + 1], held_out[k], held_out[k + 1], said.at_bound,
                 (errors[k] - errors[k + 1]) / errors[0],
+                in_model=self._in_model(candidate, said.parameters),
                 course=None if course is None else replace(
                     course, begin=course.begin - begun, end=course.end - begun)))
         return effects
@@ -403,6 +426,22 @@ class _Answer:
         regression, fit = self.dated_fits.regression, self.dated.fit
         return ({self.drives[d]: one for d, one in regression.noise(fit).items()},
                 {self.drives[d]: regression.noise_floor(fit, d) for d in regression.drives})
+
+    def _in_model(self, candidate: EffectCandidate, keys: Iterable[str]) -> dict[str, float]:
+        """Return what the given model says of an effect; nothing where it lacks it.
+
+        Of links and joints only those that it is on are told.
+        """
+        found = {}
+        for one in candidate.components:
+            values = self.ranking.first.design.present(one.effect, one.drive)
+            prefix = '' if one.drive is None else f'{self.drives[one.drive]}.'
+            found.update({prefix + name: float(value) for name, value in (values or {}).items()
+                          if prefix + name in keys})
+        # A body or friction on a link or joint where there is none is new.
+        return found if not candidate.effect.is_of_one_place or any(
+            one.given[k] for one in candidate.components if one.given
+            for k, c in enumerate(one.effect.coefficients) if c.name in one.names) else {}
 
     def _error_held_out(self, model: ForceModel) -> float:
         """Return the error of a model on the recordings that are not fitted [N]."""

@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from pprs_dynamics.arrays import Array
@@ -107,6 +108,9 @@ class FoundEffect(FittedEffect):
         Whether that is that no machine can have it.
     without : RankedSet, optional
         The best set without it, against the best one with it.
+    in_model : mapping of str to float
+        What the given model says of the parameters, where it has the effect: then the recordings
+        say something else. Empty for an effect that it lacks.
     course : Course or None
         When it is there, from the start of the first recording [s]; None: all the time.
     """
@@ -122,6 +126,7 @@ class FoundEffect(FittedEffect):
     objection: str = ''
     is_impossible: bool = False
     without: RankedSet | None = None
+    in_model: Mapping[str, float] = field(default_factory=dict)
     course: Course | None = None
 
     @property
@@ -140,6 +145,7 @@ class FoundEffect(FittedEffect):
                 'since': self.course.begin if self.course and self.course.kind == SINCE else None,
                 'course': self.course.kind if self.course else None,
                 'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
+                **({'in_model': dict(self.in_model)} if self.in_model else {}),
                 'evidence': self.evidence,
                 'without': None if self.without is None else self.without.to_dict(),
                 'error_before': self.error_before, 'error_after': self.error_after,

@@ -97,6 +97,10 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     """Return what to do next, and the command for it."""
     if diagnosis.effort_looks_like:
         return measure_first(list(diagnosis.effort_looks_like.values()), files)
+    if diagnosis.stick_slip:
+        return ('Record a motion that is faster than the stick-slip, and diagnose that; as long as '
+                'the machine has to move so slowly, its cause comes first (grease, gains, a soft '
+                'transmission)', replace(files, recordings=(SECOND,)).command('diagnose'))
     if diagnosis.little:
         return first_step(diagnosis.model, files)
     repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
@@ -121,7 +125,8 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                 'diagnose both recordings', repeat)
     if len(diagnosis.effects) == 1:
         found = diagnosis.effects[0]
-        return ('Confirm it on the machine, then add it', files.command(
+        step = 'set it anew, or take it out' if found.in_model else 'add it'
+        return (f'Confirm it on the machine, then {step}', files.command(
             'adopt', found.name, '--output', f'with_{found.name}.yaml', held_out=True))
     if diagnosis.effects:
         return ('Confirm them on the machine, then add them', files.command(

@@ -54,11 +54,25 @@ def why_impossible(effect: type[CatalogueEffect], parameters: Mapping[str, Estim
     return next(_reasons(effect, parameters, design, decisions), '')
 
 
-def why_nothing(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate]) -> str:
+def why_nothing(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
+                in_model: Mapping[str, float]) -> str:
     """Return why what a fit says of an effect may be nothing, as a clause; '' where it is not.
 
-    One number of several may be nothing.
+    One number of several may be nothing. Of an effect that the model has, as `in_model` says, what
+    is otherwise may be no more than the uncertainty.
+
+    Parameters
+    ----------
+    effect : type of CatalogueEffect
+    parameters : mapping of str to Estimate
+        By drive.parameter, or parameter.
+    in_model : mapping of str to float
+        By the same; empty for an effect that the model lacks.
     """
+    if in_model:
+        return '' if any(abs(one.value - in_model[key]) > INTERVAL * one.std
+                         for key, one in parameters.items() if key in in_model) else (
+            'it holds what the model has')
     sizes = _sizes(effect, parameters)
     if not sizes or any(abs(one.value) > INTERVAL * one.std for one in sizes.values()):
         return ''

@@ -19,10 +19,10 @@ MOST_TOLD = 3  # drives of whose effort little is explained, in a sentence
 COUNTS = ('no', 'one', 'two', 'three', 'four', 'five', 'six')
 
 
-def with_uncertainty(value: float, std: float, unit: str) -> str:
-    """Return a value with ± two standard deviations, in a unit of fitting size."""
+def with_uncertainty(value: float, std: float, unit: str, size: float | None = None) -> str:
+    """Return a value with ± two standard deviations, in a unit that fits its size or another."""
     below, factor, name = READ_IN.get(unit, (0.0, 1.0, unit))
-    if abs(value) >= below:
+    if abs(value if size is None else size) >= below:
         factor, name = 1.0, unit
     name = PRINTED.get(name, name)
     name = name if name in ('', '°') else f' {name}'

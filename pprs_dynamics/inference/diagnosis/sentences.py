@@ -45,6 +45,7 @@ from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
 
+MOST_CHANGED = 4  # values of an effect of the model that a sentence sets against the recordings'
 MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
 TOLD_COST = 0.05  # of a term of a cost, that one digit shows
 # Times the size that matters, an uncertainty beyond which, and beyond the value, nothing is known.
@@ -78,20 +79,27 @@ class Finding:
 
 @dataclass(frozen=True)
 class FittedValue:
-    """A fitted parameter of an effect; `drive` is '' for none."""
+    """A fitted parameter of an effect; `drive` is '' for none, `given` what the model says."""
 
     effect: str
     drive: str
     parameter: Parameter
     estimate: Estimate
+    given: float | None = None
+
+    @property
+    def size(self) -> float:
+        """The larger of both values, which decides how they are read."""
+        return max(abs(self.estimate.value), abs(self.given or 0.0))
 
     @property
     def text(self) -> str:
         """Value with uncertainty and unit as people read it; none where it may be anything."""
-        known = max(abs(self.estimate.value), ANYTHING * self.parameter.scale)
+        known = max(self.size, ANYTHING * self.parameter.scale)
         if INTERVAL * self.estimate.std > known:
             return 'not determined by this motion'
-        return with_uncertainty(self.estimate.value, self.estimate.std, self.estimate.unit)
+        return with_uncertainty(self.estimate.value, self.estimate.std, self.estimate.unit,
+                                self.size)
 
 
 @dataclass(frozen=True)
@@ -211,18 +219,23 @@ def runner_up(diagnosis: Diagnosis) -> str:
 
 def _headline(diagnosis: Diagnosis) -> str:
     held, unit = diagnosis.effects, diagnosis.residuals.unit
-    named = listed([_or_rivals(diagnosis, one) for one in held])
     doubt = _doubt(diagnosis)
     if diagnosis.effort_looks_like:
         told = dict.fromkeys(one.what for one in diagnosis.effort_looks_like.values())
         return f'{" ".join(map(sentence, told))} No effect is claimed.'
+    if diagnosis.stick_slip:
+        sticking = [f'{drive} at {one.frequency:.3g} Hz'
+                    for drive, one in diagnosis.stick_slip.items()]
+        return (f'Stick-slip: {listed(sticking)} stand, are loaded until they break away, and '
+                'slip. What else may be missing cannot be seen in such a motion: no effect is '
+                'claimed.')
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
         f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')
     noise = in_unit(diagnosis.noise_floor, unit)
     if diagnosis.little:
         little = word_little(diagnosis.little, ' with what was found' if held else '')
-        beside = f' What was found: {named}.{fall}.' if held else ''
+        beside = f' What was found: {_claims(diagnosis)}.{fall}.' if held else ''
         return (f'{little[:1].upper()}{little[1:]}, and no effect of the catalogue the rest.'
                 f'{beside}{doubt}')
     if not held and not diagnosis.depends_on and diagnosis.unconfirmed:
@@ -232,8 +245,8 @@ def _headline(diagnosis: Diagnosis) -> str:
                  if left > AT_NOISE * diagnosis.noise_floor else '')
         return f'{lacks}Nothing that was found holds{above}.{doubt}'
     if any(one.course is not None and one.course.kind != SINCE for one in held):
-        return ('Something changes within the recording, as if there were '
-                f'{named}.{fall}. No constant effect does that.{doubt}')
+        return (f'Something changes within the recording, as if {_claims(diagnosis)}.{fall}. No '
+                f'constant effect does that.{doubt}')
     if diagnosis.verdict == 'unknown':
         groups = unexplained_groups(diagnosis)
         places = listed([place_on(group) for group in groups[:2]] or [
@@ -241,7 +254,7 @@ def _headline(diagnosis: Diagnosis) -> str:
             for drive, ratio in diagnosis.above_noise.items()])
         more = len(groups) - 2
         places += f' and in {more} more place{"s" * (more > 1)}' if more > 0 else ''
-        beside = f' Beside it, the model lacks {named}.{fall}, not to the noise.' if held else ''
+        beside = f' Beside it, {_claims(diagnosis)}.{fall}, not to the noise.' if held else ''
         return ('Something is missing that no effect of the catalogue explains: '
                 f'{places}.{beside}{doubt}')
     unseen = (f'How much of the error of {listed(diagnosis.unseen_noise)} is noise cannot be told '
@@ -260,7 +273,36 @@ def _headline(diagnosis: Diagnosis) -> str:
              else f'. The noise is {noise}; the rest lies near reversals, where friction turns '
              'over in another width than the model\'s.')
     which = ': this data cannot tell which' if any(_rivals(diagnosis, one) for one in held) else ''
-    return f'The model lacks {named}{which}.{fall}{level}{doubt}'
+    claims = _claims(diagnosis)
+    begin = 'T' if claims.startswith('the model') else claims[:1]
+    return f'{begin}{claims[1:]}{which}.{fall}{level}{doubt}'
+
+
+def _claims(diagnosis: Diagnosis) -> str:
+    """Return what the model lacks, and what it has that is not as the recordings say."""
+    new = [_or_rivals(diagnosis, one) for one in diagnosis.effects if not one.in_model]
+    told = [f'the model lacks {listed(new)}'] if new else []
+    return '; '.join([*told, *(_otherwise(diagnosis, one)
+                               for one in diagnosis.effects if one.in_model)])
+
+
+def _otherwise(diagnosis: Diagnosis, found: FoundEffect) -> str:
+    """Return what the model says of an effect that it has, and what the recordings say."""
+    fitted = [one for one in _fitted(diagnosis, found) if one.given is not None]
+    several = len({one.drive for one in fitted}) > 1
+
+    def told(one: FittedValue, text: str) -> str:
+        symbol = f'{one.parameter.symbol} ' if len(found.effect.parameters) > 1 else ''
+        return symbol + text + (f' on {one.drive}' if several else '')
+
+    fitted = fitted[:MOST_CHANGED]
+    given = ', '.join(told(one, with_uncertainty(
+        one.given, 0.0, one.estimate.unit, one.size)) for one in fitted if one.given is not None)
+    said = ', '.join(told(one, one.text) for one in fitted)
+    rivals = _rivals(diagnosis, found)
+    other = f' (or the model lacks {listed(rivals, "or")})' if rivals else ''
+    return (f'{_title(diagnosis, found)} is in the model with {given}; '
+            f'this recording says {said}{other}')
 
 
 def _doubt(diagnosis: Diagnosis) -> str:
@@ -304,7 +346,8 @@ def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
 def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding:
     card = found.effect.card_in(diagnosis.model.kind)
     title = _title(diagnosis, found)
-    what = f'The model lacks {title}: {_parameters(diagnosis, found)}'
+    what = (_otherwise(diagnosis, found) if found.in_model else
+            f'The model lacks {title}: {_parameters(diagnosis, found)}')
     if issubclass(found.effect, MeasurementEffect):
         what += ('. This is what the sensor says, not what the drive must do: it enters '
                  'comparisons and the monitor, never a command')
@@ -352,8 +395,9 @@ def _fitted(diagnosis: Diagnosis, found: FittedEffect) -> list[FittedValue]:
     values = []
     for key, estimate in found.parameters.items():
         drive, name = found.effect.place_and_parameter(key)
-        if estimate.value:
-            values.append(FittedValue(found.name, drive, known[name], estimate))
+        given = found.in_model.get(key) if isinstance(found, FoundEffect) else None
+        if estimate.value or given:
+            values.append(FittedValue(found.name, drive, known[name], estimate, given))
     return sorted(values, key=lambda one: order.index(one.drive))
 
 

@@ -15,14 +15,18 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.inference.diagnosis.quantities import (
     listed,
+    percent,
     plain,
     sentence,
     with_sign,
 )
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import UnknownCandidate
 from pprs_dynamics.inference.search.patterns import Pattern
 from pprs_dynamics.inference.search.unknown import PatternLibrary
+from pprs_dynamics.measurement.motion.stick_slip import StickSlip
 
+STICK_SLIP = 'stick_slip'  # kind of statement
 # How a variable is called, and the unit it is read in: factor from SI, and name. Those of drives
 # that push, and of those that turn.
 UNITS = {
@@ -270,6 +274,16 @@ def _ends(
     return float(np.median(shape[order[:few]])), float(np.median(shape[order[-few:]]))
 
 
+def word_stick_slip(drive: str, found: StickSlip, residuals: Residuals) -> Statement:
+    """Return the statement that a drive sticks and slips."""
+    unit = residuals.units_of(drive).position
+    return Statement(
+        drive, 'frequency', (found.frequency, found.frequency), 1.0, found.share,
+        f'{drive}: it sticks and slips {found.frequency:.3g} times a second, by '
+        f'{found.step:.2g} {unit}, at speeds up to {found.speed:.2g} {unit}/s, in '
+        f'{percent(found.share)} of the time', np.inf, STICK_SLIP, 0.0, 0.0)
+
+
 def describe_unexplained(
     group: Sequence[Statement], beside_effects: bool,
 ) -> tuple[str, str, str, str, str]:
@@ -278,6 +292,14 @@ def describe_unexplained(
     drives = listed([one.drive for one in group])
     texts = '; '.join(one.text if len(group) > 1 else one.text.removeprefix(f'{one.drive}: ')
                       for one in group)
+    if first.kind == STICK_SLIP:
+        return (f'stick_slip on {drives}', f'Stick-slip on {drives}: {texts}.',
+                'The drive stands while its effort builds up, and the effort falls while it slips, '
+                'over and over at one frequency.',
+                'Friction that falls with the speed (boundary lubrication, dry guides), a soft '
+                'transmission before it, and a controller that is slow or has little damping.',
+                'Move faster: above some speed it ends. Stiffer gains or another lubricant shift '
+                'that speed and the frequency.')
     left = 'what the effects found leave' if beside_effects else 'the error'
     what = (f'Something on {drives} that no effect of the catalogue explains, '
             f'{place_of(first.variable)}. Its shape is '

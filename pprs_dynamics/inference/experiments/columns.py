@@ -22,7 +22,6 @@ from pprs_dynamics.inference.regression.base_columns import (
     PresentCoefficient,
     PresentShape,
     ReversalShape,
-    present_values,
 )
 from pprs_dynamics.inference.regression.collecting import sensitivities_of
 from pprs_dynamics.inference.regression.design import Design
@@ -205,7 +204,7 @@ class ColumnPlan:
                                             for d in range(len(self.model.drives))})
                     for effect in self._wanted if issubclass(effect, StructureEffect)),
                 homing=tuple(by_drive(column[part]) for column in found.get(HOMING, ())))
-            base = [self._present(one, design) if isinstance(
+            base = [design.present_rows(one) if isinstance(
                         one, (PresentCoefficient, PresentShape))
                     else _felt(one, by_drive(shared[k][part])) for k, one in enumerate(self.base)]
             result.append(self._by_drive(base, design))
@@ -231,22 +230,6 @@ class ColumnPlan:
         sensitivities.homing_stride = max(1, samples // HOMING_SAMPLES) if shifts else 0
         return {name.removeprefix(PRESENT): column
                 for name, column in sensitivities.columns(forces).items()}
-
-    def _present(self, column: PresentCoefficient | PresentShape, design: Design) -> Rows:
-        """Return the column of what the given model has already on one motion."""
-        effect = next(e for e in self.model.effects if type(e) is column.effect)
-        assert isinstance(effect, CatalogueEffect)
-        values = present_values(effect, column.drive)
-        drive = None if column.drive is None else self.model.drives.index(column.drive)
-        term = design.find_term(column.effect, drive,
-                                {p.name: values[p.name] for p in column.effect.shape})
-        if isinstance(column, PresentCoefficient):
-            at = term.names.index(column.coefficient.name)
-            return {d: rows[at] * column.coefficient.scale for d, rows in term.rows.items()}
-        assert drive is not None
-        weights = effect.to_coefficients(values)
-        slopes = design.slope_rows(term, np.array([weights[name] for name in term.names] or [1.0]))
-        return {drive: slopes[column.effect.shape.index(column.parameter)]}
 
     def _motion_design(self, forces: Forces, part: slice, time: Array, treat: Treatment,
                        block: int) -> Design:

@@ -27,11 +27,10 @@ from pprs_dynamics.inference.experiments.criteria import (
 from pprs_dynamics.inference.regression.base_columns import (
     BaseColumn,
     ModelNumber,
-    PresentCoefficient,
-    PresentShape,
     ReversalShape,
+    present_columns,
 )
-from pprs_dynamics.inference.regression.design import FREE, Design
+from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.regression.sensitivities import PASSIVE_WIDTHS, model_numbers
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
@@ -51,6 +50,7 @@ from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel, Forces
+from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
 
 HELD = 1e-3  # of a column's square may lie outside the span of another effect's
 # Effects that most machines have, or that are most often entered wrongly.
@@ -216,7 +216,7 @@ def _excitation(fits: FittedSets, nothing: CandidateSet) -> Question:
     regression = fits.regression
     weak = []
     for term in fits.design.structure:
-        if term.effect.is_of_one_place:
+        if term.effect.is_of_one_place or fits.design.present(term.effect, None) is not None:
             continue
         block = regression.block(term.rows)
         gain = np.diag(regression.own_information(nothing.fit, block))
@@ -394,8 +394,5 @@ def base_without_recordings(model: DriveModel) -> tuple[BaseColumn, ...]:
     base += [ReversalShape({}, 1.0, None, number) for number in range(len(PASSIVE_WIDTHS))]
     for effect in model.effects:
         if isinstance(effect, CatalogueEffect):
-            for drive in effect.drives if isinstance(effect, DriveEffect) else (None,):
-                base += [PresentCoefficient({}, FREE, type(effect), drive, c)
-                         for c in effect.coefficients]
-                base += [PresentShape({}, FREE, type(effect), drive, p) for p in effect.shape]
+            base += present_columns(effect, effect_uncertainties(model.values, effect.name))
     return tuple(base)

@@ -69,7 +69,10 @@ class ReversalShape(BaseColumn):
 
 @dataclass(frozen=True)
 class PresentCoefficient(BaseColumn):
-    """A coefficient of an effect that the given model has, per unit of its `scale`."""
+    """A coefficient of an effect that the given model has, per unit of its `scale`.
+
+    Within what the model file says of how well it is known; more of a change is a hypothesis.
+    """
 
     effect: type[CatalogueEffect]
     drive: str | None
@@ -78,7 +81,10 @@ class PresentCoefficient(BaseColumn):
 
 @dataclass(frozen=True)
 class PresentShape(BaseColumn):
-    """A shape parameter of an effect that the given model has, by its amount of movement."""
+    """A shape parameter of an effect that the given model has, by its amount of movement.
+
+    Within its uncertainty, as a `PresentCoefficient`.
+    """
 
     effect: type[CatalogueEffect]
     drive: str | None
@@ -146,3 +152,50 @@ def present_values(effect: CatalogueEffect, drive: str | None) -> Mapping[str, f
         return effect.drives[drive]
     assert isinstance(effect, StructureEffect)
     return effect.values
+
+
+def _coefficient_deviations(effect: CatalogueEffect, drive: str | None,
+                           known: Mapping[str, float]) -> dict[str, float]:
+    """Return the standard deviations of an effect's coefficients by those of its parameters.
+
+    Parameters
+    ----------
+    effect : CatalogueEffect
+    drive : str or None
+    known : mapping of str to float
+        Standard deviations by drive.parameter, or parameter; what is not there is exact.
+    """
+    kind, values = type(effect), present_values(effect, drive)
+    prefix = f'{drive}.' if drive else ''
+    here = kind.to_coefficients(values)
+    variances = dict.fromkeys(here, 0.0)
+    for parameter in kind.linear:
+        if std := known.get(prefix + parameter.name, 0.0):
+            moved = kind.to_coefficients({**values, parameter.name: values.get(
+                parameter.name, parameter.default or 0.0) + std})
+            for name, value in moved.items():
+                variances[name] += (value - here[name]) ** 2
+    return {name: variance ** 0.5 for name, variance in variances.items()}
+
+
+def present_columns(effect: CatalogueEffect, known: Mapping[str, float],
+                    ) -> list[PresentCoefficient | PresentShape]:
+    """Return what of an effect is uncertain, as columns without rows.
+
+    Parameters
+    ----------
+    effect : CatalogueEffect
+        Of the given model.
+    known : mapping of str to float
+        Standard deviations by drive.parameter, or parameter; what is not there is exact.
+    """
+    kind, found = type(effect), list[PresentCoefficient | PresentShape]()
+    for drive in effect.drives if isinstance(effect, DriveEffect) else (None,):
+        deviations = _coefficient_deviations(effect, drive, known)
+        found += [PresentCoefficient({}, (c.scale / deviations[c.name]) ** 2, kind, drive, c)
+                  for c in kind.coefficients if deviations[c.name] > 0]
+        for p in kind.shape:
+            if std := known.get(f'{drive}.{p.name}', 0.0):
+                amount = p.amount(std, present_values(effect, drive)[p.name])
+                found.append(PresentShape({}, amount ** -2, kind, drive, p))
+    return found

@@ -28,6 +28,7 @@ from pprs_dynamics.inference.regression.base_columns import (
     PresentCoefficient,
     PresentShape,
     ReversalShape,
+    present_columns,
     present_values,
 )
 from pprs_dynamics.inference.regression.collecting import (
@@ -61,10 +62,13 @@ from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
 
 SHAPE_STEP = 1e-3  # amount of movement, for derivatives by shape parameters
 LONGEST_DELAY = 0.3  # [s], that a recording may show at once
-FREE = 1e-6  # prior precision of what is not known beforehand
+# By how many of its standard deviations a number of an effect may have been fitted wrong as long as
+# another effect was missing.
+LEANING = 10.0
 # A drive hardly moves whose speed is seldom beyond the width in which the model's friction turns
 # over, times the first: in less than the second of the time.
 TURNED, LEAST_MOVING = 2.0, 0.05
@@ -83,7 +87,7 @@ class Design:
     recordings : tuple of FullRate
     base : tuple of BaseColumn
     structure : tuple of Term
-        Effects that are not in single drives.
+        Effects that are not in single drives, those of the given model among them.
     homing : tuple of dict of drive to (M,) array
         Change of all forces per metre that a drive is measured too far [N/m].
     notes : tuple of str
@@ -92,6 +96,8 @@ class Design:
         Of `model`, exactly [N].
     point : OperatingPoint, optional
         None: the given model.
+    joining : str
+        See `of`.
     """
 
     given: ForceModel
@@ -105,7 +111,10 @@ class Design:
     reconstructions: tuple[Reconstruction, ...] = field(repr=False)
     forces: Array = field(repr=False)
     point: OperatingPoint | None = None
+    joining: str = ''
     _moved: dict[bytes, tuple[Reconstruction, ...]] = field(
+        default_factory=dict, repr=False, compare=False)
+    _own_rows: dict[tuple[type[CatalogueEffect], int], Array] = field(
         default_factory=dict, repr=False, compare=False)
 
     @property
@@ -120,9 +129,20 @@ class Design:
     @classmethod
     def of(
         cls, model: ForceModel, recordings: Sequence[Recording],
-        progress: Callable[[float], None] | None = None,
+        progress: Callable[[float], None] | None = None, joining: str = '',
     ) -> Design:
-        """Evaluate a model and its sensitivities on recordings; errors as `measure_residuals`."""
+        """Evaluate a model and its sensitivities on recordings; errors as `measure_residuals`.
+
+        Parameters
+        ----------
+        model : ForceModel
+        recordings : sequence of Recording
+        progress : callable, optional
+            Called with the share that is done.
+        joining : str, optional
+            Effect that joins the model: the numbers of the others were fitted without it, and are
+            `LEANING` times as uncertain as the file says.
+        """
         report = progress or (lambda share: None)
         reconstructions = []
         for k, recording in enumerate(recordings):
@@ -131,7 +151,7 @@ class Design:
 
             reconstructions.append(reconstruct(model, recording, followed))
         return cls._evaluated(model, model, tuple(reconstructions),
-                              lambda share: report(0.5 + 0.5 * share))
+                              lambda share: report(0.5 + 0.5 * share), joining=joining)
 
     def around(self, point: OperatingPoint, alone: bool = False) -> Design:
         """Return the design of the same recordings around another operating point.
@@ -145,7 +165,8 @@ class Design:
         design = self._evaluated(
             point.model, self.given, self.reconstructed(point.model), None,
             {one.effect for one in point.effects} if alone else None,
-            {(one.drive, one.number) for one in self.base if isinstance(one, ReversalShape)})
+            {(one.drive, one.number) for one in self.base if isinstance(one, ReversalShape)},
+            self.joining)
         shift = np.zeros_like(design.residuals.model)
         for column, c in zip(design.base, point.base, strict=True):
             if not isinstance(column, ReversalShape):
@@ -153,11 +174,13 @@ class Design:
                     shift[:, d] += c * row
         for one in point.effects:
             term = design.find_term(one.effect, one.drive, one.shape)
-            if issubclass(one.effect, AddedBody):
+            if issubclass(one.effect, AddedBody) and self.present(one.effect, None) is None:
                 term = replace(term, rows=one.effect.around(term.rows, one.coefficients))
             weights = np.array([one.coefficients[name] for name in term.names] or [1.0])
             for d, rows in term.rows.items():
                 shift[:, d] += weights @ rows
+            for d, row in design.known_change(term).items():
+                shift[:, d] += row
         residuals = replace(design.residuals, model=design.residuals.model - shift)
         return replace(design, residuals=residuals, point=point)
 
@@ -178,7 +201,8 @@ class Design:
                    reconstructions: tuple[Reconstruction, ...],
                    progress: Callable[[float], None] | None,
                    effects: Container[type[CatalogueEffect]] | None = None,
-                   reversals: Container[tuple[int | None, int]] | None = None) -> Design:
+                   reversals: Container[tuple[int | None, int]] | None = None, joining: str = '',
+                   ) -> Design:
         """Return the design around a model; `reversals` are the widths that are left open there.
 
         They are those of the given model around every other one: a sensor that says nothing of
@@ -202,14 +226,16 @@ class Design:
         stacked = stacked_columns(tables)
         residuals = join_tables(model, tables)
         count = len(model.drives)
+        there = [(PRESENT + one.name, type(one)) for one in given.effects
+                 if isinstance(one, StructureEffect)]
         structure = tuple(
-            Term(effect, None, {}, _by_drive(stacked[effect.name], count),
-                 _by_drive(stacked[BARE + effect.name], count)
-                 if BARE + effect.name in stacked else None)
-            for effect in sensitivities.searched)
+            Term(effect, None, {}, _by_drive(stacked[name], count),
+                 _by_drive(stacked[BARE + name], count) if BARE + name in stacked else None)
+            for name, effect in (
+                *((effect.name, effect) for effect in sensitivities.searched), *there))
         homing = tuple(dict(enumerate(column)) for column in stacked.get(HOMING, ()))
         design = cls(given, model, residuals, tuple(full), (), structure, homing, tuple(notes),
-                     reconstructions, residuals.model)
+                     reconstructions, residuals.model, joining=joining)
         base: list[BaseColumn] = [
             ModelNumber(_rows(column), 1.0, number)
             for number, column in zip(sensitivities.numbers, stacked[NUMBERS], strict=True)]
@@ -226,12 +252,9 @@ class Design:
                  for number, column in enumerate(stacked.get(OF_JOINTS, ()))
                  if is_open(None, number, column)]
         for effect in given.effects:
-            if isinstance(effect, DriveEffect):
-                base += design._present_in_drives(effect)
-            elif isinstance(effect, StructureEffect):
-                base += [PresentCoefficient(_rows(column * c.scale), FREE, type(effect), None, c)
-                         for c, column in zip(effect.coefficients, stacked[PRESENT + effect.name],
-                                              strict=True)]
+            if isinstance(effect, (DriveEffect, StructureEffect)):
+                base += [replace(one, rows=design.present_rows(one))
+                         for one in present_columns(effect, design.uncertainties(effect))]
         return replace(design, base=tuple(base))
 
     def moving(self, drive: int) -> np.typing.NDArray[np.bool_]:
@@ -266,11 +289,51 @@ class Design:
                           self.given.units[drive].turns)
 
     def acts_on(self, effect: type[CatalogueEffect], drive: int) -> bool:
-        """Return whether an effect may be looked for on a drive: it may act, and is not there."""
-        present = next((e for e in self.given.effects if type(e) is effect), None)
+        """Return whether an effect may be looked for on a drive, there already or not."""
         return (issubclass(effect, DriveEffect) and self.given.offers(effect)
-                and not (isinstance(present, DriveEffect) and self.drives[drive] in present.drives)
                 and (not effect.is_friction or self.moves(drive)))
+
+    def present(self, effect: type[CatalogueEffect], drive: int | None,
+                ) -> Mapping[str, float] | None:
+        """Return the parameters that the given model has of an effect; None where it lacks it."""
+        there = next((e for e in self.given.effects if type(e) is effect), None)
+        name = None if drive is None else self.drives[drive]
+        if there is None or (isinstance(there, DriveEffect) and name not in there.drives):
+            return None
+        assert isinstance(there, CatalogueEffect)
+        return present_values(there, name)
+
+    def uncertainties(self, effect: CatalogueEffect) -> dict[str, float]:
+        """Return the standard deviations of what the given model has of an effect.
+
+        By drive.parameter; beside an effect that joins they are larger, see `of`.
+        """
+        factor = LEANING if self.joining not in ('', effect.name) else 1.0
+        return {key: factor * std for key, std in effect_uncertainties(
+            self.given.values, effect.name).items()}
+
+    def known_change(self, term: Term) -> dict[int, Array]:
+        """Return what a term changes whatever its coefficients, (M,) by drive.
+
+        Of an effect that the given model has in another shape, what the other shape does to the
+        coefficients that are there; nothing for all others.
+        """
+        if term.drive is None or (values := self.present(term.effect, term.drive)) is None:
+            return {}
+        effect = term.effect
+        assert issubclass(effect, DriveEffect)
+        shape = {p.name: values[p.name] for p in effect.shape}
+        if (effect, term.drive) not in self._own_rows:
+            self._own_rows[effect, term.drive] = self.drive_rows(effect, term.drive, shape)
+        before = self._own_rows[effect, term.drive]
+        if not term.names:  # what it does is all in its shape, and that is no change
+            return {term.drive: -before[0]}
+        if shape == dict(term.shape):
+            return {}
+        known = effect.to_coefficients(values)
+        rows = term.rows[term.drive]  # of all coefficients, or of the first, which scans have
+        c = np.array([known[name] for name in term.names])[:len(rows)]
+        return {term.drive: c @ (rows - before[:len(rows)])}
 
     def drive_rows(self, effect: type[DriveEffect], drive: int,
                    shape: Mapping[str, float]) -> Array:
@@ -373,23 +436,22 @@ class Design:
             slopes.append((after - before) / SHAPE_STEP)
         return np.stack(slopes)
 
-    def _present_in_drives(self, effect: DriveEffect) -> list[BaseColumn]:
-        """Return what an effect of the given model may still change, drive by drive."""
-        found: list[BaseColumn] = []
-        kind = type(effect)
-        for name in effect.drives:
-            drive, values = self.drives.index(name), present_values(effect, name)
-            term = self.term(kind, drive, {p.name: values[p.name] for p in kind.shape})
-            weights = kind.to_coefficients(values)
-            found += [PresentCoefficient({d: rows[k] * c.scale for d, rows in term.rows.items()},
-                                         FREE, kind, name, c)
-                      for k, c in enumerate(kind.coefficients)]
-            if kind.shape:
-                slopes = self.slope_rows(term, np.array(
-                    [weights[name] for name in term.names] or [1.0]))
-                found += [PresentShape({drive: row}, FREE, kind, name, p)
-                          for p, row in zip(kind.shape, slopes, strict=True)]
-        return found
+    def present_rows(self, column: PresentCoefficient | PresentShape) -> dict[int, Array]:
+        """Return the rows, (M,) by drive, of what the model's effects may be otherwise."""
+        there = next(e for e in self.model.effects if type(e) is column.effect)
+        assert isinstance(there, CatalogueEffect)
+        values = present_values(there, column.drive)
+        drive = None if column.drive is None else self.drives.index(column.drive)
+        term = self.find_term(column.effect, drive,
+                              {p.name: values[p.name] for p in column.effect.shape})
+        if isinstance(column, PresentCoefficient):
+            at = term.names.index(column.coefficient.name)
+            return {d: rows[at] * column.coefficient.scale for d, rows in term.rows.items()
+                    if np.any(rows[at])}
+        assert drive is not None
+        weights = there.to_coefficients(values)
+        slopes = self.slope_rows(term, np.array([weights[name] for name in term.names] or [1.0]))
+        return {drive: slopes[column.effect.shape.index(column.parameter)]}
 
     def friction(self) -> ActiveFriction | AxisFriction | None:
         """Return the friction that the model has in its drives."""

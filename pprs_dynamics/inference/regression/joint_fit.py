@@ -319,17 +319,18 @@ class Regression:
         """Return the information on a block's coefficients that a fit leaves, (k, k)."""
         return self._beside(fit, block)[0]
 
-    def own_share(self, fit: JointFit, block: Block) -> float:
-        """Return the least share of a column's whitened square that a fit cannot take."""
+    def own_share(self, fit: JointFit, block: Block, coefficients: Array) -> float:
+        """Return the share of the whitened square of a block's force that a fit cannot take."""
         S, _, plain = self._beside(fit, block)
-        return float(np.min(np.diag(S) / np.maximum(plain, 1e-300)))
+        own, whole = (float(coefficients @ one @ coefficients) for one in (S, plain))
+        return own / max(whole, 1e-300)
 
     def _beside(self, fit: JointFit, block: Block) -> tuple[Array, Array, Array]:
-        """Return own sums of products, those with what is left, and full squares of a block."""
+        """Return own sums of products, those with what is left, and full products of a block."""
         taken, b = Columns(self, block.rows).projected(fit)
-        S = sum(np.tensordot(self.weights(fit, d), self.products(block, block, d), 1)
-                for d in block.rows)
-        return S - taken @ fit.covariance @ taken.T, b, np.diag(S)
+        S = np.sum([np.tensordot(self.weights(fit, d), self.products(block, block, d), 1)
+                    for d in block.rows], axis=0)
+        return S - taken @ fit.covariance @ taken.T, b, S
 
 
 class Columns:

@@ -142,7 +142,8 @@ class Sensitivities(ABC):
         in both directions; `OF_JOINTS` the former in all passive joints; `HOMING` per metre that
         each drive is measured too far; the coefficients of each effect of `searched` by its name,
         and after `BARE` as they were if friction did not follow the loads; those of effects
-        that the given model has after `PRESENT`. What a kind of model does not have is left out.
+        that the given model has by their names after `PRESENT`. What a kind of model does not have
+        is left out.
 
         Parameters
         ----------
@@ -167,8 +168,10 @@ class Sensitivities(ABC):
         known = {effect.name for effect in self.given.effects}
         for present in self.model.effects:
             if isinstance(present, StructureEffect) and present.name in known:
-                columns[PRESENT + present.name], _ = self._of_structure(
+                columns[PRESENT + present.name], bare = self._of_structure(
                     type(present), state, reference)
+                if isinstance(present, BodyEffect):
+                    columns[BARE + PRESENT + present.name] = bare
         return columns
 
     @abstractmethod

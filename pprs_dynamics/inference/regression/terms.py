@@ -87,7 +87,10 @@ class FullRate:
 
 @dataclass(frozen=True)
 class PlacedEffect:
-    """An effect on a drive or in the structure, with all its coefficients by name."""
+    """An effect on a drive or in the structure, with all its coefficients by name.
+
+    Where the given model has it, they are what is changed of those that it has.
+    """
 
     effect: type[CatalogueEffect]
     drive: int | None
@@ -105,7 +108,7 @@ class OperatingPoint:
     base : (P,) array
         Coefficients of the base columns; those of reversals are 0.
     effects : tuple of PlacedEffect
-        What it has beside the given model.
+        What it has beside the given model, or otherwise.
     """
 
     model: ForceModel

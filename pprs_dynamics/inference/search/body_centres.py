@@ -22,6 +22,7 @@ from pprs_dynamics.physics.effects.added_body import AXES, MOMENTS, PRODUCTS, Ad
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 if TYPE_CHECKING:
+    from pprs_dynamics.physics.mechanism.mechanism import Mechanism
     from pprs_dynamics.physics.model.force_model import ForceModel
 
 REACH = 4.0  # of the mechanism's size, the mean distance of its joints: what hangs on it is within
@@ -49,7 +50,7 @@ def about_centre(term: Term, mass: str, centre: tuple[float, ...]) -> Term:
 def centre_of(effect: type[CatalogueEffect], names: tuple[str, ...], c: Array,
               model: ForceModel) -> tuple[float, ...]:
     """Return where a body of these coefficients is, within the reach."""
-    size = reach_of(model)
+    size = reach_of(model.robot)  # type: ignore[attr-defined]
     known = dict(zip(names, c.tolist(), strict=True))
     prefix = names[0].removesuffix('mass')
     mass = known[names[0]]
@@ -72,7 +73,8 @@ def find_centre(term: Term, mass: str, error: Array, scale: Mapping[int, float],
         Of each drive's error.
     model : ForceModel
     """
-    prefix, size = mass.removesuffix('mass'), reach_of(model)
+    size = reach_of(model.robot)  # type: ignore[attr-defined]
+    prefix = mass.removesuffix('mass')
     at = [term.names.index(prefix + name) for name in (
         'mass', *(f'moment_{axis}' for axis in AXES), *MOMENTS, *PRODUCTS)]
     stacked = np.concatenate([np.vstack((term.rows[d][at], error[:, d]))[:, known] / max(one, 1e-12)
@@ -101,7 +103,12 @@ def find_centre(term: Term, mass: str, error: Array, scale: Mapping[int, float],
     return tuple((size * best.x).tolist())
 
 
-def reach_of(model: ForceModel) -> float:
-    """Return how far from its place a body may be [m]."""
-    size: float = model.robot.structure.size  # type: ignore[attr-defined]
-    return REACH * size
+def reach_of(robot: Mechanism) -> float:
+    """Return how far from its place a body may be [m].
+
+    By the mean distance of the joints, or where that is less, as of an arm with a single joint,
+    by the mean distance of what it moves from the joints that move it.
+    """
+    mass = float(np.abs(robot.inertial[:, 0]).sum())
+    first = float(np.linalg.norm(robot.inertial[:, 1:4], axis=1).sum())
+    return REACH * max(robot.structure.size, first / mass if mass > 0 else 0.0)

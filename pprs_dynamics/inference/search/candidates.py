@@ -72,6 +72,9 @@ class Component:
         Parameters of the shape, by name.
     centre : tuple of float
         Of an added body with a first moment: about where it is, from its place's centre [m].
+    given : tuple of float
+        All coefficients that the given model has of the effect there, which the fitted ones
+        change; none where it does not have it.
     course : Course or None
         None: all the time.
     """
@@ -81,6 +84,7 @@ class Component:
     names: tuple[str, ...]
     shape: tuple[tuple[str, float], ...] = ()
     centre: tuple[float, ...] = ()
+    given: tuple[float, ...] = ()
     course: Course | None = None
 
     @classmethod
@@ -114,10 +118,15 @@ class Component:
         found[[known.index(name) for name in self.names]] = coefficients
         return found
 
+    def total(self, coefficients: Array) -> Array:
+        """Return all of the effect's coefficients, with those that the given model has."""
+        every = self.every(coefficients)
+        return every + np.array(self.given) if self.given else every
+
     def values(self, coefficients: Array) -> dict[str, float]:
-        """Return all linear parameters of the effect."""
+        """Return all linear parameters of the effect, with what the given model has of it."""
         every = {c.name: float(value) for c, value in zip(
-            self.effect.coefficients, self.every(coefficients), strict=False)}
+            self.effect.coefficients, self.total(coefficients), strict=False)}
         return {name: float(value) for name, value in self.effect.from_coefficients(every).items()}
 
 
@@ -304,8 +313,8 @@ class CandidateSet:
         return tuple(c for c in self.candidates if not any(c is one for one in gone))
 
     def coefficients(self, component: Component) -> Array:
-        """Return the coefficients of a component."""
-        return self.fit.of(self.blocks[component])
+        """Return the coefficients of a component; not that of what is known of it."""
+        return self.fit.of(self.blocks[component])[:max(len(component.names), 1)]
 
     def blocks_of(self, candidate: Candidate) -> tuple[Block, ...]:
         """Return the columns of a candidate."""

@@ -62,7 +62,7 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
     others : iterable of CandidateSet
         Of one effect each, that may be the right one with a step in time.
     """
-    own = [(kept, one) for one in kept.effects]
+    own = [(kept, one) for one in kept.effects if _is_new(one)]
     if not kept.unknowns and not any(
             offer.is_worth_a_fit(fits) for offer in _offers(fits, kept, own)):
         return fits, kept
@@ -70,9 +70,10 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
     dated = FittedSets(fits.design, fits.decisions, fits.regression.error_scale)
     best = dated.evaluate(kept.candidates)
     names = {one.name for one in kept.effects}
-    more = [(one, one.effects[0]) for one in others if one.effects[0].name not in names]
+    more = [(one, one.effects[0]) for one in others
+            if one.effects[0].name not in names and _is_new(one.effects[0])]
     for _ in range(MOST_COURSES):
-        held = [(best, one) for one in best.effects if not one.course]
+        held = [(best, one) for one in best.effects if not one.course and _is_new(one)]
         # Patterns of no catalogue imitate what changes: offers are beside effects alone.
         plain = dated.at_noise_of(best, best.effects) if best.unknowns else best
         offers = sorted(_offers(dated, plain, [*held, *more]), key=lambda one: -one.gain)
@@ -86,6 +87,11 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
         best = _refined(dated, found)
     best = _simplest(dated, best, [*(one for _, one in own), *(one for _, one in more)])
     return (dated, best) if any(one.course for one in best.effects) else (fits, kept)
+
+
+def _is_new(candidate: EffectCandidate) -> bool:
+    """Return whether the given model lacks an effect: what it has is there all the time."""
+    return not any(one.given for one in candidate.components)
 
 
 def _courses(fits: FittedSets) -> Iterator[Course]:

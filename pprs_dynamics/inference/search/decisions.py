@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 
-from pprs_dynamics.inference.regression.design import LEAST_MOVING, TURNED
+from pprs_dynamics.inference.regression.design import LEANING, LEAST_MOVING, TURNED
 from pprs_dynamics.inference.regression.joint_fit import LEAST_SAMPLES
 from pprs_dynamics.inference.regression.normal_equations import BEYOND_TOLERANCE
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
@@ -70,6 +70,9 @@ class Decisions:
         0.05, '1', 'standard deviation of the load of a drive in motion over its mean, up to which '
         'friction by load and friction that no load changes are told as one',
         'dry friction varies by as much along a guide')
+    stick_slip: float = _number(
+        0.2, '1', 'share of the time in stick-slip, from which no other effect is claimed',
+        'a fifth of the samples decides about any friction')
     reversal_share: float = _number(
         0.12, '1', 'share of the samples, the slowest, that a pattern of friction may leave out',
         'friction turns over there, in a width that nobody knows')
@@ -135,6 +138,8 @@ FIXED = (
      'a tolerance is a limit: one number in a hundred lies beyond'),
     ('BEYOND_TOLERANCE', BEYOND_TOLERANCE, '1', "steepness of a number's prior beyond tolerance",
      'it may be passed by a fifth where much speaks for it, and not more'),
+    ('LEANING', LEANING, '1', "uncertainty of an effect's numbers, times, where another one joins",
+     'they were fitted without it; recordings decide, and where they tell nothing the file'),
     ('TURNED', TURNED, '1', "speed over the model's width of reversal, at which a drive moves",
      'friction has turned over to 96 %'),
     ('LEAST_MOVING', LEAST_MOVING, '1', 'share of the time in motion that friction needs',

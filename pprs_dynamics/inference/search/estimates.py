@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,16 +15,21 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
     PresentCoefficient,
+    PresentShape,
+    present_values,
     units_of,
     within,
 )
 from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.joint_fit import JointFit
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.inference.search.library import placed
 from pprs_dynamics.inference.search.reversal_widths import place_of
 from pprs_dynamics.physics.effects.added_body import AddedBody
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 TOLD = 0.5  # of a coefficient's prior variance, below which the recordings tell it
 
@@ -102,12 +107,10 @@ def estimate(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
     parameters: dict[str, Estimate] = {}
     bound: list[str] = []
     for component in candidate.components:
-        blocks = [found.blocks[component],
-                  *([slopes[component]] if component in slopes else [])]
-        index = fit.index_of(blocks)
-        covariance = fit.covariance[np.ix_(index, index)]
-        c = found.coefficients(component)
-        some, held = _of_component(fits, component, c, covariance)
+        index = _places(fits, fit, component, slopes.get(component))
+        some, held = _of_component(
+            fits, component, found.coefficients(component),
+            _covariance(fits, fit, component, len(index), index), moved=found.fit.coefficients)
         parameters.update(some)
         bound += held
     for key, one in _left_out(fits, found, candidate).items():
@@ -148,7 +151,7 @@ def _told_elsewhere(fits: FittedSets, found: CandidateSet, candidate: EffectCand
     if drives is None or effect.shape or found.blocks[candidate.components[0]].mean is not None:
         return []
     names = candidate.components[0].names
-    blocks = [fits.library.block(Component.of(effect, d, {}, names))
+    blocks = [fits.library.block(placed(fits.design, effect, d, {}, names))
               for d in fits.regression.drives
               if d not in drives and fits.design.acts_on(effect, d)]
     fit = fits.regression.at((*found.fit.blocks, *blocks), found.fit.amplitudes)
@@ -173,19 +176,89 @@ def _left_out(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
             continue
         block = fits.library.block(replace(component, names=rest))
         fit = fits.regression.stated(found.fit, [block])
-        place = fit.places[block]
-        some, _ = _of_component(fits, replace(component, names=rest), np.zeros(len(rest)),
-                                fit.covariance[place, place], with_shape=False)
+        others = replace(component, names=rest, given=())
+        index = _places(fits, fit, replace(component, names=rest))
+        some, _ = _of_component(fits, others, np.zeros(len(rest)), _covariance(
+            fits, fit, others, len(rest), index), with_shape=False)
         prefix = '' if component.drive is None else f'{fits.design.drives[component.drive]}.'
-        fitted = {prefix + p.name for p in candidate.effect.linear
-                  if component.values(found.coefficients(component))[p.name]}
+        changed = replace(component, given=()).values(found.coefficients(component))
+        fitted = {prefix + p.name for p in candidate.effect.linear if changed[p.name]}
         estimates.update({key: one for key, one in some.items() if key not in fitted})
     return estimates
 
 
-def _of_component(fits: FittedSets, component: Component, c: Array, covariance: Array,
-                  with_shape: bool = True) -> tuple[dict[str, Estimate], list[str]]:
+def _places(fits: FittedSets, fit: JointFit, component: Component, slopes: Block | None = None,
+            ) -> list[int]:
+    """Return the places of a component's coefficients in a fit, then of its shape."""
+    places = fit.index_of([fits.library.block(component)])[:max(len(component.names), 1)].tolist()
+    return places if slopes is None else [*places, *fit.index_of([slopes]).tolist()]
+
+
+def _covariance(fits: FittedSets, fit: JointFit, component: Component, size: int,
+                index: Sequence[int]) -> Array:
+    """Return the covariance of a component's coefficients, then of its shape where that is in it.
+
+    Of an effect that the given model has, with what it may be otherwise within its uncertainty.
+
+    Parameters
+    ----------
+    fits : FittedSets
+    fit : JointFit
+    component : Component
+    size : int
+    index : sequence of int
+        Their places in the fit; none where the base columns are all that there is of them.
+    """
+    weights = np.zeros((size, len(fit.coefficients)))
+    weights[np.arange(len(index)), index] = 1.0
+    first = max(len(component.names), 1 if index else 0)
+    for k, column in _present_at(fits, component):
+        if isinstance(column, PresentShape):
+            at = first + component.effect.shape.index(column.parameter)
+            if at < size:
+                weights[at, k] = 1.0
+        elif column.coefficient.name in component.names:
+            weights[component.names.index(column.coefficient.name), k] = column.coefficient.scale
+    found: Array = weights @ fit.covariance @ weights.T
+    return found
+
+
+def _present_at(fits: FittedSets, component: Component,
+                ) -> Iterator[tuple[int, PresentCoefficient | PresentShape]]:
+    """Yield the base columns, with their places, of what the given model has of a component."""
+    name = None if component.drive is None else fits.design.drives[component.drive]
+    for k, column in enumerate(fits.design.base):
+        if (isinstance(column, (PresentCoefficient, PresentShape))
+                and (column.effect, column.drive) == (component.effect, name)):
+            yield k, column
+
+
+def _of_component(
+    fits: FittedSets, component: Component, c: Array, covariance: Array, with_shape: bool = True,
+    moved: Array | None = None,
+) -> tuple[dict[str, Estimate], list[str]]:
+    """Return the parameters of a component, and those at the edge of what was tried.
+
+    Parameters
+    ----------
+    fits : FittedSets
+    component : Component
+    c : (k,) array
+        Its coefficients.
+    covariance : (k + s, k + s) array
+        Of these and of the shape.
+    with_shape : bool
+    moved : (P,) array, optional
+        Coefficients of the fit, of which those of base columns move what the given model has.
+    """
     effect, shape = component.effect, component.parameters
+    if component.given and moved is not None:
+        base = {column.coefficient.name: float(moved[k]) * column.coefficient.scale
+                for k, column in _present_at(fits, component)
+                if isinstance(column, PresentCoefficient)}
+        component = replace(component, given=tuple(
+            one + base.get(p.name, 0.0) for one, p in zip(
+                component.given, effect.coefficients, strict=True)))
     prefix = '' if component.drive is None else f'{fits.design.drives[component.drive]}.'
     unit_of = _units(fits.design, component.drive)
     units = units_of(fits.design.given, component.drive)
@@ -200,9 +273,9 @@ def _of_component(fits: FittedSets, component: Component, c: Array, covariance: 
         slope = np.zeros(size)
         for k in range(size):
             step = 1e-4 * max(float(np.sqrt(covariance[k, k])), 1e-12)
-            moved = c.copy()
-            moved[k] += step
-            slope[k] = (component.values(moved)[parameter.name] - values[parameter.name]) / step
+            beside = c.copy()
+            beside[k] += step
+            slope[k] = (component.values(beside)[parameter.name] - values[parameter.name]) / step
         variance = float(slope @ covariance[:size, :size] @ slope)
         found[prefix + parameter.name] = Estimate(
             within(parameter, values[parameter.name], units), max(variance, 0.0) ** 0.5,
@@ -225,27 +298,26 @@ def _units(design: Design, drive: int | str | None) -> Callable[[str], str]:
     return design.residuals.units_of(name).of
 
 
-def estimate_present(fits: FittedSets, found: CandidateSet, fitted: ForceModel, name: str,
+def estimate_present(fits: FittedSets, found: CandidateSet, effect: CatalogueEffect,
                      ) -> dict[str, Estimate]:
-    """Return the parameters of an effect that the given model has, as a fit moves them.
+    """Return the parameters of an effect of the given model, as base columns move them.
 
-    Deviations are known for parameters that are coefficients.
+    By drive.parameter, or parameter: within what the model file says of how well they are known,
+    and how well after the fit.
     """
-    known = {}
-    for k, column in enumerate(fits.design.base):
-        if isinstance(column, PresentCoefficient) and column.effect.name == name:
-            key = f'{column.drive}.{column.coefficient.name}' if column.drive else (
-                column.coefficient.name)
-            known[key] = float(np.sqrt(found.fit.covariance[k, k])) * column.coefficient.scale
-    effect = next(type(e) for e in fits.design.given.effects if e.name == name)
-    units = {p.name: p.unit for p in getattr(effect, 'parameters', ())}
-    prefix = f'effects.{name}.'
-    place_of = getattr(effect, 'place_and_parameter', lambda key: ('', key))
-    return {key: Estimate(float(value), known.get(key, float('nan')),
-                          _units(fits.design, drive or None)(units[parameter]))
-            for full, value in fitted.values.items() if full.startswith(prefix)
-            for key in [full.removeprefix(prefix)]
-            for drive, parameter in [place_of(key)]}
+    kind, parameters = type(effect), dict[str, Estimate]()
+    fit = fits.regression.stated(found.fit)
+    for name in effect.drives if isinstance(effect, DriveEffect) else (None,):
+        drive = None if name is None else fits.design.drives.index(name)
+        values = present_values(effect, name)
+        component = placed(fits.design, kind, drive, {p.name: values[p.name] for p in kind.shape},
+                           tuple(c.name for c in kind.coefficients))
+        count = len(kind.coefficients)
+        some, _ = _of_component(
+            fits, component, np.zeros(count),
+            _covariance(fits, fit, component, count + len(kind.shape), []), moved=fit.coefficients)
+        parameters.update(some)
+    return parameters
 
 
 def calibrations(fits: FittedSets, found: CandidateSet, widths: Mapping[int, float],

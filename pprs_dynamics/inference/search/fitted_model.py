@@ -57,8 +57,17 @@ def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> Fo
         kind = one.effect
         if kind.name not in names:
             names.append(kind.name)
-        every = {**kind.from_coefficients(one.coefficients), **one.shape}
         drive = '' if one.drive is None else f'{design.drives[one.drive]}.'
+        coefficients, shape = one.coefficients, one.shape
+        if (given := design.present(kind, one.drive)) is not None:
+            # What is there already has been moved within its uncertainty.
+            moved = {name: float(values.get(f'effects.{kind.name}.{drive}{name}', value))
+                     for name, value in given.items()}
+            coefficients = {name: value + coefficients.get(name, 0.0)
+                            for name, value in kind.to_coefficients(moved).items()}
+            if all(given[name] == value for name, value in shape.items()):
+                shape = {name: moved[name] for name in shape}
+        every = {**kind.from_coefficients(coefficients), **shape}
         for parameter in kind.parameters:
             if kind.is_of_one_place and every[parameter.name] == parameter.default:
                 continue  # of all the links or joints that it is not on

@@ -175,7 +175,7 @@ class FittedSets:
         """
         found = {}
         for one in (one for c in candidates for one in c.components):
-            size = _stepped(fit.of(self.library.block(one)))
+            size = _stepped(fit.of(self.library.block(one))[:max(len(one.names), 1)])
             key = (one, tuple(size.tolist()))
             if key not in self._nuisance:
                 self._nuisance[key] = self._nuisance_of(one, size)
@@ -214,9 +214,9 @@ class FittedSets:
 
         By the Savage-Dickey ratio of prior and posterior density at 0.
         """
-        if not component.names:
-            return np.inf
         block = found.blocks[component]
+        if block.mean is not None:  # without it the shape goes, too
+            return np.inf
         place = found.fit.places[block]
         c, covariance = found.fit.coefficients[place], found.fit.covariance[place, place]
         return float(c @ np.linalg.solve(covariance, c) + np.linalg.slogdet(covariance)[1]
@@ -258,7 +258,7 @@ class FittedSets:
                 value = parameter.moved(shape[parameter.name], float(np.clip(step, -limit, limit)))
                 bounded = parameter.of(units_of(self.design.given, component.drive).turns)
                 shape[parameter.name] = float(np.clip(value, bounded.lower, bounded.upper))
-            moved[component] = Component.of(effect, component.drive, shape, component.names)
+            moved[component] = replace(component, shape=tuple(sorted(shape.items())))
         return tuple(
             EffectCandidate.of(moved.get(one, one) for one in c.components)
             if isinstance(c, EffectCandidate) else c for c in found.candidates)
@@ -269,7 +269,7 @@ class FittedSets:
         for one in (one for one in found.blocks if one.effect.shape):
             assert one.drive is not None
             rows = self.design.slope_rows(self.library.term(one),
-                                          one.every(found.coefficients(one)))
+                                          one.total(found.coefficients(one)))
             slopes.append((one, self.regression.block({one.drive: rows},
                                                       precision=np.eye(len(rows)))))
         return slopes

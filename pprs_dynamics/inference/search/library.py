@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design, searched_in_drives
@@ -33,7 +34,28 @@ from pprs_dynamics.inference.search.candidates import (
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.system.parallel import lazy
+
+
+def placed(design: Design, effect: type[CatalogueEffect], drive: int | None,
+           shape: Mapping[str, float], names: tuple[str, ...]) -> Component:
+    """Return an effect on a drive or in the structure, with what the given model has of it."""
+    found = Component.of(effect, drive, shape, names)
+    values = design.present(effect, drive)
+    if values is None:
+        return found
+    known = effect.to_coefficients(values)
+    return replace(found, given=tuple(known[c.name] for c in effect.coefficients))
+
+
+def shapes_of(design: Design, effect: type[DriveEffect], drive: int,
+              ) -> Sequence[Mapping[str, float]]:
+    """Return the shapes in which an effect is tried on a drive, the given model's among them."""
+    trials = effect.trials(design.covered[drive])
+    values = design.present(effect, drive)
+    return trials if values is None or not effect.shape else [
+        *trials, {p.name: values[p.name] for p in effect.shape}]
 
 
 class DriveLibrary:
@@ -60,21 +82,38 @@ class DriveLibrary:
         parts: list[Array] = [np.zeros((0, len(self.series)), dtype=np.float32)]
         first = 0
         for effect in self.effects:
-            terms = self.design.trial_terms(effect, self.d,
-                                            effect.trials(self.design.covered[self.d]))
+            terms = self.design.trial_terms(effect, self.d, shapes_of(self.design, effect, self.d))
+            rows: list[Array] = []
             for term in terms:
-                if not term.names:
-                    entries.append(Entry(Component.of(effect, self.d, term.shape, ()), (first,),
-                                         CERTAIN * np.eye(1), np.ones(1)))
-                entries += [Entry(Component.of(effect, self.d, term.shape, names),
-                                  tuple(first + term.names.index(name) for name in names))
-                            for names in effect.variants
-                            if names and set(names) <= set(effect.scanned)]
-                first += len(term.rows[self.d])
+                known = self.design.known_change(term)
+                entries += self._entries(term, first + sum(map(len, rows)), len(known))
+                rows += ([term.rows[self.d] + known[self.d]] if known and not term.names
+                         else [term.rows[self.d], *(row[None] for row in known.values())])
+            first += sum(map(len, rows))
             # In single precision and in frequency alone: there are hundreds of them.
             parts.append(self.series.transform(np.concatenate(
-                [term.rows[self.d] for term in terms], dtype=np.float32, casting='same_kind')))
+                rows, dtype=np.float32, casting='same_kind')))
         return ScoreTest(self.regression, {self.d: np.concatenate(parts)}, entries)
+
+    def _entries(self, term: Term, first: int, known: int) -> list[Entry[Component]]:
+        """Return the variants of a term whose rows begin at a place; what is known of it last."""
+        effect = term.effect
+        if not term.names:
+            return [Entry(placed(self.design, effect, self.d, term.shape, ()), (first,),
+                          CERTAIN * np.eye(1), np.ones(1))]
+        found = []
+        for names in effect.variants:
+            if not (names and set(names) <= set(effect.scanned)):
+                continue
+            at = [term.names.index(name) for name in names]
+            chosen = self.series.transform(term.rows[self.d][at]) if known else None
+            precision = None if chosen is None else block_diag(
+                self.regression.g_prior({self.d: chosen @ chosen.T}), np.array([[CERTAIN]]))
+            found.append(Entry(
+                placed(self.design, effect, self.d, term.shape, names),
+                (*(first + k for k in at), *[first + len(term.rows[self.d])] * known), precision,
+                np.append(np.zeros(len(at)), 1.0) if known else None))
+        return found
 
     def offers(self, fit: JointFit) -> dict[str, tuple[Component, float]]:
         """Return the best shape and variant of every effect, by name, with its gain at a noise."""
@@ -106,7 +145,7 @@ class Library:
         self._nuisance: dict[Component, dict[int, Array]] = {}
         self._prices: dict[Component, CostTerms] = {}
         self.local = {d: DriveLibrary(design, regression, d) for d in regression.drives}
-        self.spanning = [Component.of(effect, d, {}, names)
+        self.spanning = [placed(design, effect, d, {}, names)
                          for effect in searched_in_drives(design) if effect.shifts_positions()
                          for d in regression.drives if design.acts_on(effect, d)
                          for names in effect.variants]
@@ -117,14 +156,20 @@ class Library:
 
     def _placed(self, term: Term, names: tuple[str, ...]) -> Component:
         """Return an effect in the structure, a body where it is most likely to be."""
-        found = Component.of(term.effect, None, {}, names)
-        if not has_centre(term.effect, names):
+        found = placed(self.design, term.effect, None, {}, names)
+        if found.given or not has_centre(term.effect, names):
             return found
         key = (term.effect, names[0])
         if key not in self._centres:
             self._centres[key] = find_centre(term, names[0], self.design.residuals.error,
                                              self.regression.error_scale, self.design.given)
         return replace(found, centre=self._centres[key])
+
+    def variant(self, component: Component, names: tuple[str, ...]) -> Component:
+        """Return a component with other coefficients; a body where it is most likely to be."""
+        if component.drive is None:
+            return self._placed(self.design.find_term(component.effect, None, {}), names)
+        return replace(component, names=names)
 
     @cached_property
     def score_test(self) -> ScoreTest[Component]:
@@ -169,9 +214,20 @@ class Library:
     def block(self, component: Component) -> Block:
         """Return the columns of a component, transformed, with their prior."""
         if component not in self._blocks:
-            block = self.regression.term_block(self.term(component), component.names)
-            self._blocks[component] = replace(
-                block, precision=block.precision + self._expected(component))
+            term = self.term(component)
+            block = self.regression.term_block(term, component.names)
+            block = replace(block, precision=block.precision + self._expected(component))
+            known = self.design.known_change(term)
+            if known and not component.names:
+                block = replace(self.regression.term_block(replace(term, rows={
+                    d: rows + known[d] for d, rows in term.rows.items()}), ()))
+            elif known:
+                change = self.regression.block(known, CERTAIN * np.eye(1))
+                block = Block(
+                    {d: np.concatenate([rows, change.rows[d]]) for d, rows in block.rows.items()},
+                    block_diag(block.precision, np.array([[CERTAIN]])),
+                    np.append(np.zeros(block.size), 1.0))
+            self._blocks[component] = block
         return self._blocks[component]
 
     def _expected(self, component: Component) -> Array:
@@ -202,7 +258,7 @@ class Library:
     def trials(self, component: Component) -> Sequence[Mapping[str, float]]:
         """Return the shapes in which a component is tried."""
         effect, d = component.effect, component.drive
-        return (effect.trials(self.design.covered[d])
+        return (shapes_of(self.design, effect, d)
                 if d is not None and issubclass(effect, DriveEffect) else ({},))
 
     def tried(self, component: Component, name: str) -> list[float]:
@@ -253,6 +309,7 @@ class Library:
             usual, narrowed, odds = self._expected(component), 0.0, 0.0
             if np.any(usual):
                 decisions, both = self.prices.decisions, self.block(component).precision
+                both = both[:len(usual), :len(usual)]
                 narrowed = float(np.linalg.slogdet(both)[1] - np.linalg.slogdet(both - usual)[1])
                 if component.drive is not None:
                     odds = -2 * float(np.log(
@@ -273,8 +330,11 @@ class Library:
             return force
         for one in candidate.components:
             c = one.every(found.coefficients(one))
-            for d, rows in self.term(one).rows.items():
+            term = self.term(one)
+            for d, rows in term.rows.items():
                 force[:, d] += c @ rows
+            for d, row in self.design.known_change(term).items():
+                force[:, d] += row
         return force
 
     def release(self) -> None:

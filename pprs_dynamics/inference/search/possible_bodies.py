@@ -23,7 +23,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
-from pprs_dynamics.inference.search.body_centres import REACH
+from pprs_dynamics.inference.search.body_centres import reach_of
 from pprs_dynamics.inference.search.candidates import Component
 from pprs_dynamics.physics.effects.added_body import AXES, KEPT, MOMENTS, AddedBody
 from pprs_dynamics.physics.effects.structure_effect import with_bodies
@@ -56,13 +56,26 @@ def with_possible_bodies(model: ForceModel, regression: Regression, fit: JointFi
     """
     for component, block in bodies.items():
         place = fit.places[block]
-        robot = with_bodies(model.robot, model.effects)  # type: ignore[attr-defined]
-        found = nearest_possible(robot, component, fit.of(block), fit.covariance[place, place])
+        # What is changed of a body that the model has is none: all of it has to be one.
+        there = [one for one in model.effects
+                 if not (component.given and type(one) is component.effect)]
+        before = given_body(component)
+        robot = with_bodies(model.robot, there)  # type: ignore[attr-defined]
+        found = nearest_possible(robot, component, before + fit.of(block),
+                                 fit.covariance[place, place])
         if found is None:
             return None
-        if not np.array_equal(found, fit.of(block)):
+        found = found - before
+        if not np.allclose(found, fit.of(block), rtol=1e-12, atol=0.0):
             fit = regression.held(fit, fit.index_of([block]), found)
     return fit
+
+
+def given_body(component: Component) -> Array:
+    """Return what the given model has of a component's coefficients, (k,)."""
+    known = dict(zip((c.name for c in component.effect.coefficients), component.given,
+                     strict=False))
+    return np.array([known.get(name, 0.0) for name in component.names])
 
 
 def nearest_possible(robot: Mechanism, component: Component, c: Array, covariance: Array,
@@ -146,7 +159,7 @@ def _margins(robot: Mechanism, component: Component, sign: float) -> Callable[[A
         away = c[1:4] / mass if len(c) > 1 else np.zeros(3)
         inertia = padded[tensor].reshape(3, 3)
         found = [np.array([sign * c[0] / LEAST_MASS - 1,
-                           1 - float(np.linalg.norm(away)) / (REACH * robot.structure.size)])]
+                           1 - float(np.linalg.norm(away)) / reach_of(robot)])]
         if has_extent:
             about = sign * (np.trace(inertia) / 2 * np.eye(3) - inertia)
             extent = np.asarray(np.linalg.eigvalsh(about), dtype=float)

@@ -222,7 +222,8 @@ class Search:
         for component in candidate.components:
             for names in candidate.effect.variants:
                 if names != component.names:
-                    yield self._with(candidate, component, replace(component, names=names))
+                    yield self._with(candidate, component,
+                                     self.fits.library.variant(component, names))
 
     def replaced(self, found: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
                  ) -> CandidateSet:
@@ -247,7 +248,8 @@ class Search:
         for candidate in best.effects:
             for component in candidate.components if len(candidate.components) > 1 else ():
                 # On one of its drives it, or some of its coefficients, may stand for another.
-                fewer = [replace(component, names=names) for names in candidate.effect.variants
+                fewer = [self.fits.library.variant(component, names)
+                         for names in candidate.effect.variants
                          if set(names) < set(component.names)]
                 for kept in ([], *([one] for one in fewer)):
                     less = self._with(candidate, component, *kept)
@@ -281,7 +283,7 @@ class Search:
         shapes = [effect.alternatives(one.parameters) for one in candidate.components]
         for number in range(min(map(len, shapes))):
             yield EffectCandidate.of(
-                Component.of(effect, one.drive, others[number], one.names)
+                replace(one, shape=tuple(sorted(others[number].items())))
                 for one, others in zip(candidate.components, shapes, strict=True))
 
     def _simplify(self, found: CandidateSet) -> None:
@@ -311,13 +313,13 @@ class Search:
             if len({one.names for one in candidate.components}) > 1:
                 for names in effect.variants:
                     yield self._exchanged(best, candidate, EffectCandidate.of(
-                        replace(one, names=names) for one in candidate.components))
+                        self.fits.library.variant(one, names) for one in candidate.components))
             for component in candidate.components:
                 for names in effect.variants:
                     # The others take part in every scan.
                     if names != component.names and not set(names) <= set(effect.scanned):
                         yield self._exchanged(best, candidate, self._with(
-                            candidate, component, replace(component, names=names)))
+                            candidate, component, self.fits.library.variant(component, names)))
 
     @staticmethod
     def _with(candidate: EffectCandidate, gone: Component, *instead: Component) -> EffectCandidate:

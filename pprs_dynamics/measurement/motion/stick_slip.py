@@ -11,12 +11,14 @@ builds up while the drive stands, and falls while it slips.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.measurement.files.recording import Recording
 
 WINDOWS = (0.5, 1.0, 2.0, 4.0)  # over which a mean speed is taken, of several periods each [s]
 STUCK = 0.25  # of the mean speed, below which a drive stands
@@ -50,6 +52,19 @@ class StickSlip:
     step: float
     slips: int
     share: float
+
+
+def sticking_drives(recordings: Sequence[Recording]) -> dict[str, StickSlip]:
+    """Return the stick-slip of every drive that has it, that of most slips of all segments."""
+    found: dict[str, StickSlip] = {}
+    for recording in recordings:
+        for d, drive in enumerate(recording.drives):
+            for part in recording.segments:
+                one = find_stick_slip(recording.time[part], recording.position[part, d],
+                                      recording.effort[part, d])
+                if one is not None and (drive not in found or one.slips > found[drive].slips):
+                    found[drive] = one
+    return found
 
 
 def find_stick_slip(time: Array, position: Array, effort: Array) -> StickSlip | None:

@@ -310,8 +310,8 @@ def named_keys(parameters: Mapping[str, Any]) -> dict[str, Key]:
 
 
 # Blocks whose keys are not listed one by one.
-ADDED = ('effects.', 'tolerances.', 'history.', 'joint_map.', 'joint_prefix', 'columns.',
-         'effort_kind')
+ADDED = ('effects.', 'uncertainties.', 'tolerances.', 'history.', 'joint_map.', 'joint_prefix',
+         'columns.', 'effort_kind')
 
 
 def is_axis(names: Iterable[str]) -> bool:

@@ -26,7 +26,7 @@ NOT_KNOWN = 1e300  # a standard deviation that is none; ROS 2 files have no bett
 
 @dataclass(frozen=True)
 class Step:
-    """One effect that was added to a model, or fitted anew.
+    """One effect that was added to a model, set anew or taken out.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ class Step:
         What was overridden; effects that explain the data as well; numbers that moved.
     previous : mapping
         Values that the step changed, as they were.
-    added : tuple of str
-        Keys that were not there before.
+    added, removed : tuple of str
+        Keys that were not there before, and those that are not there any more.
     """
 
     effect: str
@@ -86,6 +86,7 @@ class Step:
     calibrated: tuple[str, ...] = ()
     previous: Mapping[str, Any] = field(default_factory=dict)
     added: tuple[str, ...] = ()
+    removed: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the step for JSON."""
@@ -142,11 +143,9 @@ def with_step(before: Mapping[str, Any], after: Mapping[str, Any], step: Step) -
     changed = {key for key in {*before, *after}
                if not key.startswith(f'{BLOCK}.') and as_list(before.get(key, MISSING)) != as_list(
                    after.get(key, MISSING))}
-    gone = changed - after.keys()
-    if gone:
-        raise ValueError(f'a step adds and changes, but {sorted(gone)} would go')
     kept = replace(step, previous={key: before[key] for key in before if key in changed},
-                   added=tuple(key for key in after if key in changed - before.keys()))
+                   added=tuple(key for key in after if key in changed - before.keys()),
+                   removed=tuple(key for key in before if key in changed - after.keys()))
     number = len(read_steps(before)) + 1
     return {**after, **kept.as_values(f'{BLOCK}.{step_name(number)}')}
 
@@ -164,7 +163,7 @@ def without_last_step(values: Mapping[str, Any]) -> tuple[dict[str, Any], Step]:
         raise ModelError(BLOCK, MISSING, 'hold a step that can be taken back')
     last, prefix = steps[-1], f'{BLOCK}.{step_name(len(steps))}.'
     for key in (*last.added, *last.previous):
-        if key not in values:
+        if key not in values and key not in last.removed:
             raise ModelError(key, MISSING, f'be there: {prefix[:-1]} set it, and taking it back '
                              'would not give the model that was')
     kept = {key: value for key, value in values.items()
@@ -181,7 +180,7 @@ def original_values(values: Mapping[str, Any]) -> dict[str, Any]:
     original = dict(values)
     for step in reversed(read_steps(values)):
         original.update((key, value) for key, value in step.previous.items()
-                        if not key.startswith('effects.'))
+                        if not key.startswith(('effects.', 'uncertainties.')))
     return original
 
 

@@ -45,11 +45,12 @@ from pprs_dynamics.physics.model.parameter_file import (
     parse_parameters,
     read_parameters,
 )
+from pprs_dynamics.physics.model.uncertainties import UNCERTAINTIES
 from pprs_dynamics.system.bounded_yaml import check_bounds, check_size
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.package_files import located
 
-WRITTEN = ('effects', BLOCK)  # blocks of commands; the rest is people's
+WRITTEN = ('effects', UNCERTAINTIES, BLOCK)  # blocks of commands; the rest is people's
 INDENT = '  '
 DEPTH = 2  # of the keys, below /** and ros__parameters
 COMMENT_COLUMN = 46
@@ -267,7 +268,7 @@ def _ledger_section(values: Mapping[str, Any]) -> list[str]:
 
 def _effects_block(values: Mapping[str, Any], indent: int = DEPTH * len(INDENT)) -> list[str]:
     found = {key: values[key] for key in sorted(
-        (key for key in values if key.startswith('effects.')),
+        (key for key in values if key.startswith(('effects.', f'{UNCERTAINTIES}.'))),
         key=lambda key: _rank(key, values))}
     return [' ' * (indent - DEPTH * len(INDENT)) + line for line in _lines(found, DEPTH, {})]
 
@@ -280,11 +281,12 @@ def _rank(key: str, values: Mapping[str, Any]) -> tuple[int, ...]:
     """
     active, drives = values.get('effects.active') or (), values.get(
         drives_key(mechanism_block(values)), DRIVES)
-    _, name, *rest = key.split('.')
-    if not rest:
+    block, name, *rest = key.split('.')
+    if block == 'effects' and not rest:
         return (1,)
     order = active.index(name) if name in active else len(active)
-    return (0, order, list(drives).index(rest[0]) if rest[0] in drives else -1)
+    return (0 if block == 'effects' else 2, order,
+            list(drives).index(rest[0]) if rest[0] in drives else -1)
 
 
 def _lines(values: Mapping[str, Any], depth: int, keys: Mapping[str, Key],

@@ -21,6 +21,7 @@ from pprs_dynamics.physics.model.keys import (
     keys_of,
     mechanism_block,
 )
+from pprs_dynamics.physics.model.uncertainties import check_uncertainties
 
 
 @contextmanager
@@ -46,6 +47,7 @@ def checked_values(parameters: Mapping[str, Any]) -> dict[str, Any]:
         else:
             values[name] = key.default
     check_tolerances(parameters, keys)
+    check_uncertainties(parameters)
     return {**values, **{name: value for name, value in parameters.items()
                          if name.startswith(ADDED)}}
 

@@ -1,0 +1,207 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Effects that a model has: they hold within their uncertainty, or it is told that they do not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from model_recordings import record, with_effects
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.app.fleet.manifest import ManifestEntry
+from pprs_dynamics.app.fleet.store import AUTO
+from pprs_dynamics.app.fleet.survey import SurveyJob, examine, identify
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.inference.adoption.adopt import adopt
+from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
+from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.paired_errors import rms
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.ledger import without_last_step
+from pprs_dynamics.physics.model.model_file import build_model, load_model
+from pprs_dynamics.physics.model.model_writer import write_model
+
+MODEL = DriveModel.load()
+NOISE = 0.06  # [N]
+Effects = dict[str, dict[str, float]]
+STRIBECK: Effects = {'stribeck_friction': {'lift_1.force': 0.6, 'lift_1.velocity': 0.02}}
+RIPPLE = {'slide_1.force': 0.4, 'slide_1.phase': 0.3}
+# What the model has, and what is true: of another size, of another shape, or not there at all.
+WRONG: dict[str, tuple[Effects, Effects]] = {
+    'a payload that is not there': ({'payload_mass': {'mass': 0.3}}, {}),
+    'friction of another size': ({'coulomb_friction': {'slide_2.force': 0.3}},
+                                 {'coulomb_friction': {'slide_2.force': 0.5}}),
+    'another Stribeck velocity': (
+        {'stribeck_friction': {'lift_1.force': 0.6, 'lift_1.velocity': 0.05}},
+        {'stribeck_friction': {'lift_1.force': 0.6, 'lift_1.velocity': 0.01}}),
+    'another delay on one of two drives': (
+        {'time_delay': {'slide_1.delay': 0.004, 'lift_1.delay': 0.004}},
+        {'time_delay': {'slide_1.delay': 0.012, 'lift_1.delay': 0.004}}),
+    'a tilt that is not there': ({'base_tilt': {'x': 0.03, 'y': 0.0}}, {}),
+    'a gain that is not there': ({'effort_gain': {'slide_1.gain': 0.1}}, {}),
+    'another pitch': ({'force_ripple': {**RIPPLE, 'slide_1.pitch': 0.012}},
+                      {'force_ripple': {**RIPPLE, 'slide_1.pitch': 0.02}}),
+    'a zero that is not off': ({'homing_error': {'slide_1.zero': 0.002}}, {}),
+}
+
+
+def booked(adoption: object, recording: Recording) -> DriveModel:
+    entry = RecordingEntry.of(recording)
+    model = LedgerBook((entry,), ()).entered(adoption)  # type: ignore[arg-type]
+    assert isinstance(model, DriveModel)
+    return model
+
+
+@pytest.mark.parametrize('case', WRONG)
+def test_an_effect_that_does_not_hold_is_a_finding_with_both_values(case: str) -> None:
+    there, true = WRONG[case]
+    (name, given), = there.items()
+    found = diagnose(with_effects(MODEL, there), [record(with_effects(MODEL, true), NOISE)])
+    assert found.verdict in ('effect', 'ambiguous')
+    (effect,) = found.effects
+    assert effect.name == name
+    # Only where it is otherwise, and what the recording says is what is true, not a difference.
+    truth = true.get(name, dict.fromkeys(given, 0.0))
+    wrong = {key for key, value in given.items() if truth[key] != value}
+    told = {key for key in effect.in_model if key in wrong}
+    assert told == wrong
+    drives = {key.partition('.')[0] for key in wrong}
+    assert effect.drives is None or set(effect.drives) == drives
+    for key in wrong:
+        assert effect.in_model[key] == given[key]
+        estimate = effect.parameters[key]
+        assert abs(estimate.value - truth[key]) < 4 * estimate.std < 0.3 * abs(
+            given[key] - truth[key])
+    assert effect.to_dict()['in_model'] == dict(effect.in_model)
+    headline = word_diagnosis(found).headline
+    assert f'{name}' in headline
+    assert 'is in the model with' in headline
+    assert 'lacks' not in headline or found.indistinguishable
+    # What is handed on explains the recording to the noise.
+    assert rms(measure_residuals(found.adopted, [record(with_effects(MODEL, true), NOISE)])[0]) < (
+        1.03 * found.noise_floor)
+
+
+RIGHT: Effects = {**STRIBECK, 'payload_mass': {'mass': 0.25},
+                  'time_delay': {'slide_1.delay': 0.004}, 'base_tilt': {'x': 0.02, 'y': -0.01},
+                  'effort_gain': {'lift_2.gain': 0.03}}
+
+
+def test_effects_that_hold_are_adequate_as_they_are() -> None:
+    model = with_effects(MODEL, RIGHT)
+    found = diagnose(model, [record(model, NOISE)])
+    assert (found.verdict, found.effects, found.unconfirmed) == ('adequate', (), ())
+
+
+def test_what_lies_within_its_uncertainty_is_no_finding_and_beyond_it_is_one() -> None:
+    """The same difference, of what is known to 0.04 kg, to 1 g, and of what is taken as exact."""
+    there, true = {'payload_mass': {'mass': 0.25}}, {'payload_mass': {'mass': 0.30}}
+    recording = record(with_effects(MODEL, true), NOISE)
+
+    def verdict(std: float | None) -> str:
+        known = {} if std is None else {'payload_mass': {'mass': std}}
+        return diagnose(with_effects(MODEL, there, known), [recording]).verdict
+    assert verdict(0.04) == 'adequate'
+    assert verdict(0.001) == 'effect'
+    assert verdict(None) == 'effect'
+
+
+@pytest.mark.parametrize('true', [STRIBECK, {'payload_mass': {'mass': 0.3}},
+                                  {'time_delay': {'lift_1.delay': 0.006}}], ids=list)
+def test_what_adopt_wrote_holds_on_the_same_and_on_other_recordings(
+    true: Effects, tmp_path: Path,
+) -> None:
+    (name, truth), = true.items()
+    first = record(with_effects(MODEL, true), NOISE)
+    adoption = adopt(MODEL, EffectRequest(CATALOGUE[name]), [first])
+    assert adoption.adopted
+    model = booked(adoption, first)
+    # How well it is known stands in the file, and in that of before there was a place for it.
+    path = tmp_path / 'better.yaml'
+    write_model(path, model.values)
+    read = load_model(path)
+    for key in truth:
+        assert 0 < read.values[f'uncertainties.{name}.{key}'] < 0.1 * truth[key]
+    old = build_model({key: value for key, value in read.values.items()
+                       if not key.startswith('uncertainties.')})
+    other = record(with_effects(MODEL, true), NOISE, seed=1, motion=Excitation(seed=3))
+    for given in (read, old):
+        for recording in (first, other):
+            found = diagnose(given, [recording])
+            assert (found.verdict, [one.name for one in found.effects]) == ('adequate', [])
+
+
+def test_adopt_sets_what_is_otherwise_and_the_way_back_is_exact() -> None:
+    there, true = WRONG['another Stribeck velocity']
+    given, recording = with_effects(MODEL, there), record(with_effects(MODEL, true), NOISE)
+    adoption = adopt(given, EffectRequest(CATALOGUE['stribeck_friction']), [recording])
+    assert adoption.adopted
+    after = booked(adoption, recording)
+    assert after.values['effects.stribeck_friction.lift_1.velocity'] == pytest.approx(0.01, rel=0.1)
+    assert diagnose(after, [recording]).verdict == 'adequate'
+    assert without_last_step(after.values)[0] == given.values
+
+
+def test_adopt_takes_out_what_nothing_is_left_of() -> None:
+    """One of two drives, then the effect; not what another effect of the model is."""
+    there: Effects = {'coulomb_friction': {'slide_2.force': 0.4, 'lift_1.force': 0.3},
+                      'payload_mass': {'mass': 0.3}}
+    true: Effects = {'coulomb_friction': {'lift_1.force': 0.3}, 'payload_mass': {'mass': 0.3}}
+    given, recording = with_effects(MODEL, there), record(with_effects(MODEL, true), NOISE)
+    adoption = adopt(given, EffectRequest(CATALOGUE['coulomb_friction'], ('slide_2',)), [recording])
+    assert adoption.adopted
+    assert any('taken out' in remark for remark in adoption.remarks)
+    less = booked(adoption, recording)
+    assert 'effects.coulomb_friction.slide_2.force' not in less.values
+    assert less.values['effects.coulomb_friction.lift_1.force'] == pytest.approx(0.3, abs=0.02)
+    assert less.values['effects.active'] == ['coulomb_friction', 'payload_mass']
+    assert without_last_step(less.values)[0] == given.values
+    recording = record(with_effects(MODEL, {'payload_mass': {'mass': 0.3}}), NOISE)
+    adoption = adopt(less, EffectRequest(CATALOGUE['coulomb_friction']), [recording])
+    assert adoption.adopted
+    none = booked(adoption, recording)
+    assert none.values['effects.active'] == ['payload_mass']
+    assert not [key for key in none.values if '.coulomb_friction.' in key
+                and key.startswith(('effects.', 'uncertainties.'))]
+
+
+def test_an_effect_of_the_model_that_holds_is_not_set_anew() -> None:
+    model = with_effects(MODEL, STRIBECK)
+    adoption = adopt(model, EffectRequest(CATALOGUE['stribeck_friction']), [record(model, NOISE)])
+    assert not adoption.adopted
+    assert 'is in the model already' in adoption.reason
+
+
+@pytest.mark.parametrize(('key', 'value', 'rule'), [
+    ('uncertainties.payload_mas.mass', 0.1, 'unknown key'),
+    ('uncertainties.payload_mass.mas', 0.1, 'belong to effects.payload_mass.mas'),
+    ('uncertainties.payload_mass.mass', -0.1, 'standard deviation'),
+    ('uncertainties.payload_mass.mass', np.nan, 'standard deviation')])
+def test_an_uncertainty_of_nothing_is_refused(key: str, value: float, rule: str) -> None:
+    with pytest.raises(ModelError, match=rule):
+        build_model({**with_effects(MODEL, {'payload_mass': {'mass': 0.3}}).values, key: value})
+
+
+@pytest.mark.parametrize('options', [AUTO, 'payload_mass,stribeck_friction'])
+def test_a_survey_follows_what_the_model_has(options: str, tmp_path: Path) -> None:
+    """What the recording says of it, found otherwise or not: neither a difference nor nothing."""
+    model = with_effects(MODEL, {**STRIBECK, 'payload_mass': {'mass': 0.2}},
+                         {'payload_mass': {'mass': 0.05}})
+    true = {**STRIBECK, 'payload_mass': {'mass': 0.22}}
+    path = tmp_path / 'run.csv'
+    write_recording(path, record(with_effects(MODEL, true), NOISE))
+    job = SurveyJob(ManifestEntry(str(path), 'robot'), model.values, model.fingerprint, options)
+    found = {(row['drive'], row['effect'], row['parameter']): row
+             for row in examine(job, identify(str(path))).rows if row.get('effect')}
+    mass = found[None, 'payload_mass', 'mass']
+    assert abs(mass['value'] - 0.22) < 4 * mass['std'] < 0.02
+    assert found['lift_1', 'stribeck_friction', 'force']['value'] == pytest.approx(0.6, abs=0.1)

@@ -1,0 +1,31 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A diagnosis of a drive that sticks and slips says so, and claims nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from sticking_block import TIME, dragged, slow
+
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, next_step
+from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.parameter_file import parse_parameters
+
+MODEL = ('/**:\n  ros__parameters:\n    axis: {mass: 0.02, viscous: 0.4, coulomb: 0.6, '
+         'offset: 0.0, gravity: 0.0}\n    friction: {reversal_velocity: 0.001}\n')
+
+
+def test_it_is_named_with_its_frequency_and_no_ripple_is_claimed() -> None:
+    position, effort = dragged(slow())
+    noise = 0.005 * np.random.default_rng(4).normal(size=len(TIME))
+    found = diagnose(build_model(parse_parameters(MODEL)), [Recording.from_arrays(
+        'run', TIME, position[:, None], None, (effort + noise)[:, None], ('axis',))])
+    assert (found.verdict, found.effects) == ('unknown', ())
+    assert found.to_dict()['stick_slip']['axis']['frequency'] == pytest.approx(2.3, abs=0.1)
+    assert 'Stick-slip: axis at 2.3' in word_diagnosis(found).headline
+    assert 'faster' in next_step(found, PLACEHOLDERS)[0]

@@ -1,0 +1,40 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Recordings of what a model itself says about a motion, with white noise on the efforts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics import DriveModel
+from pprs_dynamics.inference.experiments.fourier_path import FourierPath
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.model_file import build_model
+
+TIME = np.arange(6000) * 0.002
+EXCITATION = Excitation()
+
+
+def record(model: DriveModel, noise: float = 0.0, seed: int = 0,
+           motion: Excitation | FourierPath = EXCITATION) -> Recording:
+    """Return a recording of what a model says about a motion."""
+    forces = model.drive_forces(motion.motion(TIME).with_time(TIME))
+    said = model.measured(forces)
+    rng = np.random.default_rng(seed)
+    return Recording.from_arrays(
+        'made', TIME, forces.mechanism.position + model.position_error,
+        effort=said.total + noise * rng.normal(size=said.total.shape))
+
+
+def with_effects(model: DriveModel, effects: dict[str, dict[str, float]],
+                 uncertainties: dict[str, dict[str, float]] | None = None) -> DriveModel:
+    """Return a model with effects, and with how well their parameters are known, by key."""
+    def flat(block: str, values: dict[str, dict[str, float]]) -> dict[str, Any]:
+        return {f'{block}.{name}.{key}': value for name, of_effect in values.items()
+                for key, value in of_effect.items()}
+    return build_model({**model.values, 'effects.active': list(effects), **flat('effects', effects),
+                        **flat('uncertainties', uncertainties or {})})
