@@ -369,6 +369,16 @@ def test_why_one_set_and_not_another_is_told_by_the_terms_of_their_costs() -> No
     assert 'fit + 2.0, coefficients - 1.3, drives + 2.8' in page.html()
 
 
+def test_the_runner_up_says_nothing_of_what_was_never_named() -> None:
+    """What is within the model error of others is in the best set, but in no finding."""
+    best = (('coulomb_friction', ('lift_2',)), ('hysteresis', ('lift_2',)))
+    sets = (ranked_set(best, 0.0), ranked_set(best[:1], 3.0),
+            ranked_set((('rod_mass', None),), 9.0))
+    diagnosis = one_effect(sets=sets, within_model_error=(within_model_error(),))
+    assert runner_up(diagnosis).startswith('rod_mass instead of coulomb_friction on lift_2')
+    assert runner_up(one_effect(sets=sets[:2], within_model_error=(within_model_error(),))) == ''
+
+
 def test_effects_that_are_only_on_other_drives_in_the_runner_up_are_told_once() -> None:
     every = tuple(DRIVES)
     best = ranked_set((('hysteresis', every), ('coulomb_friction', ('lift_2',))), 0.0)

@@ -42,7 +42,7 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
 MOST_LISTED = 2  # places of effects whose parameters the sentences give; names in one line
 WIDTH = 80
-LONGEST = 240  # characters of values and the runner-up without --details: three lines
+LONGEST = 400  # characters of rows, values and the runner-up without --details: five lines
 MOST_EFFECTS = 4  # that are shown without --details
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
 ELSEWHERE = '[dim]Why, how to confirm it, and all values: --details, or --report FILE.html[/]'
@@ -79,7 +79,7 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     """Yield verdict, fall and next step, in at most 25 lines of 80 columns."""
     yield verdict_panel(diagnosis.verdict, COLOURS[diagnosis.verdict], words.headline)
     second = runner_up(diagnosis)
-    room = max(LONGEST - _room(f'Runner-up {second}'), WIDTH)
+    room = max(LONGEST - _room(f'Runner-up {second}') - WIDTH * len(diagnosis.effects), WIDTH)
     if diagnosis.effects:
         yield text_table(_headings(diagnosis), _effect_rows(diagnosis)[:MOST_EFFECTS],
                          right=(2, 3, 4), whole=(0, 2, 3, 4), frame='none')

@@ -199,22 +199,30 @@ def _cost(found: RankedSet) -> str:
 
 
 def runner_up(diagnosis: Diagnosis) -> str:
-    """Return how the second best set differs from the best, and its costs; '' for none."""
-    if len(diagnosis.sets) < 2:
+    """Return how the second best set differs from the best, and its costs; '' for none.
+
+    By what is told: what is within the model error of others was never named as missing.
+    """
+    within = {one.name for one in diagnosis.within_model_error} - {
+        one.name for one in diagnosis.effects}
+    untold = within & {name for one in diagnosis.sets[:1] for name, _ in one.names}
+    sets = [(one, {pair for pair in one.names if pair[0] not in untold}) for one in diagnosis.sets]
+    following = next(((one, names) for one, names in sets[1:] if names != sets[0][1]), None)
+    if following is None:
         return ''
-    best, second = (set(one.names) for one in diagnosis.sets[:2])
-    missing, instead = best - second, second - best
+    best, (second, others) = sets[0][1], following
+    missing, instead = best - others, others - best
     moved = {name for name, _ in missing} & {name for name, _ in instead}
     if len(missing | instead) <= 2:
         moved = set()  # one on other drives: both are told
     left, put = (listed([with_drives(_plain_name(name), drives, diagnosis.residuals.drives)
                          for name, drives in one.names
                          if (name, drives) in apart and name not in moved])
-                 for one, apart in zip(diagnosis.sets[:2], (missing, instead), strict=True))
+                 for one, apart in ((diagnosis.sets[0], missing), (second, instead)))
     words = [f'{put} instead of {left}' if put and left else f'{put} as well' if put
              else f'without {left}' if left else '',
              f'{listed(sorted(moved))} on other drives' if moved else '']
-    return f'{", ".join(filter(None, words))}: {_cost(diagnosis.sets[1])}'
+    return f'{", ".join(filter(None, words))}: {_cost(second)}'
 
 
 def _headline(diagnosis: Diagnosis) -> str:

@@ -1,0 +1,75 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A load on arms that show only some of its numbers: one joint, or two in a plane."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pprs_dynamics import JointMotion
+from pprs_dynamics.inference.adoption.adopt import adopt
+from pprs_dynamics.inference.adoption.request import requested
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.model_file import build_model, load_model
+
+LINK = '''<link name="{name}"><inertial><origin xyz="0 0 -0.25"/><mass value="0.6"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="j{number}" type="revolute"><parent link="{parent}"/><child link="{name}"/>
+<origin xyz="0 0 {at}"/><axis xyz="0 1 0"/><limit lower="-20" upper="20" effort="80"
+velocity="30"/></joint>'''
+NOISE = 0.05  # [N m]
+
+
+def planar_arm(folder: Path, joints: int) -> ForceModel:
+    """Return an arm whose axes are all parallel; its tool frame is on the last of them."""
+    names = ['base', *(f'rod_{k}' for k in range(1, joints + 1))]
+    links = ''.join(LINK.format(name=names[k], number=k, parent=names[k - 1],
+                                at=0 if k == 1 else -0.5) for k in range(1, joints + 1))
+    (folder / 'arm.urdf').write_text(f'<robot name="arm"><link name="base"/>{links}</robot>')
+    listed = ', '.join(f'j{k}' for k in range(1, joints + 1))
+    (folder / 'arm.yaml').write_text(f'''/**:
+  ros__parameters:
+    arm: {{urdf: arm.urdf, base: base, tool: {names[-1]}, joints: [{listed}]}}
+    friction:
+      viscous: [{", ".join(["0.1"] * joints)}]
+      coulomb: [{", ".join(["0.3"] * joints)}]
+      reversal_velocity: 0.01
+''')
+    return load_model(folder / 'arm.yaml')
+
+
+def record(model: ForceModel, seed: int = 0) -> Recording:
+    time = np.arange(1500) * 0.01
+    rates = np.array([[0.31, 0.83], [0.47, 1.13]])[:, :len(model.drives)]
+    phase = 2 * np.pi * rates[:, None] * time[:, None] + np.arange(len(model.drives))
+    size = np.array([0.9, 0.4])[:, None, None]
+    turn = 2 * np.pi * rates[:, None]
+    q, v, a = ((size * wave).sum(axis=0) for wave in (
+        np.sin(phase), turn * np.cos(phase), -turn ** 2 * np.sin(phase)))
+    total = model.drive_forces(JointMotion(q, v, a, time)).total
+    rng = np.random.default_rng(seed)
+    return Recording.from_arrays('made', time, q, velocity=v, drives=model.drives,
+                                 effort=total + NOISE * rng.normal(size=total.shape))
+
+
+@pytest.mark.parametrize('joints', [1, 2])
+def test_a_load_is_found_and_adopted_where_a_motion_shows_it(joints: int, tmp_path: Path) -> None:
+    """Half a kilogram half a metre from the axis: the arm with one joint has no other length."""
+    model = planar_arm(tmp_path, joints)
+    true = build_model({**model.values, 'effects.active': ['payload_mass'],
+                        'effects.payload_mass.mass': 0.5, 'effects.payload_mass.z': -0.5},
+                       model.source)
+    recording = record(true)
+    found = diagnose(model, [recording])
+    assert [one.name for one in found.effects] == ['payload_mass']
+    said = found.effects[0].parameters
+    assert abs(said['mass'].value * said['z'].value + 0.25) < 0.01
+    adoption = adopt(model, requested('payload_mass', model), [recording], diagnosis=found)
+    assert adoption.adopted, adoption.reason
+    assert adoption.held_out_after < 1.1 * NOISE
