@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
 import {cut, withGaps} from '../../pprs_dynamics/app/browser/curves.mjs';
-import {fromSlider, ordered, toSlider} from '../../pprs_dynamics/app/browser/effects.mjs';
+import {fromSlider, ordered, pays, toSlider} from '../../pprs_dynamics/app/browser/effects.mjs';
 import {commandOf, traceOf} from '../../pprs_dynamics/app/browser/fleet.mjs';
 import {rms, sentence} from '../../pprs_dynamics/app/browser/live.mjs';
 import {adoptionSaid} from '../../pprs_dynamics/app/browser/panels.mjs';
@@ -35,6 +35,15 @@ test('what is ticked comes first, then what is called for, then by evidence', ()
   const effects = [{name: 'a', evidence: 5}, {name: 'b', evidence: null}, {name: 'c', evidence: 50},
                    {name: 'd', is_called_for: true, evidence: 1}, {name: 'e', is_ticked: true}];
   assert.deepEqual(ordered(effects).map((one) => one.name), ['e', 'd', 'c', 'a', 'b']);
+});
+
+test('beside a diagnosis only what it calls for, or what is ticked, is told to pay', () => {
+  const slow = {name: 'time_delay', evidence: 118};
+  assert.ok(pays({...slow, is_judged: false}));
+  assert.ok(!pays({...slow, is_judged: true, is_called_for: false}));
+  assert.ok(pays({...slow, is_judged: true, is_called_for: true}));
+  assert.ok(pays({...slow, is_judged: true, is_ticked: true}));
+  assert.ok(!pays({...slow, evidence: -1, is_called_for: true}));
 });
 
 test('an adoption is said once, at its end', () => {

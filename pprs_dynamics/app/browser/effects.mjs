@@ -18,6 +18,11 @@ export const toSlider = (one, middle) => (one.value === null ? 0 : Math.round(10
   one.is_relative ? Math.log10(one.value / middle)
     : (one.value - middle) / Math.max(Math.abs(middle), one.scale))));
 
+/* Whether an effect is told to pay: beside a diagnosis, which knows how friction turns over and what
+   forms leave over, what it does not call for pays by a scan alone. */
+export const pays = (one) => one.evidence > 0
+  && (one.is_ticked || one.is_called_for || !one.is_judged);
+
 /* What is ticked first, then what the diagnosis names, then by evidence. */
 const score = (one) => (one.is_ticked ? 1e12 : 0) + (one.is_called_for ? 1e11 : 0)
   + (one.evidence ?? -1e9);
@@ -74,9 +79,11 @@ class EffectRow {
     }
     if (effect.is_called_for) this.title.append(' ', make('span', 'called for', 'badge'));
     this.evidence.textContent = plain(effect.evidence);
-    this.evidence.title = EVIDENCE + (effect.evidence_terms
+    this.evidence.title = EVIDENCE + (effect.evidence > 0 && !pays(effect)
+      ? '; by a scan: the diagnosis, which counts reversals and lack of fit, does not call for it'
+      : '') + (effect.evidence_terms
       ? `; what the cost has more without it: ${effect.evidence_terms}` : '');
-    this.evidence.classList.toggle('pays', effect.evidence > 0);
+    this.evidence.classList.toggle('pays', pays(effect));
     this.evidence.classList.toggle('pending', effect.evidence_is_pending);
     this.evidence.setAttribute('aria-label', `evidence ${this.evidence.textContent}${
       effect.evidence_is_pending ? ', pending' : ''}`);

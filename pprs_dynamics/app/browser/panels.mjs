@@ -3,7 +3,7 @@
 import {$, button, make} from './dom.mjs';
 import {amount, plain, titleOf} from './format.mjs';
 
-const VERDICTS = {adequate: 'the model is adequate', effect: 'effects are missing',
+const VERDICTS = {adequate: 'the model is adequate', effect: 'effects are missing, or otherwise than in the model',
                   ambiguous: 'several effects explain it alike',
                   unknown: 'something no effect explains'};
 

@@ -547,7 +547,7 @@ class Session:
         """Return all that one screen shows, but for the curves."""
         with self._lock:
             view, diagnosis, adoption = self.view_state, self.diagnosis, self.last_adoption
-            called_for = {one.name for one in diagnosis.effects} if diagnosis else set()
+            called_for = {one.name for one in diagnosis.effects} if diagnosis else None
             return {
                 'revision': self.revision, 'version': self.version, 'stage': view.stage,
                 'is_settled': view.is_settled, 'is_approximate': view.is_approximate,
@@ -556,7 +556,7 @@ class Session:
                 'errors': {name: one.to_dict() for name, one in self.errors().items()},
                 'overall': self.overall().to_dict(), **views.units_to_dict(self.model),
                 'effects': [
-                    views.effect_to_dict(view, effect, self.model, effect.name in called_for)
+                    views.effect_to_dict(view, effect, self.model, called_for)
                     for effect in self.candidates],
                 'verdict': diagnosis.verdict if diagnosis else None,
                 'little': word_little(little_explained(

@@ -8,7 +8,7 @@ Linear at once, then noise, shapes and the exact model.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -198,8 +198,17 @@ def _with_chosen(fits: TickFits, free: CandidateSet, ticks: Mapping[str, Tick]) 
 
 
 def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: ForceModel,
-                   is_called_for: bool) -> dict[str, Any]:
-    """Return all that is shown of one effect."""
+                   called_for: Set[str] | None) -> dict[str, Any]:
+    """Return all that is shown of one effect.
+
+    Parameters
+    ----------
+    view : ViewState
+    effect : type of CatalogueEffect
+    model : ForceModel
+    called_for : set of str or None
+        Effects that the diagnosis calls for; None where there is none yet.
+    """
     card, drives = effect.card_in(model.kind), model.drives
     tick = view.ticks.get(effect.name)
     offer = next((one for one in view.offers if one.candidate.effect is effect), None)
@@ -212,7 +221,9 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: ForceM
         'is_on_drives': issubclass(effect, DriveEffect), 'evidence': finite(evidence),
         'evidence_terms': '' if without is None else word_terms(without),
         'evidence_is_pending': (view.stage == LINEAR if tick else not view.has_offers),
-        'bends_columns': effect.bends_columns, 'is_called_for': is_called_for,
+        'bends_columns': effect.bends_columns,
+        'is_called_for': called_for is not None and effect.name in called_for,
+        'is_judged': called_for is not None,
         'equation': card.equation, 'looks_like': card.looks_like,
         'causes': card.causes, 'confirm': card.confirm,
         'parameters': _parameters(view, effect, model) if tick else []}
