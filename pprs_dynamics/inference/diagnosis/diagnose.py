@@ -349,6 +349,9 @@ class _Answer:
             in_model = self._in_model(candidate, said.parameters)
             impossible = why_impossible(
                 candidate.effect, said.parameters, self.design, self.decisions)
+            # Numbers that stand for each other in part are uncertain each, and not together.
+            nothing = '' if without.cost > self.decisions.rival_margin else why_nothing(
+                candidate.effect, said.parameters, in_model)
             found.append(FoundEffect(
                 candidate.effect, self.design.named(candidate.drives), said.parameters,
                 final.fits.library.force(final.found, last, self.remaining.shape),
@@ -358,8 +361,7 @@ class _Answer:
                     held_out[k + 1] < held_out[k]
                     or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
                 or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1]),
-                impossible or why_nothing(candidate.effect, said.parameters, in_model),
-                bool(impossible),
+                impossible or nothing, bool(impossible),
                 without, in_model))
         return found
 
