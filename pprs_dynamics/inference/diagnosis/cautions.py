@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
-from pprs_dynamics.inference.search.candidates import CandidateSet
+from pprs_dynamics.inference.search.candidates import SINCE, CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 
 
@@ -18,7 +18,8 @@ def find_cautions(
     fits: FittedSets, best: CandidateSet, effects: Sequence[FoundEffect],
 ) -> tuple[str, ...]:
     """Return sentences, the graver first."""
-    return (*fits.design.given.faults, *_length(fits, best), *_motion(fits), *_filtered(fits),
+    return (*fits.design.given.faults, *_courses(effects), *_length(fits, best), *_motion(fits),
+            *_filtered(fits),
             *_unexcited(fits, best), *_bounds(effects))
 
 
@@ -100,6 +101,19 @@ def _unexcited(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
     if weak:
         yield (f'this motion hardly excites {", ".join(weak)}: it cannot tell whether '
                f'{"it is" if len(weak) == 1 else "they are"} there')
+
+
+def _courses(effects: Sequence[FoundEffect]) -> Iterator[str]:
+    """Say what to do with effects that are not there all the time."""
+    for one in effects:
+        if one.course is None:
+            continue
+        if one.course.kind == SINCE:
+            yield (f'{one.name} is there{one.when}: adopt would fit it throughout, and must be '
+                   'given a recording that begins after that')
+        else:
+            yield (f'{one.name} is not constant{one.when}: warm the machine up, and look for what '
+                   'slips')
 
 
 def _bounds(effects: Sequence[FoundEffect]) -> Iterator[str]:

@@ -23,7 +23,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
 from pprs_dynamics.inference.diagnosis.possible import why_impossible, why_nothing
-from pprs_dynamics.inference.diagnosis.quantities import listed
+from pprs_dynamics.inference.diagnosis.quantities import listed, plain
 from pprs_dynamics.inference.diagnosis.statements import (
     Statement,
     word_statement,
@@ -35,7 +35,15 @@ from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import certainty, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.candidates import (
+    DURING,
+    SINCE,
+    Candidate,
+    CandidateSet,
+    EffectCandidate,
+)
+from pprs_dynamics.inference.search.cost_terms import CostTerms
+from pprs_dynamics.inference.search.courses import with_courses
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import (
     Calibration,
@@ -53,6 +61,8 @@ from pprs_dynamics.inference.search.fitted_model import (
     fitted_model,
     linear_error,
     linear_residual,
+    model_at,
+    parts_of,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder
@@ -217,24 +227,27 @@ def diagnose(
                           'stands tells nothing of friction, masses or delays', 'shape')
     other = {} if as_it_is else looks_like(model, recordings)
     if other:
-        answer = _Answer(without_search(model, recordings, decisions, report), validate, decisions)
+        answer = _Answer(without_search(model, recordings, decisions, report), validate, decisions,
+                         claims=False)
         return replace(answer.diagnosis(()), verdict='unknown', depends_on=(), warnings=(),
                        effort_looks_like=other)
     sticking = {drive: one for drive, one in sticking_drives(recordings).items()
                 if one.share > decisions.stick_slip}
     if sticking and not as_it_is:
         # No law of the drive's own motion describes what its controller and its elasticity do.
-        answer = _Answer(without_search(model, recordings, decisions, report), validate, decisions)
-        plain = answer.diagnosis(())
-        return replace(plain, verdict='unknown', warnings=(), stick_slip=sticking, depends_on=tuple(
-            word_stick_slip(drive, one, plain.residuals) for drive, one in sticking.items()))
+        answer = _Answer(without_search(model, recordings, decisions, report), validate, decisions,
+                         claims=False)
+        bare = answer.diagnosis(())
+        return replace(bare, verdict='unknown', warnings=(), stick_slip=sticking, depends_on=tuple(
+            word_stick_slip(drive, one, bare.residuals) for drive, one in sticking.items()))
     answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share)),
                      validate, decisions)
     unconfirmed: list[FoundEffect] = []
     if any(one.is_impossible for one in answer.effects):
         # Whatever stands for what cannot be, or beside it, would be as wrong.
         found = _all_objected(answer.effects)
-        answer = _Answer(answer.ranking.claiming_nothing(), validate, decisions)
+        answer = _Answer(answer.ranking.claiming_nothing(), validate, decisions,
+                         claims=False)
         report(1.0)
         return replace(answer.diagnosis(found), verdict='unknown')
     while weak := [one for one in answer.effects if one.objection or not one.is_confirmed]:
@@ -258,7 +271,7 @@ class _Answer:
     """What is to be said of a ranking."""
 
     def __init__(self, ranking: Ranking, validate: Sequence[Recording],
-                 decisions: Decisions) -> None:
+                 decisions: Decisions, claims: bool = True) -> None:
         self.ranking, self.validate, self.decisions = ranking, validate, decisions
         self.fits, self.best, self.kept = ranking.last, ranking.best, ranking.kept
         self.design = self.fits.design
@@ -266,7 +279,14 @@ class _Answer:
         self.final = settled(self.fits, self.kept)
         self.remaining = ranking.first.design.residuals.measured - exact_forces(
             self.design, self.final.model)
-        self.effects = self._effects()
+        # Before a constant form is believed.
+        self.dated_fits, self.dated = with_courses(
+            self.fits, self.kept, ranking.alone.values()) if claims else (self.fits, self.kept)
+        self.is_dated, self.adopted = self.dated is not self.kept, self.final.model
+        if self.is_dated:
+            self.remaining = linear_residual(self.dated_fits, self.dated)
+            self.adopted = self._dated_model()
+        self.effects = self._dated_effects() if self.is_dated else self._effects()
 
     def diagnosis(self, unconfirmed: tuple[FoundEffect, ...]) -> Diagnosis:
         first, final, effects = self.ranking.first.design, self.final, self.effects
@@ -277,20 +297,28 @@ class _Answer:
         floors = {self.drives[d]: seen.get(self.drives[d], regression.noise_floor(
             self.best.fit, d)) for d in regression.drives}
         rivals = self._rivals()
+        if self.is_dated:
+            # What imitates a constant form is no rival of one that changes.
+            rivals = {}
+            noise, floors = self._noise_beside_courses()
         depends = self._depends_on(noise)
+        if self.is_dated:
+            depends = (*self._passing(), *depends)
         sets = tuple((name, *others) for name, others in rivals.items() if others)
         above = self._above_noise(floors)
-        little = little_explained(final.model, first.residuals, self.remaining, self.decisions)
-        verdict = ('unknown' if depends or above or little else 'ambiguous' if sets
+        little = little_explained(self.adopted, first.residuals, self.remaining, self.decisions)
+        passing = any(one.course is not None and one.course.kind != SINCE for one in effects)
+        verdict = ('unknown' if depends or above or little or passing else 'ambiguous' if sets
                    else 'effect' if effects else 'adequate')
         moved = [one for one in calibrations(final.fits, final.found, final.widths)
                  if abs(one.after - one.before) > self.decisions.sure * one.std]
+        remainders = () if self.is_dated else self.ranking.remainders
         return Diagnosis(
             verdict, tuple(effects), sets, unconfirmed, self._candidates(),
-            self._suspects(), depends, tuple(map(self._within_model_error,
-                                                 self.ranking.remainders)), self._sets(),
-            self._barred(), tuple(moved), find_cautions(self.fits, self.best, effects), first.notes,
-            first.given, final.model, first.residuals, self.remaining, noise, floors,
+            self._suspects(), depends, tuple(map(self._within_model_error, remainders)),
+            self._sets(), self._barred(), tuple(moved),
+            find_cautions(self.fits, self.best, effects), first.notes,
+            first.given, self.adopted, first.residuals, self.remaining, noise, floors,
             root_mean_square(list(floors.values())), above, little,
             tuple(name for name in floors if name not in seen),
             'validation' if self.validate else 'blocks', selection=self.ranking,
@@ -334,6 +362,70 @@ class _Answer:
                 bool(impossible),
                 without, in_model))
         return found
+
+    def _dated_effects(self) -> list[FoundEffect]:
+        """Return the effects where some begin, end or grow within the recordings."""
+        fits, found = self.dated_fits, self.dated
+        begun = self.ranking.first.design.reconstructions[0].start
+        given = self.ranking.first.design.residuals.error
+        steps = [fits.evaluate(found.effects[:k]) for k in range(1, len(found.effects))] + [found]
+        errors = [root_mean_square(given), *(linear_error(fits, step) for step in steps)]
+        held_out = [errors[0], *(hold_out(fits, step).error for step in steps)]
+        effects = []
+        for k, candidate in enumerate(found.effects):
+            course = candidate.course
+            if course is not None and course.kind == DURING:
+                continue  # what passes is no property of the machine
+            said = estimate(fits, found, candidate, are_drives_known=True)
+            effects.append(FoundEffect(
+                candidate.effect, self.design.named(candidate.drives), said.parameters,
+                fits.library.force(found, candidate, self.remaining.shape),
+                fits.evaluate(found.without(candidate)).total - found.total, errors[k],
+                errors[k + 1], held_out[k], held_out[k + 1], said.at_bound,
+                (errors[k] - errors[k + 1]) / errors[0],
+                in_model=self._in_model(candidate, said.parameters),
+                course=None if course is None else replace(
+                    course, begin=course.begin - begun, end=course.end - begun)))
+        return effects
+
+    def _passing(self) -> list[Statement]:
+        """Return what was there for a stretch alone, drive by drive."""
+        residuals = self.ranking.first.design.residuals
+        begun = self.ranking.first.design.reconstructions[0].start
+        found, fits = self.dated, self.dated_fits
+        statements = []
+        for candidate in found.effects:
+            course = candidate.course
+            if course is None or course.kind != DURING:
+                continue
+            force = fits.library.force(found, candidate, self.remaining.shape)
+            span = (course.begin - begun, course.end - begun)
+            inside = (residuals.time >= course.begin) & (residuals.time < course.end)
+            evidence = fits.evaluate(found.without(candidate)).total - found.total
+            for d in np.flatnonzero(np.any(force, axis=0)):
+                squares = np.square(residuals.error[:, d])
+                share = float(np.nansum(squares[inside]) / np.nansum(squares))
+                size = root_mean_square(force[inside, d])
+                statements.append(Statement(
+                    self.drives[d], 'time', span, share, float(np.mean(inside)),
+                    f'{self.drives[d]}: from {span[0]:.4g} s to {span[1]:.4g} s alone its error is '
+                    f'another, {plain(size)} {residuals.units_of(self.drives[d]).effort} rms, as '
+                    f'of a contact, a stop or a hand ({candidate.name} would explain it): what '
+                    'passes is no property of the machine',
+                    evidence, 'range', size, float(np.mean(force[:, d] ** 2))))
+        return statements
+
+    def _dated_model(self) -> ForceModel:
+        """Return the model with what is there at the end, and stays."""
+        base, placed = parts_of(self.dated_fits, self.dated)
+        there = [one for one, component in zip(placed, self.dated.blocks, strict=True)
+                 if component.course is None or component.course.kind == SINCE]
+        return model_at(self.design, base, there)
+
+    def _noise_beside_courses(self) -> tuple[dict[str, NoiseSpectrum], dict[str, float]]:
+        regression, fit = self.dated_fits.regression, self.dated.fit
+        return ({self.drives[d]: one for d, one in regression.noise(fit).items()},
+                {self.drives[d]: regression.noise_floor(fit, d) for d in regression.drives})
 
     def _in_model(self, candidate: EffectCandidate, keys: Iterable[str]) -> dict[str, float]:
         """Return what the given model says of an effect; nothing where it lacks it.
@@ -407,10 +499,12 @@ class _Answer:
     def _depends_on(self, noise: dict[str, NoiseSpectrum]) -> tuple[Statement, ...]:
         statements = []
         libraries = {library.d: library for library in self.ranking.patterns}
-        for candidate in self.kept.unknowns:
+        for candidate in self.dated.unknowns:
+            evidence = (self.dated_fits.evaluate(self.dated.without(candidate)).total
+                        - self.dated.total if self.is_dated else self._evidence(candidate))
             for d, block in candidate.parts.items():
                 statements.append(word_statement(
-                    libraries[d], candidate, self.kept.fit.of(block), self._evidence(candidate)))
+                    libraries[d], candidate, self.dated.fit.of(block), evidence))
         drifting = levels(self.fits.regression.residuals, dict(noise), self.decisions)
         statements += [one for name, one in drifting.items()
                        if one.amplitude > self._lack_of_fit(self.drives.index(name))]
@@ -418,8 +512,9 @@ class _Answer:
 
     def _lack_of_fit(self, d: int) -> float:
         """Return what the forms of the adopted effects may leave on a drive, rms [N]."""
-        forces = [self.fits.library.force(self.kept, one, self.design.residuals.measured.shape)
-                  for one in self.kept.effects if one.effect.idealised]
+        forces = [self.dated_fits.library.force(
+            self.dated, one, self.design.residuals.measured.shape)
+            for one in self.dated.effects if one.effect.idealised]
         return self.decisions.form_share * float(np.sqrt(sum(
             np.mean(np.square(force[:, d])) for force in forces)))
 
@@ -440,6 +535,10 @@ class _Answer:
                             linear_error(fits, found))
 
     def _sets(self) -> tuple[RankedSet, ...]:
+        if self.is_dated:
+            # Those of the search are of constant forms.
+            return (RankedSet(tuple((c.name, self.design.named(c.drives))
+                                    for c in self.dated.candidates), CostTerms()),)
         # Of a set that bends nothing the cost is that in the first design.
         best, *others = self._of_each_name(self.ranking.sets, MOST_SETS)
         return (best, *sorted(others, key=lambda one: one.cost))

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.search.candidates import SINCE, Course
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -72,6 +73,11 @@ class FittedEffect:
         return self.effect.name
 
     @property
+    def when(self) -> str:
+        """When it is there, as the end of a clause; '' where that is all the time."""
+        return ''
+
+    @property
     def places(self) -> tuple[tuple[str, ...], ...]:
         """Links or joints that it is on, each with those that no motion tells it from."""
         return self.effect.places_of(self.parameters)
@@ -105,6 +111,8 @@ class FoundEffect(FittedEffect):
     in_model : mapping of str to float
         What the given model says of the parameters, where it has the effect: then the recordings
         say something else. Empty for an effect that it lacks.
+    course : Course or None
+        When it is there, from the start of the first recording [s]; None: all the time.
     """
 
     evidence: float
@@ -119,11 +127,23 @@ class FoundEffect(FittedEffect):
     is_impossible: bool = False
     without: RankedSet | None = None
     in_model: Mapping[str, float] = field(default_factory=dict)
+    course: Course | None = None
+
+    @property
+    def when(self) -> str:
+        """When it is there, as the end of a clause; '' where that is all the time."""
+        if self.course is None:
+            return ''
+        if self.course.kind == SINCE:
+            return f' since {self.course.begin:.4g} s'
+        return f', growing from nothing at the start to this at {self.course.end:.4g} s'
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
         return {'name': self.name, 'drives': listed(self.drives),
                 'alike': [list(names) for names in self.places if len(names) > 1],
+                'since': self.course.begin if self.course and self.course.kind == SINCE else None,
+                'course': self.course.kind if self.course else None,
                 'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
                 **({'in_model': dict(self.in_model)} if self.in_model else {}),
                 'evidence': self.evidence,

@@ -38,6 +38,7 @@ from pprs_dynamics.inference.diagnosis.statements import (
     place_of,
     place_on,
 )
+from pprs_dynamics.inference.search.candidates import SINCE
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
@@ -251,6 +252,9 @@ def _headline(diagnosis: Diagnosis) -> str:
         above = (f', and the error of {in_unit(left, unit)} is more than the noise, {noise}'
                  if left > AT_NOISE * diagnosis.noise_floor else '')
         return f'{lacks}Nothing that was found holds{above}.{doubt}'
+    if any(one.course is not None and one.course.kind != SINCE for one in held):
+        return (f'Something changes within the recording, as if {_claims(diagnosis)}.{fall}. No '
+                f'constant effect does that.{doubt}')
     if diagnosis.verdict == 'unknown':
         groups = unexplained_groups(diagnosis)
         places = listed([place_on(group) for group in groups[:2]] or [
@@ -339,7 +343,7 @@ def _title(diagnosis: Diagnosis, found: FittedEffect) -> str:
     """Return the effect and where it is, all links and joints that are alike among them."""
     places = listed([listed(names, 'or') for names in found.places])
     return (f'{found.name} on {places}' if places else
-            with_drives(found.name, found.drives, diagnosis.residuals.drives))
+            with_drives(found.name, found.drives, diagnosis.residuals.drives)) + found.when
 
 
 def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:

@@ -431,6 +431,8 @@ class Design:
             value = term.shape[parameter.name]
             moved = {**term.shape, parameter.name: parameter.moved(value, SHAPE_STEP)}
             after = coefficients @ self.drive_rows(term.effect, term.drive, moved)
+            if term.course is not None:
+                after = after * term.course
             slopes.append((after - before) / SHAPE_STEP)
         return np.stack(slopes)
 

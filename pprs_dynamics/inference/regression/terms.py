@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.motion.treatment import Treatment
@@ -32,6 +32,8 @@ class Term:
         One row per coefficient [N].
     bare : dict of drive to (k, M) array, optional
         The rows if friction did not follow the loads that the effect adds.
+    course : (M,) array, optional
+        By which the rows are multiplied already: which share of the effect is there when.
     """
 
     effect: type[CatalogueEffect]
@@ -39,6 +41,14 @@ class Term:
     shape: Mapping[str, float]
     rows: Rows
     bare: Rows | None = None
+    course: Array | None = None
+
+    def following(self, course: Array) -> Term:
+        """Return the term that is there as a course (M,) says."""
+        return replace(
+            self, rows={d: rows * course for d, rows in self.rows.items()}, course=course,
+            bare=None if self.bare is None else {d: rows * course
+                                                 for d, rows in self.bare.items()})
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -24,6 +24,36 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE, catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 
+COURSE_TIMES = 200  # beginnings that are tried, evenly over the recordings
+SINCE, DURING, DRIFT = 'since', 'during', 'drift'  # kinds of courses
+
+
+@dataclass(frozen=True)
+class Course:
+    """When an effect is there, of the time of all recordings together [s].
+
+    Parameters
+    ----------
+    kind : {'since', 'during', 'drift'}
+        From `begin` on; from `begin` to `end`; or growing in proportion to the time from nothing
+        at `begin`.
+    begin, end : float
+    """
+
+    kind: str
+    begin: float
+    end: float
+
+    def weight(self, time: Array, period: float) -> Array:
+        """Return which share of the effect is there, (M,), in means over a period about times."""
+        if self.kind == DRIFT:
+            share: Array = (time - self.begin) / max(self.end - self.begin, 1e-300)
+            return share
+        share = np.clip((time - self.begin) / period + 0.5, 0.0, 1.0)
+        if self.kind == DURING:
+            share = share * np.clip((self.end - time) / period + 0.5, 0.0, 1.0)
+        return share
+
 
 @dataclass(frozen=True)
 class Component:
@@ -45,6 +75,8 @@ class Component:
     given : tuple of float
         All coefficients that the given model has of the effect there, which the fitted ones
         change; none where it does not have it.
+    course : Course or None
+        None: all the time.
     """
 
     effect: type[CatalogueEffect]
@@ -53,6 +85,7 @@ class Component:
     shape: tuple[tuple[str, float], ...] = ()
     centre: tuple[float, ...] = ()
     given: tuple[float, ...] = ()
+    course: Course | None = None
 
     @classmethod
     def of(cls, effect: type[CatalogueEffect], drive: int | None, shape: Mapping[str, float],
@@ -121,6 +154,11 @@ class EffectCandidate:
     def name(self) -> str:
         """Of the effect."""
         return self.effect.name
+
+    @property
+    def course(self) -> Course | None:
+        """When it is there; None: all the time."""
+        return self.components[0].course
 
     @property
     def claim(self) -> str:
@@ -350,7 +388,8 @@ class Prices:
             return candidate.terms
         terms = CostTerms(
             names=len(candidate.hypotheses) * self.of_name(),
-            drives=0.0 if candidate.drives is None else self.of_drives(len(candidate.components)))
+            drives=0.0 if candidate.drives is None else self.of_drives(len(candidate.components)),
+            shapes=0.0 if candidate.course is None else self.of_course(candidate.course))
         return sum((of_component(one) for one in candidate.components), terms)
 
     def of_component(self, effect: type[CatalogueEffect], tried: int) -> float:
@@ -362,6 +401,11 @@ class Prices:
         if effect.shape:
             price += max(len(effect.shape) * log(self.samples), 2 * log(max(tried, 1)))
         return price
+
+    def of_course(self, course: Course) -> float:
+        """Return the price of a change within the recordings: that there is one, and when."""
+        times = {SINCE: 1, DURING: 2, DRIFT: 0}[course.kind]
+        return 2 * times * log(COURSE_TIMES) - 2 * log(self.decisions.effect_odds)
 
     def of_width(self, tried: int) -> float:
         """Return the price of a width of reversal that is another than the model's, on a drive."""

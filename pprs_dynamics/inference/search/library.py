@@ -27,6 +27,7 @@ from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
     Component,
+    Course,
     Prices,
     UnknownCandidate,
 )
@@ -195,12 +196,20 @@ class Library:
 
     def term(self, component: Component) -> Term:
         """Return the rows in time of a component, of all of its effect's coefficients."""
+        if component.course is not None:
+            return self.term(replace(component, course=None)).following(
+                self._weight(component.course))
         key = (component.effect, component.drive, component.shape, component.centre)
         if key not in self._terms:
             term = self.design.find_term(component.effect, component.drive, component.parameters)
             self._terms[key] = (about_centre(term, component.names[0], component.centre)
                                 if component.centre else term)
         return self._terms[key]
+
+    def _weight(self, course: Course) -> Array:
+        """Return which share of an effect of a course is there, (M,)."""
+        residuals = self.design.residuals
+        return course.weight(residuals.time, residuals.period)
 
     def block(self, component: Component) -> Block:
         """Return the columns of a component, transformed, with their prior."""
@@ -278,6 +287,8 @@ class Library:
             elif component.names:
                 rows = {d: np.stack([nuisance_rows(self.design, term, component.every(unit))
                                      for unit in np.eye(len(component.names))])}
+            if component.course is not None:
+                rows = {d: values * self._weight(component.course) for d, values in rows.items()}
             self._nuisance[component] = {
                 d: self.regression.series[d].transform(values) for d, values in rows.items()
                 if np.any(values) and d in self.regression.series}

@@ -1,0 +1,229 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Effects that begin, end or grow within a recording, beside their constant form.
+
+A payload that is picked up in the middle is half of it throughout to a fit of constants, and a
+contact of some seconds a spring and a ripple. Before a constant form is believed, each effect is
+tried with a step in time, as a stretch, and as a drift.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pprs_dynamics.inference.search.candidates import (
+    COURSE_TIMES,
+    DRIFT,
+    DURING,
+    SINCE,
+    CandidateSet,
+    Course,
+    EffectCandidate,
+)
+from pprs_dynamics.inference.search.fitted_sets import Candidates, FittedSets
+from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
+
+# Stretches that are tried: so many parts of the recordings, each of so many of them long.
+STRETCHES, STRETCH_LENGTHS = 40, (1, 2, 4, 8)
+COURSE_HALVINGS = 6  # of the step between them, around the best
+COURSE_TRIALS = 3  # candidates of a scan that are fitted
+MOST_COURSES = 3  # effects of one set that change within the recordings
+
+
+@dataclass(frozen=True)
+class _Offer:
+    """A candidate with a course, and by how much it would lower the deviance at least."""
+
+    gain: float
+    candidate: EffectCandidate
+
+    def is_worth_a_fit(self, fits: FittedSets) -> bool:
+        """Return whether it may pay for itself, beyond the margin of rivals."""
+        course = self.candidate.course
+        return course is not None and (
+            self.gain > fits.prices.of_course(course) + fits.decisions.rival_margin)
+
+
+def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[CandidateSet],
+                 ) -> tuple[FittedSets, CandidateSet]:
+    """Return the best set in which effects may begin, end or grow, with what it is a set of.
+
+    The same fits and set where nothing changes in time.
+
+    Parameters
+    ----------
+    fits : FittedSets
+    kept : CandidateSet
+        Of constant forms.
+    others : iterable of CandidateSet
+        Of one effect each, that may be the right one with a step in time.
+    """
+    own = [(kept, one) for one in kept.effects if _is_new(one)]
+    if not kept.unknowns and not any(
+            offer.is_worth_a_fit(fits) for offer in _offers(fits, kept, own)):
+        return fits, kept
+    # Sets of their own: those of the search are of constant forms, and so are its rivals.
+    dated = FittedSets(fits.design, fits.decisions, fits.regression.error_scale)
+    best = dated.evaluate(kept.candidates)
+    names = {one.name for one in kept.effects}
+    more = [(one, one.effects[0]) for one in others
+            if one.effects[0].name not in names and _is_new(one.effects[0])]
+    for _ in range(MOST_COURSES):
+        held = [(best, one) for one in best.effects if not one.course and _is_new(one)]
+        # Patterns of no catalogue imitate what changes: offers are beside effects alone.
+        plain = dated.at_noise_of(best, best.effects) if best.unknowns else best
+        offers = sorted(_offers(dated, plain, [*held, *more]), key=lambda one: -one.gain)
+        found = best
+        for offer in _best_of_each(offers):
+            for rest in _rests(best, offer.candidate):
+                tried = dated.pruned(dated.evaluate((*rest, offer.candidate)))
+                found = min(found, tried, key=lambda one: one.cost)
+        if not found.cost < best.cost - fits.decisions.rival_margin:
+            break
+        best = _refined(dated, found)
+    best = _simplest(dated, best, [*(one for _, one in own), *(one for _, one in more)])
+    return (dated, best) if any(one.course for one in best.effects) else (fits, kept)
+
+
+def _is_new(candidate: EffectCandidate) -> bool:
+    """Return whether the given model lacks an effect: what it has is there all the time."""
+    return not any(one.given for one in candidate.components)
+
+
+def _courses(fits: FittedSets) -> Iterator[Course]:
+    first, last = fits.design.residuals.time[[0, -1]].tolist()
+    yield Course(DRIFT, first, last)
+    for at in np.linspace(first, last, COURSE_TIMES + 1)[1:-1].tolist():
+        yield Course(SINCE, at, last)
+    edges = np.linspace(first, last, STRETCHES + 1).tolist()
+    for length in STRETCH_LENGTHS:
+        for begin, end in zip(edges, edges[length:], strict=False):
+            yield Course(DURING, begin, end)
+
+
+def _offers(fits: FittedSets, base: CandidateSet,
+            effects: Iterable[tuple[CandidateSet, EffectCandidate]]) -> Iterator[_Offer]:
+    """Yield effects with the course that lowers the deviance most, by the force that they had."""
+    residuals, shape = fits.design.residuals, fits.design.residuals.measured.shape
+    courses = list(_courses(fits))
+    weights = np.array([one.weight(residuals.time, residuals.period) for one in courses])
+    for found, candidate in effects:
+        force = fits.library.force(found, candidate, shape)
+        rows = {d: fits.regression.series[d].transform(
+            (weights * force[:, d]).astype(np.float32)) for d in fits.regression.drives
+            if np.any(force[:, d])}
+        if not rows:
+            continue
+        every = {d: rows.get(d, np.zeros((len(courses), len(series)), dtype=np.float32))
+                 for d, series in fits.regression.series.items()}
+        test = ScoreTest(fits.regression, every,
+                         [Entry(course, (k,)) for k, course in enumerate(courses)])
+        for labels, gains in test.gains(base.fit):
+            ranked = np.argsort(-gains)
+            for kind in (DRIFT, SINCE, DURING):
+                at = next(k for k in ranked if labels[k].kind == kind)
+                yield _Offer(float(gains[at]), _with_course(candidate, labels[at]))
+
+
+def _best_of_each(offers: list[_Offer]) -> list[_Offer]:
+    """Return the best offers of different effects and kinds of course."""
+    found: dict[tuple[str, str], _Offer] = {}
+    for one in offers:
+        assert one.candidate.course is not None
+        found.setdefault((one.candidate.name, one.candidate.course.kind), one)
+    return list(found.values())[:2 * COURSE_TRIALS]
+
+
+def _rests(base: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
+    """Yield what may stand beside a candidate: all else, and all but what imitates it."""
+    effects = tuple(one for one in base.effects if one.effect is not candidate.effect)
+    rests: list[Candidates] = [tuple(one for one in effects if one.course), effects,
+                               (*effects, *base.unknowns)]
+    yield from dict.fromkeys(rests)
+
+
+def _with_course(candidate: EffectCandidate, course: Course) -> EffectCandidate:
+    return EffectCandidate.of(replace(one, course=course) for one in candidate.components)
+
+
+def _refined(fits: FittedSets, found: CandidateSet) -> CandidateSet:
+    """Return a set with beginnings and ends where they cost least.
+
+    At the noise of the set: with its own, one that is a block off costs as much as one that is
+    far off.
+    """
+    time = fits.design.residuals.time
+    for candidate in found.effects:
+        course = candidate.course
+        if course is None or course.kind == DRIFT:
+            continue
+        rest = found.without(candidate)
+        step = float(time[-1] - time[0]) / (
+            STRETCHES if course.kind == DURING else COURSE_TIMES)
+        best = fits.at_noise_of(found, found.candidates).total
+        for _ in range(COURSE_HALVINGS):
+            step /= 2
+            moved = [replace(course, begin=course.begin + by) for by in (-step, step)]
+            if course.kind == DURING:
+                moved += [replace(one, end=one.end + by) for one in (course, *moved)
+                          for by in (-step, step)]
+            for one in moved:
+                if one.begin < one.end - step:
+                    total = fits.at_noise_of(
+                        found, (*rest, _with_course(candidate, one))).total
+                    if total < best:
+                        best, course = total, one
+        found = min(found, fits.evaluate((*rest, _with_course(candidate, course))),
+                    key=lambda one: one.cost)
+    return found
+
+
+def _simplest(fits: FittedSets, found: CandidateSet, effects: Iterable[EffectCandidate],
+              ) -> CandidateSet:
+    """Return the best of a set and those in which one effect changes when several did.
+
+    What changes at one time has one cause, and what comes and goes is one stretch.
+    """
+    courses = [one.course for one in found.effects if one.course is not None]
+    edges = sorted({at for one in courses if one.kind != DRIFT
+                    for at in ((one.begin, one.end) if one.kind == DURING else (one.begin,))})
+    first, last = fits.design.residuals.time[[0, -1]].tolist()
+    ends = np.linspace(first, last, STRETCHES + 1).tolist()
+    dated = {one.effect for one in found.effects if one.course is not None}
+    tried = [*(Course(SINCE, at, last) for at in edges),
+             *(Course(DURING, begin, end) for k, begin in enumerate(edges)
+               for end in edges[k + 1:])]
+    constant = tuple(one for one in found.effects if one.course is None)
+    simpler: list[CandidateSet] = []
+    for effect in effects:
+        beside = tuple(one for one in constant if one.effect is not effect.effect)
+        # What begins may end where nothing else begins.
+        more = [Course(DURING, begin, end) for begin in edges for end in ends
+                if end > begin] if effect.effect in dated else []
+        simpler += [fits.evaluate((*rest, _with_course(effect, course)))
+                    for course in (*tried, *more) for rest in dict.fromkeys(((), beside))]
+    best: dict[tuple[str, str], CandidateSet] = {}
+    for one in sorted(simpler, key=lambda one: one.cost):
+        changing = next(effect for effect in one.effects if effect.course is not None)
+        assert changing.course is not None
+        best.setdefault((changing.name, changing.course.kind), one)
+    # A change that is a hundredth of a second off costs more than patterns that make it good.
+    return _lasting(fits, min([found, *(fits.pruned(_refined(fits, one))
+                                        for one in list(best.values())[:2 * COURSE_TRIALS])],
+                              key=lambda one: one.cost))
+
+
+def _lasting(fits: FittedSets, found: CandidateSet) -> CandidateSet:
+    """Return a set in which what is there for a stretch stays, where that costs less."""
+    last = float(fits.design.residuals.time[-1])
+    for candidate in found.effects:
+        course = candidate.course
+        if course is not None and course.kind == DURING:
+            stays = _with_course(candidate, Course(SINCE, course.begin, last))
+            found = min(found, _refined(fits, fits.evaluate((*found.without(candidate), stays))),
+                        key=lambda one: one.cost)
+    return found

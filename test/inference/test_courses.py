@@ -1,0 +1,78 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What begins, passes or drifts within a recording is told as that, not as a constant effect."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pprs_dynamics import DriveModel, Recording
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.model_file import build_model
+
+MODEL = DriveModel.load()
+TIME = np.arange(6000) * 0.002
+MOTION = Excitation(12.0, 1).motion(TIME)
+FORCES = MODEL.drive_forces(MOTION)
+START = 5.0  # [s], of the recording's clock: what is told counts from the recording's start
+
+
+def diagnosed(effort: np.ndarray, position: np.ndarray | None = None) -> Diagnosis:
+    noise = 0.05 * np.random.default_rng(0).normal(size=effort.shape)
+    return diagnose(MODEL, [Recording.from_arrays(
+        'changing', TIME + START,
+        FORCES.mechanism.position if position is None else position, None, effort + noise)])
+
+
+def loaded(mass: float) -> np.ndarray:
+    heavier = build_model({**MODEL.values, 'effects.active': ['payload_mass'],
+                           'effects.payload_mass.mass': mass})
+    return heavier.drive_forces(MOTION).total
+
+
+@pytest.mark.parametrize('since', [4.0, 7.313])
+def test_a_payload_that_is_picked_up_is_told_with_its_mass_and_its_moment(since: float) -> None:
+    picked = np.where((since < TIME)[:, None], loaded(0.2), FORCES.total)
+    found = diagnosed(picked)
+    assert found.verdict == 'effect'
+    effect, = found.effects
+    assert effect.name == 'payload_mass'
+    assert abs(effect.parameters['mass'].value - 0.2) < 0.004
+    told = found.to_dict()['effects'][0]
+    assert told['since'] == pytest.approx(since, abs=0.03)
+    assert any('begins after that' in sentence for sentence in found.warnings)
+    # The model that is returned has what is there at the end.
+    assert found.adopted.values['effects.payload_mass.mass'] == pytest.approx(0.2, abs=0.004)
+    assert np.nanstd(found.remaining) < 1.1 * 0.05 / np.sqrt(5)
+
+
+def test_what_is_there_all_the_time_has_no_beginning() -> None:
+    found = diagnosed(loaded(0.2))
+    assert [one.name for one in found.effects] == ['payload_mass']
+    assert found.to_dict()['effects'][0]['since'] is None
+
+
+def test_a_contact_of_some_seconds_is_no_property_of_the_machine() -> None:
+    touched = FORCES.total.copy()
+    touched[(TIME > 6) & (TIME < 9), 4] += 3.0
+    found = diagnosed(touched)
+    assert found.verdict == 'unknown'
+    assert not found.effects
+    statement = found.depends_on[0]
+    assert (statement.drive, statement.variable) == ('lift_2', 'time')
+    assert statement.range == pytest.approx((6.0, 9.0), abs=0.05)
+
+
+def test_a_zero_that_drifts_is_told_as_drifting() -> None:
+    position = FORCES.mechanism.position.copy()
+    position[:, 1] += 0.004 * TIME / TIME[-1]
+    found = diagnosed(FORCES.total, position)
+    assert found.verdict == 'unknown'
+    effect, = found.effects
+    assert (effect.name, effect.drives) == ('homing_error', ('slide_2',))
+    assert found.to_dict()['effects'][0]['course'] == 'drift'
+    value = effect.parameters['slide_2.zero']
+    assert abs(value.value - 0.004) < 4 * value.std + 2e-4
