@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         adopt,
         adopt_all,
     )
+    from pprs_dynamics.app.front_door.changed import ChangeResult, changed
     from pprs_dynamics.app.front_door.compare import ComparisonResult, compare
     from pprs_dynamics.app.front_door.diagnose import DiagnosisResult, diagnose
     from pprs_dynamics.app.front_door.fit import FitResult, fit
@@ -62,20 +63,21 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.model.model_file import build_model, load_model
 
 __all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'ArmModel', 'Array', 'AxisModel',
-           'AxisMotion', 'Card', 'CatalogueEffect', 'ComparisonResult', 'ConvergenceError',
-           'DiagnosisResult', 'DriveEffect', 'DriveForces', 'DriveModel', 'DriveRange',
-           'DriveSamples', 'EffectError', 'Excitation', 'ExperimentResult', 'FitResult',
-           'HelicalPath', 'JointMotion', 'LimitError', 'MeasurementEffect', 'MissingLibraryError',
-           'ModelError', 'ModelState', 'MotionError', 'MotionLimits', 'Parameter',
-           'PlatformMotion', 'PprsError', 'Recording', 'Session', 'SimulationResult',
+           'AxisMotion', 'Card', 'CatalogueEffect', 'ChangeResult', 'ComparisonResult',
+           'ConvergenceError', 'DiagnosisResult', 'DriveEffect', 'DriveForces', 'DriveModel',
+           'DriveRange', 'DriveSamples', 'EffectError', 'Excitation', 'ExperimentResult',
+           'FitResult', 'HelicalPath', 'JointMotion', 'LimitError', 'MeasurementEffect',
+           'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError', 'MotionLimits',
+           'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session', 'SimulationResult',
            'SingularityError', 'StructureEffect', 'UnknownNameError', 'UnreadableFileError',
-           'WorkspaceError', 'adopt', 'adopt_all', 'build_model', 'compare', 'diagnose', 'fit',
-           'load_model', 'next_experiment', 'read_recording', 'simulate', 'write_recording']
+           'WorkspaceError', 'adopt', 'adopt_all', 'build_model', 'changed', 'compare', 'diagnose',
+           'fit', 'load_model', 'next_experiment', 'read_recording', 'simulate', 'write_recording']
 __version__ = '0.1.0'
 
 # Loaded at first use: `pprs --help` and a node's refusal need neither numpy nor a model.
 _HOMES = {
     'app.front_door.adopt': ('AdoptionResult', 'AdoptionRunResult', 'adopt', 'adopt_all'),
+    'app.front_door.changed': ('ChangeResult', 'changed'),
     'app.front_door.compare': ('ComparisonResult', 'compare'),
     'app.front_door.diagnose': ('DiagnosisResult', 'diagnose'),
     'app.front_door.fit': ('FitResult', 'fit'),

@@ -24,7 +24,8 @@ LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
 OUTPUTS = ('output', 'json', 'report', 'mcap', 'picture')
-INPUTS = ('model', 'recordings', 'validate', 'beside', 'refit', 'file', 'manifest', 'store', 'path')
+INPUTS = ('model', 'recordings', 'before', 'after', 'validate', 'beside', 'refit', 'file',
+          'manifest', 'store', 'path')
 
 DEFAULT_MODEL = 'config/paper.yaml'
 
