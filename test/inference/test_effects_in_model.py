@@ -20,9 +20,12 @@ from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveEffect
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.paired_errors import rms
+from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.paths import Excitation
@@ -205,3 +208,10 @@ def test_a_survey_follows_what_the_model_has(options: str, tmp_path: Path) -> No
     mass = found[None, 'payload_mass', 'mass']
     assert abs(mass['value'] - 0.22) < 4 * mass['std'] < 0.02
     assert found['lift_1', 'stribeck_friction', 'force']['value'] == pytest.approx(0.6, abs=0.1)
+
+
+def test_a_stream_says_what_the_model_has() -> None:
+    found = FoundEffect(CATALOGUE['payload_mass'], None, {'mass': Estimate(0.0, 0.002, 'kg')},
+                        np.zeros((10, 6)), 50.0, 0.7, 0.05, 0.7, 0.05, in_model={'mass': 0.3})
+    said = LiveEffect(found, None, True, frozenset({'payload_mass'})).sentence(MODEL.drives)
+    assert said == 'payload mass: mass 0.0 ± 4.0 g (0.3 kg in the model), from the start'

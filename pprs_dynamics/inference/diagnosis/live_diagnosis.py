@@ -99,8 +99,11 @@ class LiveEffect:
     def sentence(self, every: tuple[str, ...]) -> str:
         """Return what changed in words; `every` names all drives."""
         what = with_drives(self.found.name.replace('_', ' '), self.found.drives, every)
+        given = self.found.in_model
         values = ', '.join(
             f'{key} {with_uncertainty(one.value, one.std, one.unit)}'
+            + (f' ({with_uncertainty(given[key], 0.0, one.unit)} in the model)'
+               if key in given else '')
             for key, one in list(self.found.parameters.items())[:MOST_VALUES])
         since = 'from the start' if self.since is None else (
             f'since {datetime.fromtimestamp(self.since):%H:%M:%S}')

@@ -17,6 +17,10 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.inference.residuals.changed_readings import (
+    find_changed_efforts,
+    find_changed_positions,
+)
 from pprs_dynamics.inference.residuals.excerpt import (
     Excerpt,
     excerpt_of,
@@ -116,6 +120,9 @@ def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]
     tuple of Defect
         Empty where nothing fits clearly better, and where the recording cannot tell.
     """
+    changed = tuple(find_changed_positions(recording))
+    if changed:
+        return changed  # no reading of the whole is right
     excerpts = {unit: excerpt for unit in (1.0, *_time_units(recording))
                 if (excerpt := excerpt_of(recording, unit)) is not None}
     best = _Search(model, excerpts).best()
@@ -136,6 +143,8 @@ def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]
     if not told & {POSITION_UNIT, POSITION_SIGN, 'reversed_time'}:
         unit = 1.0 if best is None else best.time_unit
         found += _of_velocities(recording, excerpts.get(unit))
+    if not any(isinstance(finding, OtherReading) for finding in found):
+        found += find_changed_efforts(model, recording)
     # In other units or signs it would seem to lack what is there.
     if not any(isinstance(finding, OtherReading) for finding in found):
         found += find_no_measurements(model, recording, contents)

@@ -1,0 +1,74 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Efforts without a sign, and units and signs that change in the middle, are told as that."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pprs_dynamics import DriveModel, Recording
+from pprs_dynamics.inference.residuals.conventions import find_mistakes
+from pprs_dynamics.inference.residuals.mistakes import OtherReading
+from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.model_file import build_model
+
+MODEL = DriveModel.load()
+TIME = np.arange(10_000) * 0.002
+AFTER = (TIME > 12.0)[:, None]
+# Effects that the model lacks are no other unit.
+REAL = build_model({**MODEL.values, 'effects.active': ['stribeck_friction', 'viscous_friction'],
+                    'effects.stribeck_friction.lift_1.force': 1.2,
+                    'effects.stribeck_friction.lift_1.velocity': 0.02,
+                    'effects.viscous_friction.slide_2.coefficient': 12.0})
+FORCES = REAL.drive_forces(Excitation(20.0, 1).motion(TIME))
+NOISE = 0.05 * np.random.default_rng(0).normal(size=FORCES.total.shape)
+POSITION, EFFORT = FORCES.mechanism.position, FORCES.total + NOISE
+
+
+def told(position: Any = POSITION, effort: Any = EFFORT) -> list[OtherReading]:
+    found = find_mistakes(MODEL, Recording.from_arrays('r', TIME, position, None, effort))
+    return [one for one in found if isinstance(one, OtherReading)]
+
+
+def test_a_sound_recording_has_nothing_to_tell() -> None:
+    assert told() == []
+
+
+def test_efforts_without_a_sign_are_told_within_seconds() -> None:
+    began = time.process_time()
+    one, = told(effort=np.abs(EFFORT))
+    assert time.process_time() - began < 5
+    # Lifts bear the weight and never change their sign: theirs may be either.
+    assert one.kind == 'effort_absolute'
+    assert one.drives == ('slide_1', 'slide_2', 'slide_3')
+    assert 'absolute value' in one.text
+
+
+@pytest.mark.parametrize(('factor', 'is_after', 'words'), [
+    (1e3, True, 'in mN'), (1e-3, True, 'in kN'), (-1.0, True, 'negated'),
+    (1e3, False, 'in mN'), (-1.0, False, 'negated')])
+def test_efforts_that_change_their_unit_in_the_middle(factor: float, is_after: bool, words: str,
+                                                      ) -> None:
+    part = AFTER if is_after else ~AFTER
+    one, = told(effort=EFFORT * np.where(part, factor, 1.0))
+    assert words in one.text or factor == 1e-3
+    assert 'unlike in the rest' in one.text
+
+
+def test_one_drive_that_is_negated_from_a_time_on_is_named() -> None:
+    effort = EFFORT.copy()
+    effort[AFTER[:, 0], 2] *= -1
+    one, = told(effort=effort)
+    assert one.drives == ('slide_3',)
+
+
+@pytest.mark.parametrize(('is_after', 'words'), [(True, 'from 12 s on'), (False, 'until 12 s')])
+def test_positions_that_change_to_millimetres(is_after: bool, words: str) -> None:
+    part = AFTER if is_after else ~AFTER
+    found = told(position=POSITION * np.where(part, 1e3, 1.0))
+    assert any('millimetres' in one.text and words in one.text for one in found)
