@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import JointMotion
+from pprs_dynamics.app.report.adoption_report import parameter_rows
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model, load_model
@@ -44,9 +46,9 @@ def planar_arm(folder: Path, joints: int) -> ForceModel:
     return load_model(folder / 'arm.yaml')
 
 
-def record(model: ForceModel, seed: int = 0) -> Recording:
-    time = np.arange(1500) * 0.01
-    rates = np.array([[0.31, 0.83], [0.47, 1.13]])[:, :len(model.drives)]
+def record(model: ForceModel, seed: int = 0, pace: float = 1.0) -> Recording:
+    time = np.arange(1500) * 0.01 / pace ** 0.5
+    rates = np.array([[0.31, 0.83], [0.47, 1.13]])[:, :len(model.drives)] * pace
     phase = 2 * np.pi * rates[:, None] * time[:, None] + np.arange(len(model.drives))
     size = np.array([0.9, 0.4])[:, None, None]
     turn = 2 * np.pi * rates[:, None]
@@ -73,3 +75,27 @@ def test_a_load_is_found_and_adopted_where_a_motion_shows_it(joints: int, tmp_pa
     adoption = adopt(model, requested('payload_mass', model), [recording], diagnosis=found)
     assert adoption.adopted, adoption.reason
     assert adoption.held_out_after < 1.1 * NOISE
+
+
+def test_a_slow_motion_tells_the_moment_of_a_load_and_not_its_mass(tmp_path: Path) -> None:
+    """What holds 0.25 kg m may be any mass: only m c acts without acceleration."""
+    model = planar_arm(tmp_path, 1)
+    recording = record(build_model({
+        **model.values, 'effects.active': ['payload_mass'], 'effects.payload_mass.mass': 0.5,
+        'effects.payload_mass.z': -0.5}, model.source), pace=0.1)
+    found = diagnose(model, [recording])
+    effect, = found.effects
+    mass, moment = effect.parameters['mass'], effect.moments['moment_z']
+    assert mass.std > 0.1 * mass.value
+    assert moment.std < 0.002
+    assert abs(moment.value + 0.25) < 4 * moment.std
+    assert 'm c_z) -0.2' in word_diagnosis(found).effects[0].what
+    assert found.to_dict()['effects'][0]['moments']['moment_z']['unit'] == 'kg m'
+    adoption = adopt(model, requested('payload_mass', model), [recording], diagnosis=found)
+    assert adoption.adopted, adoption.reason
+    rows = dict(parameter_rows(adoption))
+    assert rows['moment_z'].startswith('-0.2')
+    assert rows['moment_z'].endswith('kg m')
+    # Where the mass is as sure, mass and centre say it.
+    quick = adopt(model, requested('payload_mass', model), [record(adoption.after)])
+    assert 'moment_z' not in dict(parameter_rows(quick))

@@ -445,6 +445,16 @@ def test_commands_hold_the_real_names_as_a_shell_takes_them() -> None:
         "pprs next-experiment 'my run.mcap' b.csv --model robot.yaml --output next.csv")
 
 
+@pytest.mark.parametrize(('given', 'written'), [
+    ('robot.yaml', 'with_coulomb_friction.yaml'),
+    ('with_coulomb_friction.yaml', 'with_coulomb_friction_2.yaml'),
+    ('with_coulomb_friction_2.yaml', 'with_coulomb_friction_3.yaml'),
+    ('elsewhere/with_coulomb_friction.yaml', 'with_coulomb_friction.yaml')])
+def test_what_is_written_is_never_the_model_that_is_given(given: str, written: str) -> None:
+    command = word_diagnosis(one_effect(), GivenFiles(('a.csv',), model=given)).command
+    assert command == (f'pprs adopt coulomb_friction a.csv --model {given} --output {written}')
+
+
 @pytest.mark.parametrize('verdict', ['effect', 'ambiguous', 'unknown', 'adequate'])
 def test_every_command_keeps_model_and_topic_and_is_one(verdict: str) -> None:
     files = GivenFiles(('a.csv',), ('b.csv',), 'my robot.yaml', '/arm/joint_states')

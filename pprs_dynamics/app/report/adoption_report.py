@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,8 @@ from pprs_dynamics.app.report.terminal import (
 )
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun
-from pprs_dynamics.inference.diagnosis.quantities import in_unit, plain, with_uncertainty
+from pprs_dynamics.inference.diagnosis.quantities import as_fitted, in_unit, plain, with_uncertainty
+from pprs_dynamics.inference.diagnosis.sentences import sure_moments
 from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -82,9 +84,18 @@ def headline(answer: Adoption) -> str:
 
 
 def parameter_rows(answer: Adoption) -> list[tuple[str, str]]:
-    """Return each parameter that is not 0, and its value ± two standard deviations."""
-    return [(key, with_uncertainty(one.value, one.std, one.unit))
+    """Return each parameter that is not 0, and its value ± two standard deviations.
+
+    With first moments of bodies that are sure where the mass is not.
+    """
+    effect = answer.request.effect
+    scales = {one.name: one.scale for one in effect.parameters}
+    rows = [(key, as_fitted(one.value, one.std, one.unit,
+                            scales.get(effect.place_and_parameter(key)[1], inf)))
             for key, one in answer.parameters.items() if one.value != 0.0]
+    return rows + [(key, with_uncertainty(one.value, one.std, one.unit)) for key, one in (
+        (told.name, answer.moments[told.name])
+        for told in sure_moments(effect, answer.parameters, answer.moments))]
 
 
 def errors_table(answer: Adoption, first: str) -> PlainTable:

@@ -9,7 +9,7 @@ effect that lowers the error a little is refused because the recordings call for
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -128,7 +128,8 @@ def adopt(
               *objections.of_held_out_error(*held_out, gains, model, case.held_out)]
     report(1.0)
     return case.answer(fitted.model, fitted.drives, found, [*remarks, *case.weakness(found)],
-                       before, after, held_out, fitted.parameters, tuple(fitted.calibrated), rivals)
+                       before, after, held_out, fitted.parameters, tuple(fitted.calibrated), rivals,
+                       moments=fitted.moments)
 
 
 def original(model: ForceModel) -> ForceModel:
@@ -194,7 +195,7 @@ class _Case:
         remarks: list[str], residuals_before: Residuals, residuals_after: Residuals,
         held_out: tuple[float, float], parameters: dict[str, Estimate],
         calibrated: tuple[Calibration, ...] = (), rivals: tuple[str, ...] = (),
-        curve: FittedCurve | None = None,
+        curve: FittedCurve | None = None, moments: Mapping[str, Estimate] | None = None,
     ) -> Adoption:
         """Return the answer to all objections that were found."""
         adopted = not found or self.force
@@ -205,7 +206,7 @@ class _Case:
             tuple(remarks), parameters, calibrated, rivals, self.model, after, residuals_before,
             residuals_after, rms(residuals_before), rms(residuals_after), *held_out,
             VALIDATION if self.validate else BLOCKS, self.diagnosis.noise_floor,
-            self.diagnosis.noise_floors, curve)
+            self.diagnosis.noise_floors, curve, moments or {})
 
 
 def _adopt_curve(case: _Case, request: CurveRequest, report: Callable[[float], None]) -> Adoption:

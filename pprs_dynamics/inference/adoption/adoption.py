@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from pprs_dynamics.inference.adoption.fit_curve import CurveRequest, FittedCurve
@@ -49,6 +50,8 @@ class Adoption:
         The same by drive [N].
     curve : FittedCurve, optional
         Of a measured curve, with its band.
+    moments : mapping of str to Estimate
+        First moments of added bodies: see `Estimates`.
     """
 
     request: EffectRequest | CurveRequest
@@ -73,6 +76,7 @@ class Adoption:
     noise_floor: float
     noise_floors: dict[str, float]
     curve: FittedCurve | None = None
+    moments: Mapping[str, Estimate] = field(default_factory=dict)
 
     @property
     def unit(self) -> str:
@@ -95,4 +99,6 @@ class Adoption:
             'forced': self.forced, 'objections': list(self.objections),
             'remarks': list(self.remarks), 'rivals': list(self.rivals),
             'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
+            **({'moments': {key: one.to_dict() for key, one in self.moments.items()}}
+               if self.moments else {}),
             'calibrated': [one.to_dict() for one in self.calibrated]}

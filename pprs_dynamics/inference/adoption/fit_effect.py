@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -77,6 +77,8 @@ class EffectFit:
     nothing_left : tuple of str
         What keys of parameters begin with where the model had the effect and recordings leave
         nothing of it: a drive, a link, or nothing for all of it. `model` has it there no more.
+    moments : mapping of str to Estimate
+        First moments of added bodies: see `Estimates`.
     """
 
     request: EffectRequest
@@ -94,6 +96,7 @@ class EffectFit:
     held_out_after: float
     block_gains: Array
     nothing_left: tuple[str, ...] = ()
+    moments: Mapping[str, Estimate] = field(default_factory=dict)
 
 
 def fit_effect(
@@ -146,7 +149,7 @@ def fit_effect(
     return EffectFit(
         request, design.named(candidate.drives), final, fitted_model(fits, plain_set), parameters,
         said.at_bound, moved, evidence, share, last, found, before.error, after.error,
-        plain_losses - after.losses, nothing)
+        plain_losses - after.losses, nothing, said.moments)
 
 
 def _numbers(design: Design, request: EffectRequest) -> tuple[int, ...] | None:

@@ -14,7 +14,7 @@ from pprs_dynamics.drives import common_effort
 from pprs_dynamics.inference.adoption.fit_effect import SURE, EffectFit
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
-from pprs_dynamics.inference.diagnosis.quantities import with_uncertainty
+from pprs_dynamics.inference.diagnosis.quantities import as_fitted, with_uncertainty
 from pprs_dynamics.inference.residuals.paired_errors import certainty
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import Estimate
@@ -141,7 +141,10 @@ def of_identifiability(fitted: EffectFit) -> list[str]:
     linear = {p.name for p in fitted.request.effect.linear or fitted.request.effect.shape}
     sizes = [key for key in told if effect.place_and_parameter(key)[1] in linear] or list(told)
     if sizes and all(key in vague for key in sizes):
-        shown = '; '.join(f'{key} = {_with_interval(told[key])}' for key in sizes[:3])
+        scales = {p.name: p.scale for p in effect.parameters}
+        shown = '; '.join(f'{key} = ' + as_fitted(
+            told[key].value, told[key].std, told[key].unit,
+            scales[effect.place_and_parameter(key)[1]]) for key in sizes[:3])
         return [f'its parameters are not identifiable from these recordings: {shown}']
     return []
 

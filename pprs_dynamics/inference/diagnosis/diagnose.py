@@ -362,7 +362,7 @@ class _Answer:
                     or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
                 or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1]),
                 impossible or nothing, bool(impossible),
-                without, in_model))
+                without, in_model, moments=said.moments))
         return found
 
     def _dated_effects(self) -> list[FoundEffect]:
@@ -387,7 +387,8 @@ class _Answer:
                 (errors[k] - errors[k + 1]) / errors[0],
                 in_model=self._in_model(candidate, said.parameters),
                 course=None if course is None else replace(
-                    course, begin=course.begin - begun, end=course.end - begun)))
+                    course, begin=course.begin - begun, end=course.end - begun),
+                moments=said.moments))
         return effects
 
     def _passing(self) -> list[Statement]:

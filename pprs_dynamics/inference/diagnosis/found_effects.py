@@ -113,6 +113,8 @@ class FoundEffect(FittedEffect):
         say something else. Empty for an effect that it lacks.
     course : Course or None
         When it is there, from the start of the first recording [s]; None: all the time.
+    moments : mapping of str to Estimate
+        First moments of added bodies: see `Estimates`.
     """
 
     evidence: float
@@ -128,6 +130,7 @@ class FoundEffect(FittedEffect):
     without: RankedSet | None = None
     in_model: Mapping[str, float] = field(default_factory=dict)
     course: Course | None = None
+    moments: Mapping[str, Estimate] = field(default_factory=dict)
 
     @property
     def when(self) -> str:
@@ -145,6 +148,8 @@ class FoundEffect(FittedEffect):
                 'since': self.course.begin if self.course and self.course.kind == SINCE else None,
                 'course': self.course.kind if self.course else None,
                 'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
+                **({'moments': {key: one.to_dict() for key, one in self.moments.items()}}
+                   if self.moments else {}),
                 **({'in_model': dict(self.in_model)} if self.in_model else {}),
                 'evidence': self.evidence,
                 'without': None if self.without is None else self.without.to_dict(),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -65,6 +66,21 @@ class GivenFiles:
             given += [option, value] if value else []
         return shlex.join([*given, *words[first:]])
 
+    def output(self, name: str) -> str:
+        """Return the name of a model file to write, which may not be the one that is given.
+
+        `with_NAME.yaml` after itself is `with_NAME_2.yaml`, and so on.
+        """
+        given, new = Path(self.model), Path(name)
+        stem, _, number = given.stem.rpartition('_')
+        if not self.model or given.absolute().parent != new.absolute().parent:
+            return name
+        if given.stem == new.stem:
+            return f'{new.stem}_2{new.suffix}'
+        if stem == new.stem and number.isdecimal():
+            return f'{new.stem}_{int(number) + 1}{new.suffix}'
+        return name
+
 
 PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made without files
 
@@ -79,7 +95,7 @@ def first_step(model: ForceModel, files: GivenFiles) -> tuple[str, str]:
         words = ('The model has no friction yet: fit inertia and friction first' if bare else
                  'Check units, signs and zeros, and that this is the model of this machine as it '
                  'was recorded; then fit it')
-        return words, files.command('fit', '--output', 'base.yaml')
+        return words, files.command('fit', '--output', files.output('base.yaml'))
     return ('Check units, signs and zeros, and that this is the model of this machine as it was '
             'recorded', files.command('info'))
 
@@ -113,7 +129,7 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         if (curve := _curve(diagnosis)) is not None:
             return ('Look at that place on the machine. A measured curve takes the error away '
                     'until the cause is known', files.command(
-                        'adopt', curve, '--output', 'with_curve.yaml', held_out=True))
+                        'adopt', curve, '--output', files.output('with_curve.yaml'), held_out=True))
         return ('Look at that place on the machine, and record the motion again: what comes back '
                 'is the machine. Then diagnose both recordings', repeat)
     if diagnosis.verdict == 'ambiguous' and all(
@@ -132,10 +148,11 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         found = diagnosis.effects[0]
         step = 'set it anew, or take it out' if found.in_model else 'add it'
         return (f'Confirm it on the machine, then {step}', files.command(
-            'adopt', found.name, '--output', f'with_{found.name}.yaml', held_out=True))
+            'adopt', found.name, '--output',
+            files.output(f'with_{found.name}.yaml'), held_out=True))
     if diagnosis.effects:
         return ('Confirm them on the machine, then add them', files.command(
-            'diagnose', '--adopt-all', '--output', 'better.yaml', held_out=True))
+            'diagnose', '--adopt-all', '--output', files.output('better.yaml'), held_out=True))
     if diagnosis.suspects:
         return ('Repeat the recording: what comes back is the machine, what does not was noise',
                 repeat)

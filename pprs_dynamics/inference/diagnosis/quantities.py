@@ -14,6 +14,8 @@ READ_IN = {'m': (1.0, 1e3, 'mm'), 'm/s': (1.0, 1e3, 'mm/s'), 's': (0.1, 1e3, 'ms
            'kg': (0.1, 1e3, 'g'), 'rad': (inf, 180 / pi, '°')}
 PRINTED = {'1': '', 'kg m^2': 'kg m²', 'N s^2/m^2': 'N s²/m²', 'm/s^2': 'm/s²',
            'N m s^2/rad^2': 'N m s²/rad²', 'rad/s^2': 'rad/s²'}
+# Times the size that matters, an uncertainty beyond which, and beyond the value, nothing is known.
+ANYTHING = 100.0
 RESOLVED = 1e-9  # of any quantity in SI units, below which a number is rounding
 MOST_TOLD = 3  # drives of whose effort little is explained, in a sentence
 COUNTS = ('no', 'one', 'two', 'three', 'four', 'five', 'six')
@@ -34,6 +36,18 @@ def with_uncertainty(value: float, std: float, unit: str, size: float | None = N
     decimals = 1 - floor(log10(spread))
     digits = max(decimals, 0)
     return f'{round(value, decimals):.{digits}f} ± {round(spread, decimals):.{digits}f}{name}'
+
+
+def as_fitted(value: float, std: float, unit: str, scale: float, size: float | None = None,
+              ) -> str:
+    """Return a fitted value as `with_uncertainty` does; that it is none where it may be anything.
+
+    `scale` is the size that matters.
+    """
+    known = max(abs(value) if size is None else size, ANYTHING * scale)
+    if INTERVAL * std > known:
+        return 'not determined by this motion'
+    return with_uncertainty(value, std, unit, size)
 
 
 def in_unit(value: float, unit: str = 'N', digits: int = 3) -> str:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan
 
@@ -22,6 +22,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles, next_step
 from pprs_dynamics.inference.diagnosis.quantities import (
     INTERVAL,
+    as_fitted,
     change,
     in_unit,
     listed,
@@ -42,14 +43,13 @@ from pprs_dynamics.inference.search.candidates import SINCE
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.effect import Parameter
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
 
 MOST_CHANGED = 4  # values of an effect of the model that a sentence sets against the recordings'
 MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
 TOLD_COST = 0.05  # of a term of a cost, that one digit shows
-# Times the size that matters, an uncertainty beyond which, and beyond the value, nothing is known.
-ANYTHING = 100.0
+VAGUE = 0.1  # of a mass, an uncertainty beyond which its first moment is told as well, if surer
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
 
 
@@ -95,11 +95,8 @@ class FittedValue:
     @property
     def text(self) -> str:
         """Value with uncertainty and unit as people read it; none where it may be anything."""
-        known = max(self.size, ANYTHING * self.parameter.scale)
-        if INTERVAL * self.estimate.std > known:
-            return 'not determined by this motion'
-        return with_uncertainty(self.estimate.value, self.estimate.std, self.estimate.unit,
-                                self.size)
+        return as_fitted(self.estimate.value, self.estimate.std, self.estimate.unit,
+                         self.parameter.scale, self.size)
 
 
 @dataclass(frozen=True)
@@ -406,7 +403,23 @@ def _fitted(diagnosis: Diagnosis, found: FittedEffect) -> list[FittedValue]:
         given = found.in_model.get(key) if isinstance(found, FoundEffect) else None
         if estimate.value or given:
             values.append(FittedValue(found.name, drive, known[name], estimate, given))
+    if isinstance(found, FoundEffect):
+        values += [FittedValue(found.name, '', one, found.moments[one.name])
+                   for one in sure_moments(found.effect, found.parameters, found.moments)]
     return sorted(values, key=lambda one: order.index(one.drive))
+
+
+def sure_moments(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
+                 moments: Mapping[str, Estimate]) -> list[Parameter]:
+    """Return the first moments of bodies that are sure where the mass is not."""
+
+    def is_vague(one: Estimate) -> bool:
+        return INTERVAL * one.std > VAGUE * abs(one.value)
+
+    known = {one.name: one for one in effect.coefficients}
+    masses = {key: parameters.get(f'{key.rpartition("moment_")[0]}mass') for key in moments}
+    return [known[key] for key, mass in masses.items()
+            if mass is not None and is_vague(mass) and not is_vague(moments[key])]
 
 
 def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -79,10 +79,14 @@ class Estimates:
         By drive.parameter, or parameter.
     at_bound : tuple of str
         Those at the edge of the shapes that were tried.
+    moments : dict of str to Estimate
+        First moments of added bodies, by the name of their coefficient: what a slow motion tells
+        where it does not tell mass and centre apart.
     """
 
     parameters: dict[str, Estimate]
     at_bound: tuple[str, ...]
+    moments: dict[str, Estimate] = field(default_factory=dict)
 
 
 def estimate(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
@@ -106,16 +110,18 @@ def estimate(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
     fit = fits.regression.stated(found.fit, [*slopes.values(), *elsewhere])
     parameters: dict[str, Estimate] = {}
     bound: list[str] = []
+    moments: dict[str, Estimate] = {}
     for component in candidate.components:
         index = _places(fits, fit, component, slopes.get(component))
-        some, held = _of_component(
-            fits, component, found.coefficients(component),
-            _covariance(fits, fit, component, len(index), index), moved=found.fit.coefficients)
+        c, covariance = found.coefficients(component), _covariance(
+            fits, fit, component, len(index), index)
+        some, held = _of_component(fits, component, c, covariance, moved=found.fit.coefficients)
         parameters.update(some)
         bound += held
+        moments.update(_moments(_moved(fits, component, found.fit.coefficients), c, covariance))
     for key, one in _left_out(fits, found, candidate).items():
         parameters[key] = replace(parameters[key], std=one.std)
-    return Estimates(parameters, tuple(bound))
+    return Estimates(parameters, tuple(bound), moments)
 
 
 def averaged(own: Estimates, others: Sequence[tuple[float, Estimates]]) -> Estimates:
@@ -252,13 +258,8 @@ def _of_component(
         Coefficients of the fit, of which those of base columns move what the given model has.
     """
     effect, shape = component.effect, component.parameters
-    if component.given and moved is not None:
-        base = {column.coefficient.name: float(moved[k]) * column.coefficient.scale
-                for k, column in _present_at(fits, component)
-                if isinstance(column, PresentCoefficient)}
-        component = replace(component, given=tuple(
-            one + base.get(p.name, 0.0) for one, p in zip(
-                component.given, effect.coefficients, strict=True)))
+    if moved is not None:
+        component = _moved(fits, component, moved)
     prefix = '' if component.drive is None else f'{fits.design.drives[component.drive]}.'
     unit_of = _units(fits.design, component.drive)
     units = units_of(fits.design.given, component.drive)
@@ -288,6 +289,30 @@ def _of_component(
             unit_of(parameter.unit))
     return found, [prefix + name for name in fits.library.at_edge(
         component, fits.decisions.edge_share)]
+
+
+def _moved(fits: FittedSets, component: Component, coefficients: Array) -> Component:
+    """Return a component with what the given model has of it as base columns move it."""
+    if not component.given:
+        return component
+    base = {column.coefficient.name: float(coefficients[k]) * column.coefficient.scale
+            for k, column in _present_at(fits, component)
+            if isinstance(column, PresentCoefficient)}
+    return replace(component, given=tuple(
+        one + base.get(p.name, 0.0) for one, p in zip(
+            component.given, component.effect.coefficients, strict=True)))
+
+
+def _moments(component: Component, c: Array, covariance: Array) -> dict[str, Estimate]:
+    """Return the first moments of an added body by themselves; none of anything else."""
+    if not issubclass(component.effect, AddedBody):
+        return {}
+    total = dict(zip((one.name for one in component.effect.coefficients), component.total(c),
+                     strict=True))
+    units = {one.name: one.unit for one in component.effect.coefficients}
+    return {name: Estimate(float(total[name]), float(np.sqrt(covariance[k, k])), units[name])
+            for k, name in enumerate(component.names)
+            if name.rpartition('.')[2].startswith('moment_')}
 
 
 def _units(design: Design, drive: int | str | None) -> Callable[[str], str]:
