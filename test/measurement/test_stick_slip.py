@@ -48,3 +48,13 @@ def test_strokes_to_and_fro_do_not() -> None:
     velocity = np.gradient(position, STEP)
     effort = 3 * position + 0.5 * np.tanh(velocity / 0.01)
     assert find_stick_slip(TIME, position, effort) is None
+
+
+@pytest.mark.parametrize('depth', [0.7, 1.0, 1.3])
+def test_a_speed_that_goes_up_and_down_does_not(depth: float) -> None:
+    # A wave on a slow way, which comes to rest once in each of its periods, or nearly, or turns.
+    w = 2 * np.pi * 1.4
+    position = slow() + 0.06 * depth / w * np.sin(w * TIME)
+    velocity = np.gradient(position, STEP)
+    effort = 0.5 * np.tanh(velocity / 0.005) + 3 * np.gradient(velocity, STEP)
+    assert find_stick_slip(TIME, position, effort) is None

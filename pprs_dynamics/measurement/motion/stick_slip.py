@@ -21,8 +21,10 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.recording import Recording
 
 WINDOWS = (0.5, 1.0, 2.0, 4.0)  # over which a mean speed is taken, of several periods each [s]
-STUCK = 0.25  # of the mean speed, below which a drive stands
-LEAST_STUCK = 0.25  # share of the time in which it stands
+SLOW = 0.25  # of the mean speed, from which on a drive is no longer taken for standing
+# Share of a period in which a drive stays within a share of a slip's travel before the next slip:
+# a wave that just comes to rest once in its period stays there for a quarter of it.
+LEAST_STUCK, STANDING = 0.4, 0.02
 LEAST_SLIPS = 8
 REGULAR = 0.3  # spread of the periods over their median, up to which they are one oscillation
 FASTEST = 0.95  # quantile of the speeds of slips that counts as the fastest
@@ -93,12 +95,10 @@ def _within(time: Array, position: Array, effort: Array, step: float, window: fl
     mean = (position[2 * half:] - position[:-2 * half]) / (2 * half * step)
     velocity = np.gradient(position, step)[inner]
     moving = np.abs(mean) > LEAST_STEP * quantum / window
-    stuck = moving & (velocity * np.sign(mean) < STUCK * np.abs(mean))
+    stuck = moving & (velocity * np.sign(mean) < SLOW * np.abs(mean))
     slipping = moving & ~stuck
     begins = np.flatnonzero(stuck[:-1] & slipping[1:]) + 1
-    if len(begins) < LEAST_SLIPS or stuck.sum() < LEAST_STUCK * max(moving.sum(), 1):
-        return None
-    direction, level = np.sign(mean), effort[inner]
+    direction, level, at = np.sign(mean), effort[inner], position[inner]
     # From one slip to the next in the same direction, without a turn between.
     pairs = [(a, b) for a, b in pairwise(begins)
              if np.all(direction[a:b] == direction[a]) and np.all(moving[a:b])]
@@ -108,14 +108,15 @@ def _within(time: Array, position: Array, effort: Array, step: float, window: fl
     period = float(np.median(periods))
     if np.median(np.abs(periods - period)) > REGULAR * period / 2 or period > window * 1.5:
         return None
-    rises, falls, travels = [], [], []
+    rises, falls, travels, stood = [], [], [], []
     for a, b in pairs:
         end = a + int(np.argmax(stuck[a:b]))  # where the slip ends
         rises.append((level[b - 1] - level[min(end, b - 1)]) * direction[a])
         falls.append((level[min(end, b - 1)] - level[a]) * direction[a])
-        travels.append(abs(position[inner][b] - position[inner][a]))
+        travels.append(abs(at[b] - at[a]))
+        stood.append(np.mean(np.abs(at[a:b] - at[b - 1]) < STANDING * travels[-1]))
     travel = float(np.median(travels))
-    if (not np.median(rises) > 0 > np.median(falls)
+    if (not np.median(rises) > 0 > np.median(falls) or np.median(stood) < LEAST_STUCK
             or not LEAST_STEP * quantum < travel < LARGEST_STEP * np.ptp(position)):
         return None
     speed = float(np.quantile(np.array(travels) / periods, FASTEST))
