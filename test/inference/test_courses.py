@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import DriveModel, Recording
+from pprs_dynamics.inference.adoption.adopt import adopt
+from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
@@ -20,11 +22,15 @@ FORCES = MODEL.drive_forces(MOTION)
 START = 5.0  # [s], of the recording's clock: what is told counts from the recording's start
 
 
-def diagnosed(effort: np.ndarray, position: np.ndarray | None = None) -> Diagnosis:
+def recorded(effort: np.ndarray, position: np.ndarray | None = None) -> Recording:
     noise = 0.05 * np.random.default_rng(0).normal(size=effort.shape)
-    return diagnose(MODEL, [Recording.from_arrays(
+    return Recording.from_arrays(
         'changing', TIME + START,
-        FORCES.mechanism.position if position is None else position, None, effort + noise)])
+        FORCES.mechanism.position if position is None else position, None, effort + noise)
+
+
+def diagnosed(effort: np.ndarray, position: np.ndarray | None = None) -> Diagnosis:
+    return diagnose(MODEL, [recorded(effort, position)])
 
 
 def loaded(mass: float) -> np.ndarray:
@@ -47,6 +53,13 @@ def test_a_payload_that_is_picked_up_is_told_with_its_mass_and_its_moment(since:
     # The model that is returned has what is there at the end.
     assert found.adopted.values['effects.payload_mass.mass'] == pytest.approx(0.2, abs=0.004)
     assert np.nanstd(found.remaining) < 1.1 * 0.05 / np.sqrt(5)
+
+
+def test_what_begins_in_the_middle_is_not_adopted_throughout() -> None:
+    recording = recorded(np.where((TIME > 4.0)[:, None], loaded(0.2), FORCES.total))
+    answer = adopt(MODEL, EffectRequest.of('payload_mass'), [recording])
+    assert not answer.adopted
+    assert 'it is there since 4' in answer.reason
 
 
 def test_what_is_there_all_the_time_has_no_beginning() -> None:

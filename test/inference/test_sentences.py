@@ -43,6 +43,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     with_uncertainty,
 )
 from pprs_dynamics.inference.diagnosis.sentences import runner_up, set_rows, word_diagnosis
+from pprs_dynamics.inference.search.candidates import DRIFT, SINCE, Course
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.estimates import Calibration
 from pprs_dynamics.inference.search.patterns import OWN, PLATFORM
@@ -93,6 +94,17 @@ def test_an_effect_is_told_with_drive_values_errors_and_its_card() -> None:
     assert finding.confirm[1:-1] == card.confirm[1:]
     assert words.command == ('pprs adopt coulomb_friction RECORDING --output '
                              'with_coulomb_friction.yaml')
+
+
+@pytest.mark.parametrize(('kind', 'said'), [
+    (SINCE, 'hysteresis since 4 s'), (DRIFT, 'hysteresis, growing from nothing at the start')])
+def test_what_changes_within_a_recording_is_not_added_throughout(kind: str, said: str) -> None:
+    changing = made_up_diagnosis(effects=(
+        found_effect('hysteresis', course=Course(kind, 4.0, 15.0)),
+        found_effect('coulomb_friction')))
+    words = word_diagnosis(changing)
+    assert said in words.following
+    assert words.command == 'pprs diagnose SECOND_RECORDING'
 
 
 def test_blocks_are_told_as_the_weaker_evidence_and_another_recording_is_not() -> None:

@@ -36,6 +36,9 @@ OWN_SHARE = 1e-6  # of a column's whitened square, below which nothing tells its
 def of_other_effects(request: EffectRequest, fitted: EffectFit, diagnosis: Diagnosis) -> list[str]:
     """Return whether the recordings call for another effect, or for none."""
     mine = next((one for one in diagnosis.effects if one.name == request.name), None)
+    if mine is not None and mine.course is not None:
+        return [f'it is there{mine.when}, and a model has it throughout: record the machine as it '
+                'is now']
     if mine is not None:
         missed = [drive for drive in fitted.drives or () if drive not in (mine.drives or ())]
         if mine.drives and missed:

@@ -103,6 +103,11 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                 'transmission)', replace(files, recordings=(SECOND,)).command('diagnose'))
     if diagnosis.little:
         return first_step(diagnosis.model, files)
+    if changing := [f'{one.name}{one.when}' for one in diagnosis.effects if one.course is not None]:
+        # Fitted throughout it would be wrong at every moment.
+        return (f'Find out what happened to the machine ({"; ".join(changing)}). Then record it as '
+                'it is now, and diagnose that recording alone',
+                replace(files, recordings=(SECOND,)).command('diagnose'))
     repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
     if diagnosis.depends_on:
         if (curve := _curve(diagnosis)) is not None:
