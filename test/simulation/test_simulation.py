@@ -775,8 +775,8 @@ def test_stops_end_the_strokes() -> None:
 
 # House rules.
 
-# What a true motion, or a load, is handed over in; an arm's come from its model, and so do the numbers that
-# MuJoCo takes.
+# What a true motion, or a load, is handed over in; an arm's come from its model, and so do the
+# numbers that MuJoCo takes.
 CONTAINERS = (
     'pprs_dynamics.drives',
     'pprs_dynamics.physics.mechanism.motion', 'pprs_dynamics.physics.mechanism.joint_motion',
