@@ -58,7 +58,7 @@ def made_up_pages(folder: Path) -> dict[str, Page]:
         'diagnosis': diagnosis_page(diagnosis, words, made_up_residuals(), ['my run.mcap']),
         'comparison': comparison_page(
             DriveModel.load(), [], diagnosis.residuals, compare(diagnosis.residuals), ['so'],
-            'pprs diagnose run.mcap'),
+            ('Find out why', 'pprs diagnose run.mcap')),
         'adoption': _adoption(diagnosis.residuals), 'history': _history(),
         'experiment': _experiment(), 'fleet': _fleet(folder / 'store')}
 

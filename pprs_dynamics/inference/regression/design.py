@@ -291,7 +291,9 @@ class Design:
     def acts_on(self, effect: type[CatalogueEffect], drive: int) -> bool:
         """Return whether an effect may be looked for on a drive, there already or not."""
         return (issubclass(effect, DriveEffect) and self.given.offers(effect)
-                and (not effect.is_friction or self.moves(drive)))
+                and (not effect.is_friction or self.moves(drive))
+                and (not effect.needs_load or any(np.any(one.guide_load[:, drive])
+                                                  for one in self.recordings)))
 
     def present(self, effect: type[CatalogueEffect], drive: int | None,
                 ) -> Mapping[str, float] | None:

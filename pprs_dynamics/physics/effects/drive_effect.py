@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -81,6 +81,8 @@ class DriveEffect(CatalogueEffect):
     """
 
     acts_in = frozenset({PLATFORM, SINGLE_AXIS, ARM})
+    # Whether it follows the load of the guide, and is not there where that is not known.
+    needs_load: ClassVar[bool] = False
 
     def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
         self.drives = {drive: dict(values) for drive, values in drives.items()}

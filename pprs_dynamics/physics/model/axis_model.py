@@ -66,8 +66,11 @@ class AxisState(JointMotion):
 
     @property
     def guide_load(self) -> Array:
-        """What gear or screw carry, (N, 1) [N]; the weight on the guide is constant and unknown."""
-        return np.abs(self.transmitted)
+        """What gear or screw carry where weight acts along the axis, else 0, (N, 1) [N].
+
+        Without weight what rubs is preload and the weight on the guide, constant and unknown.
+        """
+        return np.abs(self.transmitted) if self.gravity else np.zeros_like(self.velocity)
 
     @property
     def transmitted(self) -> Array:

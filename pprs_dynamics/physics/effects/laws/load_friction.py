@@ -23,6 +23,7 @@ class LoadFriction(DriveEffect):
     name: ClassVar[str] = 'load_friction'
     is_friction: ClassVar[bool] = True
     at_one_load: ClassVar[str] = 'coulomb_friction'
+    needs_load: ClassVar[bool] = True
     linear = (Parameter('coefficient', 'dmu', '1', "friction coefficient beyond the model's",
                         -100.0, 100.0, scale=0.02),)
     unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}
