@@ -58,8 +58,8 @@ def without_remainders(search: Search, best: CandidateSet,
             and not search.is_beyond_point):
         return without_remainders(search, search.best)
     if remainders:
-        # What paid beside them only is not kept for their sake.
-        kept = fits.pruned(kept)
+        # What paid beside them only is not kept for their sake, and neither are shapes.
+        kept = fits.refined(fits.pruned(kept))
     names = {candidate.name for candidate in kept.candidates}
     return best, kept, tuple(one for one in remainders if one.candidate.name not in names)
 
