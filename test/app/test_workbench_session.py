@@ -209,7 +209,7 @@ def test_everything_on_the_screen_is_json(session: Session) -> None:
     found = json.loads(json.dumps(session.to_dict(), allow_nan=False))
     session.experiment = None
     assert found['experiment']['accuracy'] == [{'std_before': None}]
-    assert len(found['effects']) == 25
+    assert len(found['effects']) == 27
     assert found['errors']['lift_1']['now'] < found['errors']['lift_1']['before']
 
 

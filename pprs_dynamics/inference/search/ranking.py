@@ -198,9 +198,10 @@ class Ranking:
         An effect on other drives or in another shape is the same one; a body on another link is
         another.
         """
-        return min((self.without[candidate],
-                    *(one for one in self._judged if not _has(one, candidate))),
-                   key=lambda one: self.difference(one, self.best).total)
+        # Of one claim that was ranked by exact forces, these stand for all its sets.
+        others = [one for one in self._judged if not _has(one, candidate)
+                  and (_claims(one) not in self.exact or self._beyond_linear(one) is not None)]
+        return min((self.without[candidate], *others), key=lambda one: self.difference(one, self.best).total)
 
     def difference(self, found: CandidateSet, other: CandidateSet) -> CostTerms:
         """Return the terms of what a set costs more than another, exactly where both are known."""
