@@ -201,7 +201,8 @@ class Ranking:
         # Of one claim that was ranked by exact forces, these stand for all its sets.
         others = [one for one in self._judged if not _has(one, candidate)
                   and (_claims(one) not in self.exact or self._beyond_linear(one) is not None)]
-        return min((self.without[candidate], *others), key=lambda one: self.difference(one, self.best).total)
+        return min((self.without[candidate], *others),
+                   key=lambda one: self.difference(one, self.best).total)
 
     def difference(self, found: CandidateSet, other: CandidateSet) -> CostTerms:
         """Return the terms of what a set costs more than another, exactly where both are known."""
