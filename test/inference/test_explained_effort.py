@@ -28,6 +28,7 @@ def unrelated(model: ArmModel, seed: int = 5) -> Recording:
     knots = rng.normal(size=len(made.time) // 40 + 2) * UNRELATED
     effort = made.effort.copy()
     effort[:, 0] = np.interp(np.arange(len(made.time)) / 40, np.arange(len(knots)), knots)
+    effort[:, 0] += 0.2 * rng.normal(size=len(made.time))  # as measured, not computed
     return replace(made, effort=effort)
 
 
