@@ -173,6 +173,7 @@ def test_ticked_effects_go_to_running_nodes_and_the_error_falls(bench: Workbench
             page.tab.wait_for_function(
                 f'bench.live.{key} && Math.max(...bench.live.{key}) > {6 * NOISE}')
         page.tab.locator('#live-set').click()
+        page.tab.locator('#live-confirm[open]').wait_for()
         assert 'nodes /monitor, /feedforward; robot 3-PPRS' in page.tab.locator(
             '#live-machine').inner_text()
         page.tab.locator('#live-yes').click()

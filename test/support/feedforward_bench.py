@@ -24,6 +24,7 @@ from pprs_dynamics.ros.messages import conversions
 # Message fields are doubles and the model is deterministic: what remains is the rounding of
 # time_from_start, which the memoryless model does not use.
 EQUAL = 1e-12
+SOON, FORGOTTEN = 10.0, 30.0  # [s], for a status; until discovery forgets a killed node, and more
 
 
 class FeedforwardBench:
@@ -77,9 +78,14 @@ class FeedforwardBench:
         return list(self.commands[-1].data)
 
     def wait_for_status(self, **wanted: Any) -> dict[str, Any]:
-        """Return the first new status with these entries."""
+        """Return the first new status with these entries.
+
+        A node that an earlier test killed is a namesake until discovery forgets it, for 20 s, and
+        until then nothing is OK.
+        """
         found = self.bench.spin_until(lambda: all(
-            self.bench.status[-1].get(key) == value for key, value in wanted.items()))
+            self.bench.status[-1].get(key) == value for key, value in wanted.items()),
+            FORGOTTEN if wanted.get('code') == 'OK' else SOON)
         assert found, self.bench.status[-1]
         return self.bench.status[-1]
 
