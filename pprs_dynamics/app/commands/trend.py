@@ -29,6 +29,7 @@ def _limit(text: str) -> tuple[str, float]:
             f'{text!r} must be QUANTITY=NUMBER, such as coulomb_friction.force=2.0')
     return name, value
 
+
 EXAMPLE = 'pprs trend store --report trend.html'
 
 

@@ -485,4 +485,3 @@ def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, ba
         lines += [f'      # guessed: {note}' for note in guessed]
         lines += [f'      {line}' for line in columns]
     return '\n'.join(lines) + '\n'
-

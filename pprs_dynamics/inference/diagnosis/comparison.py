@@ -80,8 +80,9 @@ class DriveComparison:
         sure = np.sqrt((1 + DECISIONS.noise_accuracy) ** 2 - 1)
         if self.is_little:
             return 'poor'
-        if self.rms == 0 or self.relative < DECISIONS.negligible or (self.noise_floor is not None
-                             and max(self.unexplained, self.told) <= sure * self.noise_floor):
+        if self.rms == 0 or self.relative < DECISIONS.negligible or (
+                self.noise_floor is not None
+                and max(self.unexplained, self.told) <= sure * self.noise_floor):
             return 'noise'
         if np.isnan(self.relative) or self.unexplained > DECISIONS.poor * self.effort:
             return 'poor'

@@ -19,8 +19,6 @@ from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredC
 from pprs_dynamics.physics.model.arm_model import ArmModel
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
-    from collections.abc import Sequence
-
     from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
     from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
     from pprs_dynamics.physics.model.force_model import ForceModel

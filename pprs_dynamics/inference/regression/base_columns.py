@@ -142,7 +142,7 @@ def move_present(values: dict[str, Any], given: ForceModel, base: Sequence[BaseC
             prefix = f'effects.{kind.name}.' + (f'{drive}.' if drive else '')
             for parameter in kind.parameters:
                 values[prefix + parameter.name] = within(parameter, every[parameter.name],
-                                                           units_of(given, drive))
+                                                         units_of(given, drive))
 
 
 def present_values(effect: CatalogueEffect, drive: str | None) -> Mapping[str, float]:
@@ -155,7 +155,7 @@ def present_values(effect: CatalogueEffect, drive: str | None) -> Mapping[str, f
 
 
 def _coefficient_deviations(effect: CatalogueEffect, drive: str | None,
-                           known: Mapping[str, float]) -> dict[str, float]:
+                            known: Mapping[str, float]) -> dict[str, float]:
     """Return the standard deviations of an effect's coefficients by those of its parameters.
 
     Parameters

@@ -239,6 +239,7 @@ class Design:
         base: list[BaseColumn] = [
             ModelNumber(_rows(column), 1.0, number)
             for number, column in zip(sensitivities.numbers, stacked[NUMBERS], strict=True)]
+
         # Where a drive stands, friction that turns over otherwise is any constant force.
         def is_open(drive: int | None, number: int, column: Array) -> bool:
             if reversals is not None:
