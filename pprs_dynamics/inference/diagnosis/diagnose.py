@@ -226,20 +226,17 @@ def diagnose(
                           f'in {", ".join(one.name for one in recordings)}', 'move: a robot that '
                           'stands tells nothing of friction, masses or delays', 'shape')
     other = {} if as_it_is else looks_like(model, recordings)
-    if other:
-        answer = _Answer(without_search(model, recordings, decisions, report), validate, decisions,
-                         claims=False)
-        return replace(answer.diagnosis(()), verdict='unknown', depends_on=(), warnings=(),
-                       effort_looks_like=other)
-    sticking = {drive: one for drive, one in sticking_drives(recordings).items()
-                if one.share > decisions.stick_slip}
-    if sticking and not as_it_is:
-        # No law of the drive's own motion describes what its controller and its elasticity do.
-        answer = _Answer(without_search(model, recordings, decisions, report), validate, decisions,
-                         claims=False)
-        bare = answer.diagnosis(())
-        return replace(bare, verdict='unknown', warnings=(), stick_slip=sticking, depends_on=tuple(
-            word_stick_slip(drive, one, bare.residuals) for drive, one in sticking.items()))
+    # No law of the drive's own motion describes what its controller and its elasticity do.
+    sticking = {} if as_it_is or other else {
+        drive: one for drive, one in sticking_drives(recordings).items()
+        if one.share > decisions.stick_slip}
+    if other or sticking:
+        bare = _Answer(without_search(model, recordings, decisions, report), validate, decisions,
+                       claims=False).diagnosis(())
+        return replace(bare, verdict='unknown', warnings=(), effort_looks_like=other,
+                       stick_slip=sticking, depends_on=tuple(
+                           word_stick_slip(drive, one, bare.residuals)
+                           for drive, one in sticking.items()))
     answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share)),
                      validate, decisions)
     unconfirmed: list[FoundEffect] = []

@@ -200,21 +200,25 @@ class Ranking:
         """
         # Of one claim that was ranked by exact forces, these stand for all its sets.
         others = [one for one in self._judged if not _has(one, candidate)
-                  and (_claims(one) not in self.exact or self._beyond_linear(one) is not None)]
+                  and (_claims(one) not in self.exact or one in self._exact_costs)]
         return min((self.without[candidate], *others),
                    key=lambda one: self.difference(one, self.best).total)
 
     def difference(self, found: CandidateSet, other: CandidateSet) -> CostTerms:
         """Return the terms of what a set costs more than another, exactly where both are known."""
-        exact = [self._beyond_linear(one) for one in (found, other)]
-        more = [0.0 if None in exact else one or 0.0 for one in exact]
-        return found.terms - other.terms + CostTerms(linearisation=more[0] - more[1])
+        terms, exact = found.terms - other.terms, self._exact_costs
+        if found not in exact or other not in exact:
+            return terms
+        return terms + CostTerms(linearisation=(exact[found] - found.total)
+                                 - (exact[other] - other.total))
 
-    def _beyond_linear(self, found: CandidateSet) -> float | None:
-        """Return what a set of the shortlist costs more by its exact forces; None for others."""
-        claims = _claims(found)
-        first = next((one for one in self.sets if _claims(one) == claims), None)
-        return self.exact[claims] - found.total if claims in self.exact and found is first else None
+    @cached_property
+    def _exact_costs(self) -> Mapping[CandidateSet, float]:
+        """What the sets of the shortlist cost: of each claim the first."""
+        first: dict[frozenset[str], CandidateSet] = {}
+        for one in self.sets:
+            first.setdefault(_claims(one), one)
+        return {first[claims]: cost for claims, cost in self.exact.items() if claims in first}
 
     @property
     def _judged(self) -> list[CandidateSet]:

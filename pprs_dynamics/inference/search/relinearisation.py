@@ -113,10 +113,9 @@ def _exact_total(fits: FittedSets, best: CandidateSet) -> float:
     """Return the cost, by its exact forces, of what will be adopted of a set."""
     kept, _ = beyond_lack_of_fit(fits, best)
     try:
-        exact = exact_forces(fits.design, fitted_model(fits, kept))
+        return _by_exact_forces(fits, kept, fitted_model(fits, kept))
     except PprsError:
         return np.inf
-    return kept.total + squared(fits, kept, exact - linear_prediction(fits, kept))
 
 
 def _bent_in_vain(search: Search, best: CandidateSet) -> set[Place]:
@@ -362,8 +361,19 @@ def exact_cost(fits: FittedSets, found: CandidateSet) -> float:
         one = settled(fits, found)
         # Widths that are not settled are columns yet, and not the model's.
         model = fitted_model(fits, found) if one.fits is fits else one.model
-        exact = exact_forces(one.fits.design, model)
+        return (_by_exact_forces(one.fits, one.found, model) if one.found.is_admissible
+                else np.inf)
     except PprsError:
         return np.inf
-    return one.found.cost + squared(one.fits, one.found,
-                                    exact - linear_prediction(one.fits, one.found))
+
+
+def _by_exact_forces(fits: FittedSets, found: CandidateSet, model: ForceModel) -> float:
+    """Return J + |exact - linear|^2 of a set, whitened, with the exact forces of its model.
+
+    Raises
+    ------
+    PprsError
+        Where the model cannot follow the recordings.
+    """
+    return found.total + squared(
+        fits, found, exact_forces(fits.design, model) - linear_prediction(fits, found))
