@@ -86,14 +86,15 @@ def platform_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Ar
     plain = model.drive_forces(motion)
     state = plain.mechanism
     at = motion
-    if changed.position_error.any():
+    if changed.misreadings:
         # Positions are read with the error, so that the model is evaluated at another pose.
         poses = solve_forward_kinematics(model.robot.geometry,
-                                         state.position + changed.position_error)
+                                         state.position
+                                         + changed.position_error(state.position))
         at = PlatformMotion.from_poses(motion.time, poses.position, poses.orientation)
     forces = changed.drive_forces(at)
     added = changed.measured(forces).total - plain.total
-    if changed.position_error.any():
+    if changed.misreadings:
         added = -added
     drive = int(np.argmax((added ** 2).sum(axis=0)))
     return ({'time': motion.time, 'position': state.position[:, drive],

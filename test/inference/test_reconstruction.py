@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ConvergenceError, MotionError
 from pprs_dynamics.inference.residuals import reconstruction
-from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces, with_zeros
+from pprs_dynamics.inference.residuals.reconstruction import read_by, reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.differentiation import (
     SHORTEST_WINDOW,
@@ -336,9 +336,8 @@ def test_zeros_elsewhere_are_those_of_a_whole_new_reconstruction():
     moved = build_model({**MODEL.values, 'effects.active': ['homing_error'], **{
         f'effects.homing_error.{name}.zero': float(by)
         for name, by in zip(names, shift, strict=True)}})
-    assert_allclose(moved.position_error, shift)
-    whole, quick = reconstruct(moved, recording), with_zeros(
-        reconstruct(MODEL, recording), moved, shift)
+    assert_allclose(moved.position_error(np.zeros((1, 6)))[0], shift)
+    whole, quick = reconstruct(moved, recording), read_by(reconstruct(MODEL, recording), moved)
     assert_allclose(quick.position, whole.position, rtol=0, atol=1e-15)
     for name in ('position', 'linear_velocity', 'angular_velocity', 'linear_acceleration'):
         assert_allclose(getattr(quick.motion, name), getattr(whole.motion, name), rtol=0,

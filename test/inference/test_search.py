@@ -128,7 +128,8 @@ def recording_of(effects: dict[str, dict], noise: float = 0.08, seed: int = 0) -
     forces = model.drive_forces(Excitation().motion(TIME).with_time(TIME))
     said = model.measured(forces)
     rng = np.random.default_rng(seed)
-    return Recording.from_arrays('made', TIME, forces.mechanism.position + model.position_error,
+    return Recording.from_arrays('made', TIME, forces.mechanism.position
+                                 + model.position_error(forces.mechanism.position),
                                  effort=said.total + noise * rng.normal(size=said.total.shape))
 
 

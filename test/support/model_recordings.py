@@ -26,7 +26,8 @@ def record(model: DriveModel, noise: float = 0.0, seed: int = 0,
     said = model.measured(forces)
     rng = np.random.default_rng(seed)
     return Recording.from_arrays(
-        'made', TIME, forces.mechanism.position + model.position_error,
+        'made', TIME, forces.mechanism.position
+        + model.position_error(forces.mechanism.position),
         effort=said.total + noise * rng.normal(size=said.total.shape))
 
 

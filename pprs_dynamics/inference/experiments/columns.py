@@ -28,6 +28,7 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.sensitivities import (
     DRIVE_WIDTHS,
     HOMING,
+    INERTIA,
     NUMBERS,
     OF_DRIVES,
     OF_JOINTS,
@@ -203,7 +204,8 @@ class ColumnPlan:
                     Term(effect, None, {}, {d: treat(found[effect.name][:, part, d].T).T
                                             for d in range(len(self.model.drives))})
                     for effect in self._wanted if issubclass(effect, StructureEffect)),
-                homing=tuple(by_drive(column[part]) for column in found.get(HOMING, ())))
+                homing=tuple(by_drive(column[part]) for column in found.get(HOMING, ())),
+                inertia=tuple(by_drive(column[part]) for column in found.get(INERTIA, ())))
             base = [design.present_rows(one) if isinstance(
                         one, (PresentCoefficient, PresentShape))
                     else _felt(one, by_drive(shared[k][part])) for k, one in enumerate(self.base)]
@@ -240,7 +242,8 @@ class ColumnPlan:
         means = treat(total)
         residuals = Residuals(self.model.drives, treat(time), np.zeros(len(means), dtype=int),
                               means, means, period=float(time[1] - time[0]) * block)
-        return Design(self.given, self.model, residuals, (full,), (), (), (), (), (), means)
+        return Design(self.given, self.model, residuals, (full,), (), (), (), (), (), (),
+                      means)
 
     def _by_drive(self, base: Sequence[Rows], design: Design) -> Columns:
         """Return base columns and those of the terms, drive by drive."""

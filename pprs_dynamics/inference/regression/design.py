@@ -39,6 +39,7 @@ from pprs_dynamics.inference.regression.collecting import (
 from pprs_dynamics.inference.regression.sensitivities import (
     BARE,
     HOMING,
+    INERTIA,
     NUMBERS,
     OF_DRIVES,
     OF_JOINTS,
@@ -46,7 +47,12 @@ from pprs_dynamics.inference.regression.sensitivities import (
 )
 from pprs_dynamics.inference.regression.terms import FullRate, OperatingPoint, Term
 from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
-from pprs_dynamics.inference.residuals.reconstruction import Reconstruction, reconstruct, with_zeros
+from pprs_dynamics.inference.residuals.reconstruction import (
+    Reconstruction,
+    misread,
+    read_by,
+    reconstruct,
+)
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.added_body import AddedBody
@@ -61,9 +67,11 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
+from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
 
+SHARE = 0.1  # of what a model has of an effect that shifts positions, for derivatives
 SHAPE_STEP = 1e-3  # amount of movement, for derivatives by shape parameters
 LONGEST_DELAY = 0.3  # [s], that a recording may show at once
 # By how many of its standard deviations a number of an effect may have been fitted wrong as long as
@@ -90,6 +98,8 @@ class Design:
         Effects that are not in single drives, those of the given model among them.
     homing : tuple of dict of drive to (M,) array
         Change of all forces per metre that a drive is measured too far [N/m].
+    inertia : tuple of dict of drive to (M,) array
+        And per acceleration that it is measured too much [N s^2/m].
     notes : tuple of str
     reconstructions : tuple of Reconstruction
     forces : (M, D) array
@@ -107,12 +117,13 @@ class Design:
     base: tuple[BaseColumn, ...]
     structure: tuple[Term, ...]
     homing: tuple[Mapping[int, Array], ...]
+    inertia: tuple[Mapping[int, Array], ...]
     notes: tuple[str, ...]
     reconstructions: tuple[Reconstruction, ...] = field(repr=False)
     forces: Array = field(repr=False)
     point: OperatingPoint | None = None
     joining: str = ''
-    _moved: dict[bytes, tuple[Reconstruction, ...]] = field(
+    _moved: dict[tuple[Any, ...], tuple[Reconstruction, ...]] = field(
         default_factory=dict, repr=False, compare=False)
     _own_rows: dict[tuple[type[CatalogueEffect], int], Array] = field(
         default_factory=dict, repr=False, compare=False)
@@ -185,15 +196,13 @@ class Design:
         return replace(design, residuals=residuals, point=point)
 
     def reconstructed(self, model: ForceModel) -> tuple[Reconstruction, ...]:
-        """Return the motion of the recordings with the zeros that a model's drives have."""
-        shift = model.position_error - self.model.position_error
-        if not np.any(shift):
+        """Return the motion of the recordings as a model's encoders tell it."""
+        if model.misreadings == self.model.misreadings:
             return self.reconstructions
-        key = np.asarray(shift).tobytes()
+        key = tuple((one.name, repr(one.drives)) for one in model.misreadings)
         if key not in self._moved:
             self._moved.clear()
-            self._moved[key] = tuple(with_zeros(one, model, shift)
-                                     for one in self.reconstructions)
+            self._moved[key] = tuple(read_by(one, model) for one in self.reconstructions)
         return self._moved[key]
 
     @classmethod
@@ -233,8 +242,10 @@ class Design:
                  _by_drive(stacked[BARE + name], count) if BARE + name in stacked else None)
             for name, effect in (
                 *((effect.name, effect) for effect in sensitivities.searched), *there))
-        homing = tuple(dict(enumerate(column)) for column in stacked.get(HOMING, ()))
-        design = cls(given, model, residuals, tuple(full), (), structure, homing, tuple(notes),
+        homing, inertia = (tuple(dict(enumerate(column)) for column in stacked.get(name, ()))
+                           for name in (HOMING, INERTIA))
+        design = cls(given, model, residuals, tuple(full), (), structure, homing, inertia,
+                     tuple(notes),
                      reconstructions, residuals.model, joining=joining)
         base: list[BaseColumn] = [
             ModelNumber(_rows(column), 1.0, number)
@@ -388,13 +399,63 @@ class Design:
         """Return an effect on one drive, of one shape."""
         if effect.shifts_positions():
             assert issubclass(effect, MeasurementEffect)
-            units = [effect({self.drives[drive]: effect.from_coefficients(
-                {c.name: float(c is unit) for c in effect.coefficients})}).position_error(
-                    self.drives) for unit in effect.coefficients]
-            every = {d: np.stack([sum(shift[k] * self.homing[k][d] for k in np.flatnonzero(shift))
-                                  for shift in units]) for d in range(len(self.drives))}
-            return Term(effect, drive, dict(shape), every)
+            return Term(effect, drive, dict(shape), self._misread_rows(effect, drive, shape))
         return Term(effect, drive, dict(shape), {drive: self.drive_rows(effect, drive, shape)})
+
+    def _misread_rows(self, effect: type[MeasurementEffect], drive: int,
+                      shape: Mapping[str, float]) -> dict[int, Array]:
+        """Return what positions of a drive that are measured wrong do to all, (k, M) by drive.
+
+        By steps, since what a play does is not in proportion to it: of `scale`, and around a model
+        that has the effect of `SHARE` of what it has.
+        """
+        name, friction = self.drives[drive], self.friction()
+        there = next((one for one in self.model.effects
+                      if isinstance(one, effect) and name in one.drives), None)
+        known = {} if there is None else effect.to_coefficients(there.drives[name])
+        width = float(self.model.reversal.widths(len(self.drives))[drive])
+
+        def error(values: Mapping[str, float]) -> list[Array]:
+            one = effect({name: {**effect.from_coefficients(values), **shape}})
+            found = []
+            for recording, read in zip(self.recordings, self.reconstructions or [None],
+                                       strict=True):
+                q, q_dot, q_ddot = self._misread(one, recording, read, drive)
+                q = q + one.loaded_position_error(
+                    (name,), recording.transmitted[:, [drive]])[:, 0]
+                v = recording.velocity[:, drive]
+                own = np.zeros_like(v)
+                if friction is not None and np.any(q_dot):
+                    turned = smooth_sign(v - q_dot, width) - recording.direction[:, drive]
+                    own = (friction.dry(recording.guide_load)[:, drive] * turned
+                           - np.broadcast_to(friction.viscous, len(self.drives))[drive] * q_dot)
+                found.append(np.stack((q, q_ddot, own)))
+            return found
+
+        rows: list[dict[int, Array]] = []
+        for c in effect.coefficients:
+            before = {one.name: known.get(one.name, 0.0) for one in effect.coefficients}
+            step = max(SHARE * abs(before[c.name]), SHARE * c.scale) if there else c.scale
+            after = error({**before, c.name: before[c.name] + step})
+            change = ([b - a for a, b in zip(error(before), after, strict=True)]
+                      if there else after)
+            q, q_ddot, own = np.concatenate(
+                [one.treat(each.T).T for one, each in zip(self.recordings, change, strict=True)],
+                axis=1) / step
+            rows.append({d: self.homing[drive][d] * q + self.inertia[drive][d] * q_ddot
+                         + own * (d == drive) for d in range(len(self.drives))})
+        return {d: np.stack([one[d] for one in rows]) for d in range(len(self.drives))}
+
+    def _misread(self, effect: MeasurementEffect, recording: FullRate,
+                 read: Reconstruction | None, drive: int) -> tuple[Array, Array, Array]:
+        """Return the errors of a drive's position and rates, (N,); of a planned motion its own."""
+        name = self.drives[drive]
+        if read is not None:
+            q, q_dot, q_ddot = misread([effect], (name,), read.recorded, read.read, drive)
+            return q[:, 0], q_dot[:, 0], q_ddot[:, 0]
+        planned = effect.position_error((name,), recording.position[:, [drive]])[:, 0]
+        rate = np.gradient(planned, recording.time)
+        return planned, rate, np.gradient(rate, recording.time)
 
     def find_term(self, effect: type[CatalogueEffect], drive: int | None,
                   shape: Mapping[str, float]) -> Term:

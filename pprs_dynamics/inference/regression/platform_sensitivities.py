@@ -70,6 +70,13 @@ class PlatformSensitivities(Sensitivities):
             self.model.mechanism(s.motion)).total
         return change
 
+    def accelerated(self, state: Any, samples: np.typing.NDArray[np.int_], change: Array) -> Array:
+        """Return the efforts of the bodies with other accelerations at samples (n,), (n, 6)."""
+        motion = platform_rates(self.model.robot.geometry, state.motion[samples],
+                                state.velocity[samples], state.acceleration[samples] + change)
+        efforts: Array = self.model.mechanism(motion).rigid_force
+        return efforts
+
     def of_homing(self, state: MechanismState, reference: Array) -> Array:
         """Return the change per metre that each drive's position is too large, (6, N, 6) [N/m]."""
         from scipy.spatial.transform import Rotation

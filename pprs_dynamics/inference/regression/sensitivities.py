@@ -24,6 +24,7 @@ from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
@@ -32,12 +33,14 @@ from pprs_dynamics.physics.model.model_file import build_model
 RELATIVE_STEP = 1e-3
 DEVIATIONS = 2.5
 HOMING_STRIDE = 5  # samples; columns of wrong zeros change slowly between reversals
+INERTIA_STRIDE = 20  # samples; inertia changes with the pose alone
 # Friction that turns over in another width than the model's is no effect: multiples of the
 # width whose differences span what is between 0.2 and 5 times the model's.
 DRIVE_WIDTHS = (0.2, 0.5, 2.0, 5.0)
 PASSIVE_WIDTHS = (0.05, 0.25, 4.0)
 # Names of columns; those of effects outside the drives have the effects' names.
 NUMBERS, HOMING, PRESENT, BARE = 'numbers', 'homing', 'present ', 'bare '
+INERTIA = 'inertia'
 OF_DRIVES, OF_JOINTS = 'drive widths', 'passive widths'
 
 
@@ -140,7 +143,7 @@ class Sensitivities(ABC):
         `NUMBERS` per standard deviation by which each number grows away from 0; `OF_DRIVES` what
         other widths of turning over would change in every drive, and last a part that is alike
         in both directions; `OF_JOINTS` the former in all passive joints; `HOMING` per metre that
-        each drive is measured too far; the coefficients of each effect of `searched` by its name,
+        each drive is measured too far, `INERTIA` per acceleration; the coefficients of each effect of `searched` by its name,
         and after `BARE` as they were if friction did not follow the loads; those of effects
         that the given model has by their names after `PRESENT`. What a kind of model does not have
         is left out.
@@ -161,6 +164,7 @@ class Sensitivities(ABC):
         homing = self.of_homing(state, reference) if self.homing_stride else None
         if homing is not None:
             columns[HOMING] = homing
+            columns[INERTIA] = self._of_inertia(state)
         for effect in self.searched:
             columns[effect.name], bare = self._of_structure(effect, state, reference)
             if issubclass(effect, BodyEffect):
@@ -192,6 +196,31 @@ class Sensitivities(ABC):
         reference : (N, D) array
             Efforts there.
         """
+
+    def accelerated(self, state: Any, samples: np.typing.NDArray[np.int_], change: Array) -> Array:
+        """Return the efforts of the bodies with other accelerations at samples (n,), (n, D).
+
+        Parameters
+        ----------
+        state : MechanismState or LinkageState
+        samples : (n,) int array
+        change : (D,) array
+            [m/s^2, rad/s^2]
+        """
+        efforts: Array = self.model.mechanism(JointMotion(
+            state.position[samples], state.velocity[samples],
+            state.acceleration[samples] + change)).rigid_force
+        return efforts
+
+    def _of_inertia(self, state: Any) -> Array:
+        """Return the change per acceleration that each drive is measured too much, (D, N, D)."""
+        every = np.arange(len(state.velocity))
+        samples = every[min(self.homing_stride // 2, len(every) - 1)::INERTIA_STRIDE]
+        count = len(self.model.drives)
+        before = self.accelerated(state, samples, np.zeros(count))
+        return np.stack([np.stack([np.interp(every, samples, one) for one in (
+            before - self.accelerated(state, samples, unit)).T], axis=1)
+            for unit in np.eye(count)])
 
     def sensed(self, column: Array, state: Any) -> Array:
         """Return what the model's sensors make of a change of the drives' forces, (N, D)."""

@@ -96,7 +96,7 @@ def forces_on(model: ForceModel, motion: DriveMotion, time: Array) -> Array | No
 
     That the mechanism cannot follow a motion says as much as its forces: nothing is raised.
     """
-    moved = replace(motion, position=motion.position - model.position_error)
+    moved = replace(motion, position=motion.position - model.position_error(motion.position))
     found = np.empty_like(motion.position)
     with np.errstate(all='ignore'):
         try:

@@ -190,8 +190,9 @@ class LiveComparison:
 
     def _forces(self, samples: list[LiveSample]) -> Array:
         model: Any = self._model
+        position = np.stack([sample.position for sample in samples])
         motion = self._followed(
-            np.stack([sample.position for sample in samples]) - model.position_error,
+            position - model.position_error(position),
             np.stack([sample.velocity for sample in samples]),
             np.stack([sample.acceleration for sample in samples]))
         forces = model.drive_forces(

@@ -295,7 +295,8 @@ def _rigid_parts(model: ForceModel, excerpt: Excerpt) -> tuple[Array, Array]:
     """Return the model's forces by inertia and by gravity on an excerpt, (N, D) each."""
     bodies = {RIGID_BODY, DriveInertia.name, *(
         one.name for one in model.effects if isinstance(one, BodyEffect))}
-    moved = replace(excerpt.motion, position=excerpt.motion.position - model.position_error)
+    position = excerpt.motion.position
+    moved = replace(excerpt.motion, position=position - model.position_error(position))
     still = np.zeros_like(moved.velocity)
     forces = []
     for motion in (moved, replace(moved, velocity=still, acceleration=still)):

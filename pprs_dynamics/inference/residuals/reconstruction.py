@@ -21,9 +21,14 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ConvergenceError, MotionError
 from pprs_dynamics.measurement.files.samples import Progress
-from pprs_dynamics.measurement.motion.drive_motion import DriveMotion, smooth_drives
+from pprs_dynamics.measurement.motion.drive_motion import (
+    DriveMotion,
+    smooth_drives,
+    smoothed_as,
+)
 from pprs_dynamics.measurement.motion.rests import find_rests
 from pprs_dynamics.measurement.motion.treatment import Treatment
+from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.arm_model import ArmModel
@@ -108,6 +113,10 @@ class Reconstruction(DriveMotion):
         Samples of the recording's segments that are not here: edges and short segments.
     start : float
         Time of the recording's first sample, which may be dropped here [s].
+    recorded : Recording
+        What it is of.
+    read : DriveMotion
+        The motion of the drives as their encoders say.
     """
 
     time: Array
@@ -119,6 +128,8 @@ class Reconstruction(DriveMotion):
     gain: Array
     dropped: int
     start: float
+    recorded: Recording
+    read: DriveMotion
 
     def __len__(self) -> int:
         return len(self.time)
@@ -253,11 +264,9 @@ def reconstruct(
         drives = smooth_drives(recording, window, model.blocks_per_period, unit)
     else:
         drives = smooth_drives(recording, window)
-    if isinstance(model, ForceModel) and np.any(model.position_error):
-        drives = replace(drives, position=drives.position - model.position_error)
-    time, total = recording.time[drives.index], len(drives.index)
+    read, time, total = drives, recording.time[drives.index], len(drives.index)
     effort = _efforts(model, recording)[drives.index]
-    followed = follow(model, time, drives, progress)
+    drives, followed = _followed_rightly(model, recording, read, time, progress)
     dropped = sum(part.stop - part.start for part in recording.segments) - total
     notes = [*drives.notes, f'{dropped} samples are dropped: half a window at the ends of '
              f'{len(drives.segments)} segments, what fills no block, and segments too short',
@@ -273,31 +282,58 @@ def reconstruct(
         **vars(drives), time=time, motion=followed.motion, effort=effort,
         treat=Treatment(drives.block_starts, total), near_branch=followed.near_branch,
         jumps=followed.jumps, gain=_applied_gain(recording), dropped=dropped,
-        start=float(recording.time[0]))
+        start=float(recording.time[0]), recorded=recording, read=read)
 
 
-def with_zeros(found: Reconstruction, model: ForceModel, shift: Array) -> Reconstruction:
-    """Return the same reconstruction with the drives' zeros elsewhere.
+def read_by(found: Reconstruction, model: ForceModel) -> Reconstruction:
+    """Return the same reconstruction with the drives where another model's encoders are.
 
     Smoothing and blocks do not depend on them.
-
-    Parameters
-    ----------
-    found : Reconstruction
-    model : ForceModel
-        Whose kinematics to use.
-    shift : (D,) array
-        By which positions are less now [m].
 
     Raises
     ------
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    moved = replace(found, position=found.position - shift)
-    followed = follow(model, found.time, moved)
-    return replace(moved, motion=followed.motion, near_branch=followed.near_branch,
-                   jumps=followed.jumps)
+    drives, followed = _followed_rightly(model, found.recorded, found.read, found.time)
+    return replace(found, position=drives.position, velocity=drives.velocity,
+                   acceleration=drives.acceleration, motion=followed.motion,
+                   near_branch=followed.near_branch, jumps=followed.jumps)
+
+
+def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recording: Recording,
+            read: DriveMotion, drive: int | None = None) -> tuple[Array, Array, Array]:
+    """Return the errors of position, velocity and acceleration that were measured, (N, D) each.
+
+    Smoothed as these are; of one drive (N, 1).
+    """
+    def error(position: Array) -> Array:
+        position = position if drive is None else position[:, [drive]]
+        return np.sum([one.position_error(names, position) for one in effects], axis=0)
+
+    return smoothed_as(read, recording, error)
+
+
+def _followed_rightly(
+    model: ForceModel | Geometry, recording: Recording, read: DriveMotion, time: Array,
+    progress: Progress | None = None,
+) -> tuple[DriveMotion, FollowedMotion]:
+    """Return the true motion of the drives, and of what they move, behind that which was read."""
+    if not isinstance(model, ForceModel) or not model.misreadings:
+        return read, follow(model, time, read, progress)
+    q, q_dot, q_ddot = misread(model.misreadings, model.drives, recording, read)
+    drives = replace(read, position=read.position - q, velocity=read.velocity - q_dot,
+                     acceleration=read.acceleration - q_ddot)
+    followed = follow(model, time, drives, progress)
+    if not np.any(model.loaded_position_error(np.ones((1, len(model.drives))))):
+        return drives, followed
+    # Loads hardly change by what they do to positions: one step is enough.
+    error = np.concatenate([
+        model.loaded_position_error(model.mechanism(
+            followed.motion[start:start + CHUNK]).transmitted)
+        for start in range(0, len(time), CHUNK)])
+    drives = replace(drives, position=drives.position - error)
+    return drives, follow(model, time, drives, progress)
 
 
 def _applied_gain(recording: Recording) -> Array:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -133,6 +133,32 @@ def smooth_drives(recording: Recording, window: float | None = None,
     return DriveMotion(
         q, q_dot, q_ddot, np.concatenate(index), spans, np.concatenate(block_starts),
         block or block_length(longest.step, duration), smoothing, recorded, tuple(notes))
+
+
+def smoothed_as(motion: DriveMotion, recording: Recording,
+                made: Callable[[Array], Array]) -> tuple[Array, Array, Array]:
+    """Return what is made of measured positions, with its rates, (N, D) each, as these are.
+
+    Parameters
+    ----------
+    motion : DriveMotion
+        Whose samples and smoothing are taken.
+    recording : Recording
+    made : callable
+        Takes the positions of a segment at equal steps, (n, D), and returns as many.
+    """
+    parts = []
+    for span in motion.segments:
+        first, last = int(motion.index[span.start]), int(motion.index[span.stop - 1])
+        part = next(one for one in recording.segments if one.start <= first < one.stop)
+        grid, _ = find_grid(recording.time[part], recording.position[part])
+        filter_ = motion.smoothing.polynomial(grid.step)
+        kept = slice(first - part.start, last + 1 - part.start)
+        values = made(grid.at_steps(recording.position[part]))
+        parts.append([grid.at_samples(one, filter_.half, kept)
+                      for one in filter_.differentiated(values)])
+    q, q_dot, q_ddot = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return q, q_dot, q_ddot
 
 
 def _grids(

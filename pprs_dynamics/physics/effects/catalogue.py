@@ -35,6 +35,7 @@ from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
 from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
 from pprs_dynamics.physics.effects.laws.link_mass import LinkMass
 from pprs_dynamics.physics.effects.laws.load_friction import LoadFriction
+from pprs_dynamics.physics.effects.laws.lost_motion import LostMotion
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.effects.laws.payload_offset import PayloadOffset
@@ -78,6 +79,7 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         JointFrictionEffect,
         LinkMass,
         LoadFriction,
+        LostMotion,
         PayloadMass,
         PayloadOffset,
         PlatformDrag,

@@ -237,11 +237,32 @@ class MeasurementEffect(DriveEffect):
     def shifts_positions(cls) -> bool:
         """Return whether measured positions are not the true ones: all drives feel that."""
         unit = cls({AXIS: {p.name: p.scale for p in cls.parameters}})
-        return bool(np.any(unit.position_error((AXIS,))))
+        return bool(np.any(unit.position_error((AXIS,), np.zeros((1, 1))))
+                    or np.any(unit.loaded_position_error((AXIS,), np.ones((1, 1)))))
 
-    def position_error(self, drives: Sequence[str]) -> Array:
-        """Return the errors of measured positions [m], to be subtracted, (D,)."""
-        return np.zeros(len(drives))
+    def position_error(self, drives: Sequence[str], position: Array) -> Array:
+        """Return the errors of measured positions, to be subtracted, (N, D) [m, rad].
+
+        Parameters
+        ----------
+        drives : sequence of str
+        position : (N, D) array
+            Consecutive samples as measured: velocities and accelerations have the error's.
+        """
+        return np.zeros_like(position)
+
+    def loaded_position_error(self, drives: Sequence[str], transmitted: Array) -> Array:
+        """Return the errors of measured positions that loads make, (N, D) [m, rad].
+
+        They are not those of a motion: velocities and accelerations are as measured.
+
+        Parameters
+        ----------
+        drives : sequence of str
+        transmitted : (N, D) array
+            What gears or screws pass on to the mechanism [N, N m].
+        """
+        return np.zeros_like(transmitted)
 
     def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
                memory: Any = None) -> Array:

@@ -140,8 +140,8 @@ def _sensor_columns(result: Any, effect: type[DriveEffect], _: Any, effort: Arra
     return tuple(_finite(_array(column, effort.shape), (effort,)) for column in columns)
 
 
-def _position_error(result: Any, _: Any, __: Any, drives: Sequence[str]) -> Array:
-    return _finite(_array(result, (len(drives),)), ())
+def _position_error(result: Any, _: Any, __: Any, ___: Any, given: Array) -> Array:
+    return _finite(_array(result, given.shape), (given,))
 
 
 def _averaged(
@@ -236,6 +236,7 @@ CHECKS: dict[str, Callable[..., Any]] = {
     'to_coefficients': _coefficients, 'from_coefficients': _parameters,
     'drive_memory': _any, 'begin': _any, 'initial_memory': _memory, 'continued_memory': _memory,
     'columns': _columns, 'force': _force, 'sensed': _sensed, 'sensor_columns': _sensor_columns,
-    'position_error': _position_error, 'shifts_positions': _any,
+    'position_error': _position_error,
+    'loaded_position_error': _position_error, 'shifts_positions': _any,
     'changed': _robot, 'load': _load, 'apply': _state,
     'trials': _shapes, 'alternatives': _shapes, 'averaged': _averaged}

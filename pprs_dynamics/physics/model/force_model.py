@@ -461,8 +461,17 @@ class ForceModel(ABC):
         return replace(forces, total=total, parts=parts)
 
     @property
-    def position_error(self) -> Array:
-        """Errors of measured drive positions [m], to be subtracted, (D,)."""
-        errors = [effect.position_error(self.drives) for effect in self.effects
-                  if isinstance(effect, MeasurementEffect)]
-        return np.sum(errors, axis=0) if errors else np.zeros(len(self.drives))
+    def misreadings(self) -> tuple[MeasurementEffect, ...]:
+        """Effects because of which drives are elsewhere than their encoders say."""
+        return tuple(effect for effect in self.effects
+                     if isinstance(effect, MeasurementEffect) and effect.shifts_positions())
+
+    def position_error(self, position: Array) -> Array:
+        """Return the errors of measured positions (N, D), to be subtracted, but those by load."""
+        errors = [one.position_error(self.drives, position) for one in self.misreadings]
+        return np.sum(errors, axis=0) if errors else np.zeros_like(position)
+
+    def loaded_position_error(self, transmitted: Array) -> Array:
+        """Return the errors of measured positions by what gears pass on, (N, D)."""
+        errors = [one.loaded_position_error(self.drives, transmitted) for one in self.misreadings]
+        return np.sum(errors, axis=0) if errors else np.zeros_like(transmitted)

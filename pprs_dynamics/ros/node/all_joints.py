@@ -44,7 +44,7 @@ class AllJoints:
             return None
         if isinstance(tree := self._made[0], PprsError):
             raise tree
-        return tree.names, tree.at(position - model.position_error)
+        return tree.names, tree.at(position - model.position_error(position[None])[0])
 
 
 def _make(model: ForceModel, position: Array, made: list[TreePositions | PprsError]) -> None:

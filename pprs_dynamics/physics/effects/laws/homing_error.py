@@ -50,6 +50,7 @@ class HomingError(MeasurementEffect):
         'move to the zero marks of the arm; measure an angle with a level',
         'Merlet, Parallel Robots, 2006')
 
-    def position_error(self, drives: Sequence[str]) -> Array:
-        """Return z of each drive [m], (D,)."""
-        return np.array([self.drives.get(name, {}).get('zero', 0.0) for name in drives])
+    def position_error(self, drives: Sequence[str], position: Array) -> Array:
+        """Return z of each drive, the same at every sample, (N, D) [m, rad]."""
+        zeros = np.array([self.drives.get(name, {}).get('zero', 0.0) for name in drives])
+        return np.broadcast_to(zeros, position.shape)

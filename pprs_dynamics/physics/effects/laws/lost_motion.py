@@ -1,0 +1,164 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Lost motion between encoder and link: the encoder is not where the link is.
+
+The encoder reads q + e. With backlash, e is half of it towards the side to which the load pushes
+the gear, b / 2 sgn(tau): the link falls from one flank to the other while the motor, and with it
+the encoder, goes on as before. With play, the link stays behind at reversals: the encoder first
+travels all of the play without it, and what the link does meanwhile no encoder says; it is taken
+to pass smoothly from its motion before to that after. With windup, e grows with the load, c tau.
+
+References
+----------
+M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38,
+2002.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+
+# On either side of the travel through the play, of its length: there the link's speed is read.
+MARGIN = 0.5
+
+
+class LostMotion(MeasurementEffect):
+    """Backlash, play or windup of what is between an encoder and the link that it is to measure."""
+
+    name: ClassVar[str] = 'lost_motion'
+    acts_in = frozenset({PLATFORM, ARM})
+    idealised: ClassVar[bool] = False
+    bends_columns: ClassVar[bool] = True
+    linear = (
+        Parameter('backlash', 'b', 'm', 'distance between the flanks, of which the load chooses '
+                  'one', -0.1, 0.1, 0.0, 5e-4, turning=(-0.5, 0.5)),
+        Parameter('play', 'b_r', 'm', 'travel of the encoder without the link at each reversal',
+                  -0.1, 0.1, 0.0, 5e-4, turning=(-0.5, 0.5)),
+        Parameter('windup', 'c', 'm/N', 'by which the encoder leads per load', -1.0, 1.0, 0.0,
+                  1e-6))
+    variants = (('backlash',), ('play',), ('windup',))
+    unphysical_below: ClassVar[Mapping[str, float]] = {
+        'backlash': 0.0, 'play': 0.0, 'windup': 0.0}
+    card = Card(
+        'measured position = q + e, e = b sgn(tau) / 2 + c tau, or b_r / 2 before and -b_r / 2 '
+        'after a reversal',
+        'weight and inertia as of a drive that stands aside, to another side where the load '
+        'changes sign; with play a burst at each reversal, where the encoder moves fast and the '
+        'drive does not, which looks like a delay or like hysteresis',
+        'worn teeth, a loose coupling, key or belt, a nut with clearance, an encoder on the motor; '
+        'a shaft, belt or harmonic drive that winds up',
+        'lock the motor and move the link to and fro by hand with a dial gauge on it: what it '
+        'moves freely is backlash, what it gives per force is windup; reverse slowly and watch '
+        'when the link follows the encoder',
+        'Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica '
+        '38, 2002')
+
+    def position_error(self, drives: Sequence[str], position: Array) -> Array:
+        """Return how far encoders are ahead because of play, (N, D) [m, rad]."""
+        error = np.zeros_like(position)
+        for name, values in self.drives.items():
+            if values['play'] and name in drives:
+                k = drives.index(name)
+                error[:, k] = position[:, k] - behind_play(position[:, k], values['play'])
+        return error
+
+    def loaded_position_error(self, drives: Sequence[str], transmitted: Array) -> Array:
+        """Return how far encoders are ahead because of loads, (N, D) [m, rad]."""
+        error = np.zeros_like(transmitted)
+        for name, values in self.drives.items():
+            if name in drives:
+                k = drives.index(name)
+                error[:, k] = (values['backlash'] / 2 * np.sign(transmitted[:, k])
+                               + values['windup'] * transmitted[:, k])
+        return error
+
+
+def behind_play(position: Array, play: float) -> Array:
+    """Return where a link is that an encoder moves through a play, (N,).
+
+    While the encoder travels through the play the link passes smoothly, by a cubic, from its
+    motion before to that after. Of a negative play, in the encoder's own coupling, the link leads
+    the encoder.
+
+    Parameters
+    ----------
+    position : (N,) array
+        Of the encoder [m, rad].
+    play : float
+        [m, rad]
+    """
+    width = abs(play)
+    turns = reversals(position, width)
+    if not turns:
+        return position.copy()
+    link = position + play / 2 * turns[0][2]  # before the first of them
+    lasts = [0, *(end for _, end, _ in turns)]
+    nexts = [*(start for start, _, _ in turns[1:]), len(position) - 1]
+    for (start, end, side), last, following in zip(turns, lasts, nexts, strict=False):
+        link[start:] = position[start:] - play / 2 * side
+        margin = int(MARGIN * (end - start)) + 1
+        a, z = max(start - margin, last), min(end + margin, following)
+        link[start:end] = position[start] + play / 2 * side
+        if a < start and z > end:
+            _bridge(link, position, a, start, end, z, play / 2 * side)
+    return link
+
+
+def _bridge(link: Array, position: Array, a: int, start: int, end: int, z: int, half: float,
+            ) -> None:
+    """Have a link go from sample a to z by a cubic, at the speeds before and after."""
+    n = z - a
+    before, after = position[a] + half, position[z] - half
+    reach_before = max(1, min(start - a, a))
+    reach_after = max(1, min(z - end, len(position) - 1 - z))
+    v0 = (position[a] - position[a - reach_before]) / reach_before if a else 0.0
+    v1 = ((position[z + reach_after] - position[z]) / reach_after
+          if z + reach_after < len(position) else 0.0)
+    s = np.arange(n + 1) / n
+    link[a:z + 1] = ((1 + 2 * s) * (1 - s) ** 2 * before + s * (1 - s) ** 2 * n * v0
+                     + s ** 2 * (3 - 2 * s) * after - s ** 2 * (1 - s) * n * v1)
+
+
+def reversals(position: Array, width: float) -> list[tuple[int, int, float]]:
+    """Return the reversals of a position (N,) that come back by at least a width.
+
+    Each as the sample at which it turns, the first at which it has come back by the width, and
+    the direction afterwards.
+    """
+    step = np.sign(np.diff(position))
+    moved = np.flatnonzero(step)
+    if not len(moved):
+        return []
+    turned = moved[1:][step[moved[1:]] != step[moved[:-1]]]
+    extremes = [0, *turned.tolist(), len(position) - 1]
+    values = position[extremes].tolist()
+    low = high = 0
+    side, found = 0.0, []
+    for k, value in enumerate(values):
+        if value > values[high]:
+            high = k
+        if value < values[low]:
+            low = k
+        if side >= 0 and values[high] - value >= width:
+            if side:
+                found.append((extremes[high], -1.0, extremes[k]))
+            side, low = -1.0, k
+            high = k
+        elif side <= 0 and value - values[low] >= width:
+            if side:
+                found.append((extremes[low], 1.0, extremes[k]))
+            side, high = 1.0, k
+            low = k
+    result = []
+    for at, direction, until in found:
+        come_back = direction * (position[at:until + 1] - position[at]) >= width
+        result.append((at, at + int(np.argmax(come_back)), direction))
+    return result
