@@ -161,7 +161,7 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
         arm = simulate_arm(found, names, seed, scale, noise, duration, path_seed, share_done)
         assert arm.motion.time is not None
         recording = Recording.from_arrays('simulated', arm.motion.time, arm.position, None,
-                                          arm.effort, found.drives)
+                                          arm.effort, found.drives, arm.channels)
         return SimulationResult(found, recording, arm.effects, (), arm.motion, ARM_RATE, seed)
     if not isinstance(found, DriveModel):
         raise MotionError('model', f'it is of {found.title}', 'be of a 3-PPRS or an arm', 'shape')
@@ -186,6 +186,7 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
         truth=False, control=ControlSettings(gravity_compensation=feedforward == 'none'),
         sensors=SensorSettings.with_effort_noise(NOISE if noise is None else noise),
         progress=share_done)
-    recording = Recording.from_arrays('simulated', run.time, run.position, run.velocity, run.effort)
+    recording = Recording.from_arrays('simulated', run.time, run.position, run.velocity, run.effort,
+                                      channels=run.channels)
     return SimulationResult(found, recording, tuple(run.effects), tuple(run.notes), motion, RATE,
                             seed)
