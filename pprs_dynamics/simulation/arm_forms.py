@@ -17,6 +17,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
+from pprs_dynamics.simulation.temperatures import thinner
 
 STEEPNESS = 0.005  # of a joint's top speed, within which hidden dry friction turns over
 
@@ -159,12 +160,12 @@ FORMS: dict[str, JointForm] = {
         lambda rng, m: {'force': 2 * SIZE(rng) * m.effort, 'time': 0.3 * float(m.time[-1])},
         lambda p, m: p['force'] * np.exp(-m.time / p['time']) * m.sign),
     'friction_temperature': JointForm(
-        'c (exp(-(T - T_0) / 25 K) - 1) v_1 asinh(v / v_1), T of the grease, of which the '
-        'thermometer is late',
+        'c (eta(T) / eta(T_0) - 1) v_1 asinh(v / v_1), ln eta = 900 K / (T + 95 K) (Vogel), T of '
+        'the grease, of which the thermometer is late',
         lambda rng, m: {'coefficient': 3 * SIZE(rng) * m.effort / m.speed,
-                        'reference': float(np.mean(m.temperature)),
+                        'reference': float(rng.choice(m.temperature)),
                         'thinning_velocity': 2 * m.speed},
-        lambda p, m: p['coefficient'] * np.expm1((p['reference'] - m.temperature) / 25.0)
+        lambda p, m: p['coefficient'] * thinner(m.temperature, p['reference'])
         * p['thinning_velocity'] * np.arcsinh(m.velocity / p['thinning_velocity'])),
     'effort_offset': JointForm(
         'constant', lambda rng, m: {'force': SIZE(rng) * m.effort},

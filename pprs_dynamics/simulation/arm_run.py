@@ -47,7 +47,7 @@ from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState, couplings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 from pprs_dynamics.simulation.sensors import ButterworthFilter, EffortFilter
-from pprs_dynamics.simulation.temperatures import Climate, thermometers
+from pprs_dynamics.simulation.temperatures import Climate, read_thermometers
 
 RATE = 100.0  # [Hz]
 CLIMATE = 45  # second seed of temperatures
@@ -299,7 +299,8 @@ def draw_motion(model: ArmModel, duration: float, seed: int, rate: float = RATE)
 
 def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float = 1.0,
                  noise: float | None = None, duration: float = 40.0, path_seed: int = 0,
-                 progress: Callable[[float], None] | None = None, warmth: bool = False) -> ArmRun:
+                 progress: Callable[[float], None] | None = None, thermometers: bool = False,
+                 ) -> ArmRun:
     """Return a recording of an arm with hidden effects.
 
     Parameters
@@ -319,8 +320,8 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
     path_seed : int
         Of the motion.
     progress : callable, optional
-    warmth : bool
-        Whether thermometers take part where no effect needs them.
+    thermometers : bool
+        Whether they take part where no effect needs them.
 
     Raises
     ------
@@ -328,10 +329,11 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         For another name.
     """
     random = np.random.default_rng(seed)
-    choices = sorted((*FORMS, 'payload_mass'))
+    motion = draw_motion(model, duration, path_seed)
+    choices = sorted((*(name for name in FORMS if able_joints(name, model, motion)),
+                      'payload_mass'))
     chosen = tuple(str(random.choice(choices)) if name == 'random' else name for name in names)
     require_known(chosen)
-    motion = draw_motion(model, duration, path_seed)
     engine = ArmEngine(model)
     if progress is not None:
         progress(0.1)
@@ -405,8 +407,8 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
     position = motion.position + shift + ENCODER * random.uniform(-0.5, 0.5, motion.position.shape)
     return ArmRun(motion, position, efforts + _noise(random, efforts.shape) * sigma,
                   tuple(hidden), {
-                      'temperature': thermometers(motion.time, temperature)}
-                  if warmth or 'friction_temperature' in chosen else {})
+                      'temperature': read_thermometers(motion.time, temperature)}
+                  if thermometers or 'friction_temperature' in chosen else {})
 
 
 def _hidden_joint(model: ArmModel, motion: JointMotion, plain: Array, random: np.random.Generator,
@@ -471,11 +473,18 @@ def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Ar
 def able_joints(name: str, model: ArmModel, motion: JointMotion) -> list[int]:
     """Return the joints that a hidden force can act in along a motion."""
     turn, stroke = FORMS[name].needs_turn, np.ptp(motion.position, axis=0)
-    able = [j for j, unit in enumerate(model.units)
+    return [j for j, unit in enumerate(model.units)
             if not turn or (unit.turns and stroke[j] >= turn)]
+
+
+def one_able_joint(name: str, model: ArmModel, motion: JointMotion,
+                   random: np.random.Generator) -> int:
+    """Return one of the joints that a hidden force can act in along a motion."""
+    able = able_joints(name, model, motion)
     if not able:
-        raise HiddenEffectError(f'{name} needs a joint that turns by {turn:g} rad')
-    return able
+        raise HiddenEffectError(f'{name} needs a joint that turns by '
+                                f'{FORMS[name].needs_turn:g} rad')
+    return able[int(random.integers(len(able)))]
 
 
 def _add(name: str, model: ArmModel, motion: JointMotion, load: Array, largest: Array,
@@ -484,8 +493,8 @@ def _add(name: str, model: ArmModel, motion: JointMotion, load: Array, largest: 
     """Add a hidden force on one joint, or on all, and return what it is."""
     form, drives = FORMS[name], model.drives
     everywhere = bool(random.random() < 0.25)
-    able = able_joints(name, model, motion)
-    chosen = able if everywhere else [able[int(random.integers(len(able)))]]
+    one = one_able_joint(name, model, motion, random) if not everywhere else None
+    chosen = able_joints(name, model, motion) if one is None else [one]
     parameters = {}
     for j in chosen:
         moment = JointMoment.along(motion, j, load[:, j], largest[j], model.gear_ratios[j],

@@ -29,7 +29,7 @@ from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
 from pprs_dynamics.physics.mechanism.mechanism import Linkage
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, draw_form, truth
-from pprs_dynamics.simulation.arm_run import ArmEngine, able_joints, draw_motion
+from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion, one_able_joint
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 from pprs_dynamics.simulation.plant import UnsolvedError
@@ -135,8 +135,7 @@ class LinkagePlant:
             return self.engine.hide_link_mass(random, scale, links)
         if name == 'base_tilt':
             return self.engine.hide_tilt(random, scale)
-        able = able_joints(name, model, motion)
-        j = able[int(random.integers(len(able)))]
+        j = one_able_joint(name, model, motion, random)
         assert motion.time is not None
         moment = JointMoment.along(motion, j, efforts[:, j], self.largest[j],
                                    model.gear_ratios[j],

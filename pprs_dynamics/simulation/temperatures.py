@@ -16,10 +16,11 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 
 HALL = (18.0, 30.0)  # [degC]
-WAVE, PERIOD = (3.0, 7.0), (20.0, 45.0)  # of the hall [K, s]
-RISE, COOLING = (4.0, 12.0), (8.0, 25.0)  # by steady work at the usual speed [K], and back [s]
+WAVE, PERIOD = (5.0, 10.0), (20.0, 45.0)  # of the hall [K, s]
+RISE, COOLING = (10.0, 30.0), (6.0, 20.0)  # by steady work at the usual speed [K], and back [s]
 STEP, RATE = 0.1, 10.0  # of a thermometer [K, Hz]
-LAG = 1.0  # by which it is late [s]
+VOGEL_B, VOGEL_C = 900.0, 95.0  # of mineral oils [K]
+LAG = 0.2  # by which it is late [s]
 
 
 @dataclass(frozen=True)
@@ -74,9 +75,18 @@ class Climate:
         found: Array = (self.surroundings(time) + self.rise * work - temperature) / self.cooling
         return found
 
-    def along(self, time: Array, velocity: Array) -> Array:
-        """Return the temperatures of drives along a motion, (N, D) [degC]."""
-        work = np.abs(velocity) / np.maximum(np.abs(velocity).mean(axis=0), 1e-12)
+    def along(self, time: Array, velocity: Array, usual: float = 0.0) -> Array:
+        """Return the temperatures of drives along a motion, (N, D) [degC].
+
+        Parameters
+        ----------
+        time : (N,) array
+            [s]
+        velocity : (N, D) array
+        usual : float
+            Speed at which the drives warm as stated; 0: the mean speed of each.
+        """
+        work = np.abs(velocity) / (usual or np.maximum(np.abs(velocity).mean(axis=0), 1e-12))
         found = np.empty_like(velocity)
         found[0] = self.start()
         for k, step in enumerate(np.diff(time)):
@@ -84,7 +94,14 @@ class Climate:
         return found
 
 
-def thermometers(time: Array, temperature: Array) -> Array:
+def thinner(temperature: Array, reference: Array | float) -> Array:
+    """Return by which share oil is more viscous than at a reference, by Vogel's law [degC]."""
+    exponent = VOGEL_B / (temperature + VOGEL_C) - VOGEL_B / (np.asarray(reference) + VOGEL_C)
+    found: Array = np.expm1(exponent)
+    return found
+
+
+def read_thermometers(time: Array, temperature: Array) -> Array:
     """Return what thermometers of drives say, (N, D) [degC]; NaN between their readings."""
     step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
     late, read = np.empty_like(temperature), np.full(temperature.shape, np.nan)

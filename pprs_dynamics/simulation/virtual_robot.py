@@ -21,7 +21,7 @@ from pprs_dynamics.simulation.hidden_forces import FrictionTemperature
 from pprs_dynamics.simulation.linkage_plant import LinkagePlant
 from pprs_dynamics.simulation.plant import Plant, PlantSettings, Truth, UnsolvedError
 from pprs_dynamics.simulation.sensors import Measurement, Sensors, SensorSettings
-from pprs_dynamics.simulation.temperatures import thermometers
+from pprs_dynamics.simulation.temperatures import read_thermometers
 
 
 class SimulatedRobot:
@@ -308,7 +308,7 @@ def simulate(
         np.array([m.velocity for m in measured]), np.array([m.effort for m in measured]),
         reference, _stacked(true), robot.hidden,
         list(robot.notes), robot.control.saturated_steps,
-        {'temperature': thermometers(time, np.array(temperatures))} if temperatures else {})
+        {'temperature': read_thermometers(time, np.array(temperatures))} if temperatures else {})
 
 
 def _stacked(moments: Sequence[Truth | None]) -> Truth | None:

@@ -122,9 +122,10 @@ def random_values(effect, rng):
                              (0.2, -40.0, 4.0))),
     (EffortOffset, {'force': -0.4}, {'v': 0.3, 'q': 0.1}, -0.4),
     (FrictionDrift, {'force': 0.9, 'time': 10.0}, {'t': 7.0, 'v': -0.2}, -0.9),
-    # 15 K above the reference, by 0.02 N and 0.2 N s/m a kelvin.
-    (FrictionTemperature, {'coulomb': -0.02, 'viscous': -0.2, 'reference': 25.0},
-     {'v': -0.2, 'load': 40.0}, 0.3 + 0.6),
+    # 15 K above the reference, by 0.02 N and 0.2 N s/m a kelvin, the latter less and less.
+    (FrictionTemperature, {'coulomb': -0.02, 'viscous': -0.2, 'reference': 25.0,
+                           'thinning': 25.0},
+     {'v': -0.2, 'load': 40.0}, 0.3 + 1.0 * (1 - math.exp(-0.6))),
     (DriveSpring, {'stiffness': 20.0, 'position': 0.05}, {'q': 0.2}, 3.0),
     (ForceRipple, {'force': 0.5, 'phase': math.pi / 6, 'pitch': 0.004}, {'q': 0.001},
      0.4330127),  # 0.5 cos(30 deg)

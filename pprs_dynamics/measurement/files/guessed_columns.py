@@ -224,8 +224,8 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
         if {*best} & COMMANDS:
             notes.append(f'{each}: only commands are there ({" ".join(best)})')
         columns.update({(joint, each): column for joint, column in groups[best].items()})
-    for channel, words in CHANNEL_WORDS.items() if quantity is None else ():
-        told = [key for key in groups if {*key} & words and not {*key} & COMMANDS]
+    for channel, telling in CHANNEL_WORDS.items() if quantity is None else ():
+        told = [key for key in groups if {*key} & telling and not {*key} & COMMANDS]
         if told:
             columns.update({(joint, channel): column for joint, column in groups[max(
                 told, key=lambda key: len(groups[key]))].items()})

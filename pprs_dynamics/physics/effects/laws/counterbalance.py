@@ -21,7 +21,7 @@ from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter
 # Over less of a turn [rad] it is a spring like any other.
 LEAST_STROKE = 0.8
 # Distances of the points from the axis, one over the other, and directions that are tried.
-RATIOS, DIRECTIONS = (0.25, 0.5, 0.75), 12
+RATIOS, DIRECTIONS = (0.2, 0.4, 0.55, 0.7, 0.85), 24
 SHORTEST, LONGEST = 0.05, 0.95
 # Share by which the pull of a gas departs from a straight line over its stroke.
 BEND = 0.2
@@ -40,7 +40,6 @@ class Counterbalance(DriveEffect):
                        'of the farther', SHORTEST, LONGEST, scale=0.1),
              Parameter('position', 'q_0', 'rad', 'position at which both points are on one side, '
                        'in line with the axis', -100.0, 100.0, scale=0.3))
-    variants = (('force',), ('force', 'stiffness'))
     card = Card(
         '(F_b + K l) dl/dq, l = sqrt(1 + rho^2 - 2 rho cos(q - q_0)); F_b and K are force and '
         'stiffness times b and b^2, b and rho b the distances of its ends from the axis',

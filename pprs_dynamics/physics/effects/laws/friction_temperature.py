@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Friction that follows a measured temperature: (F_T sgn(q_dot) + c_T q_dot) (T - T_0)."""
+"""Friction that follows a measured temperature: F_T (T - T_0) sgn(q_dot) + c_T w q_dot.
+
+w = T_d (1 - exp(-(T - T_0) / T_d)) is T - T_0 near the reference, and bends as oils thin.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +19,8 @@ from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
 TEMPERATURE = 'temperature'
-# Lubricants lose a factor e of their viscosity in 20 to 40 K: over that the line bends [K].
-BENDING = 30.0
+# Lubricants lose a factor e of their viscosity in 15 to 40 K: what is tried of it.
+THINNING = (15.0, 30.0)
 # References that are tried, in ranges of temperature from the middle.
 REFERENCES = (-2.0, -0.5, 0.0, 0.5, 2.0)
 
@@ -32,13 +35,16 @@ class FrictionTemperature(DriveEffect):
     is_friction: ClassVar[bool] = True
     linear = (Parameter('coulomb', 'F_T', 'N/K', 'dry friction per kelvin', -1e6, 1e6, 0.0,
                         scale=0.02),
-              Parameter('viscous', 'c_T', 'N s/m/K', 'viscous friction per kelvin', -1e6, 1e6, 0.0,
-                        scale=0.2))
+              Parameter('viscous', 'c_T', 'N s/m/K', 'viscous friction per kelvin, at '
+                        'the reference', -1e6, 1e6, 0.0, scale=0.2))
     shape = (Parameter('reference', 'T_0', 'degC', 'temperature at which friction is the '
-                       "model's", -1e4, 1e4, scale=10.0),)
+                       "model's", -1e4, 1e4, scale=10.0),
+             Parameter('thinning', 'T_d', 'K', 'difference of temperature in which oil loses a '
+                       'factor e of its viscosity', 5.0, 1e4, 25.0, scale=10.0))
     variants = (('coulomb',), ('viscous',), ('coulomb', 'viscous'))
     card = Card(
-        '(F_T sgn(q_dot) + c_T q_dot) (T - T_0), T the measured temperature of the drive',
+        'F_T (T - T_0) sgn(q_dot) + c_T T_d (1 - exp(-(T - T_0) / T_d)) q_dot, T the measured '
+        'temperature of the drive',
         'the step at each reversal, or the slope over velocity, shrinks or grows with the '
         'temperature of the drive, up and down; friction_drift follows the clock alone',
         'oil and grease thin as they warm: viscous friction falls to a half in 15 to 30 K; seals '
@@ -51,16 +57,17 @@ class FrictionTemperature(DriveEffect):
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
-        """Return ((T - T_0) sgn q_dot, (T - T_0) q_dot); nothing where T was not measured."""
+        """Return ((T - T_0) sgn q_dot, w q_dot); nothing where T was not measured."""
         warmer = cls._warmer(drive, shape['reference'])
-        return (warmer * drive.direction, warmer * drive.velocity)
+        thinned = -shape['thinning'] * np.expm1(-warmer / shape['thinning'])
+        return (warmer * drive.direction, thinned * drive.velocity)
 
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
-        """Return what the bend of an exponential adds, and another exponent of the speed."""
+        """Return what a bend of dry friction adds, and another exponent of the speed."""
         dry, viscous = cls.columns(drive, **shape)
-        bend = cls._warmer(drive, shape['reference']) / (2 * BENDING)
-        return ((bend * dry, bend * viscous),
+        bend = cls._warmer(drive, shape['reference']) / (2 * THINNING[-1])
+        return ((bend * dry, np.zeros_like(dry)),
                 (np.zeros_like(dry), other_exponent(drive.velocity, viscous)))
 
     @classmethod
@@ -83,4 +90,6 @@ class FrictionTemperature(DriveEffect):
         """Return references within the temperatures and beyond."""
         lowest, highest = covered.channels.get(TEMPERATURE, (0.0, 0.0))
         middle, span = (lowest + highest) / 2, highest - lowest
-        return [{'reference': middle + share * span} for share in (REFERENCES if span else (0.0,))]
+        references = {middle + share * span: None for share in REFERENCES}
+        return [{'reference': reference, 'thinning': thinning}
+                for reference in references for thinning in THINNING]
