@@ -57,6 +57,7 @@ TYPICAL = {'asymmetric_friction': {'force_forward': 0.8, 'force_backward': 0.4},
            'link_mass': {'beam.mass': 0.5},
            'gear_efficiency': {'driving': 0.25, 'driven_back': 0.1},
            'load_friction': {'coefficient': 0.05},
+           'lost_motion': {'play': 0.002},
            'stribeck_friction': {'force': 0.5, 'velocity': 0.01},
            'effort_filter': {'time_constant': 0.02},
            'time_delay': {'delay': 0.02}}

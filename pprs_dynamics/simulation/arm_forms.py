@@ -19,6 +19,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 from pprs_dynamics.simulation.temperatures import thinner
 
+CROSSED = 0.02  # of a joint's top speed or load, within which a clearance is crossed
 STEEPNESS = 0.005  # of a joint's top speed, within which hidden dry friction turns over
 
 
@@ -193,7 +194,7 @@ FORMS: dict[str, JointForm] = {
 }
 # Of the arm as a whole: the payload's size as a share of the arm's mass, and so on.
 OF_ARM = ('payload_mass', 'link_mass', 'base_tilt', 'external_wrench', 'effort_gain', 'time_delay',
-          'effort_filter', 'homing_error', 'joint_friction', 'coupled_drives')
+          'effort_filter', 'homing_error', 'lost_motion', 'joint_friction', 'coupled_drives')
 NAMES = (*FORMS, *OF_ARM)
 
 
@@ -218,6 +219,22 @@ def tilted(gravity: Array, angle: float) -> Array:
     x, y, z = gravity
     sine, cosine = np.sin(angle), np.cos(angle)
     return np.array([x, cosine * y - sine * z, sine * y + cosine * z])
+
+
+def ahead(span: float, driver: Array, largest: float) -> Array:
+    """Return by how much an encoder leads its link, (N,): one of two flanks touches.
+
+    Parameters
+    ----------
+    span : float
+        Between the flanks [m, rad].
+    driver : (N,) array
+        What chooses the flank: a speed, or a load.
+    largest : float
+        Of it.
+    """
+    lead: Array = span / 2 * driver / np.hypot(driver, CROSSED * largest)
+    return lead
 
 
 def truth(name: str, drives: list[str] | None, parameters: Mapping[str, Any], form: str,

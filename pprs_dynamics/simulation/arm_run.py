@@ -34,10 +34,12 @@ from pprs_dynamics.physics.mechanism.urdf import expanded
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
 from pprs_dynamics.simulation.arm_forms import (
+    CROSSED,
     FORMS,
     SIZE,
     STEEPNESS,
     JointMoment,
+    ahead,
     draw_form,
     require_known,
     tilted,
@@ -363,6 +365,13 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         hidden.append(truth('external_wrench', None, {'force_z': float(engine.wrench[2])},
                             'at the tool'))
     bodies = engine.torques(motion, passive) if hidden else plain
+    lead = np.zeros_like(motion.position)
+    if 'lost_motion' in chosen:
+        by_load, lead, drawn = _lost_motion(model, motion, bodies, random, scale)
+        hidden.append(drawn)
+        if by_load:  # the motor goes on as before, and the link falls behind it
+            bodies = engine.torques(replace(motion, position=motion.position - lead), passive)
+            lead = np.zeros_like(lead)
     if progress is not None:
         progress(0.8)
     efforts = bodies + _own_friction(model, engine, motion)
@@ -404,11 +413,32 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         hidden.append(truth('homing_error', [model.drives[joint]], {
             model.drives[joint]: {'zero': float(shift[joint])}}, 'positions shifted'))
     sigma = np.full(len(largest), noise) if noise is not None else 0.005 * largest
-    position = motion.position + shift + ENCODER * random.uniform(-0.5, 0.5, motion.position.shape)
+    position = motion.position + lead + shift + ENCODER * random.uniform(
+        -0.5, 0.5, motion.position.shape)
     return ArmRun(motion, position, efforts + _noise(random, efforts.shape) * sigma,
                   tuple(hidden), {
                       'temperature': read_thermometers(motion.time, temperature)}
                   if thermometers or 'friction_temperature' in chosen else {})
+
+
+def _lost_motion(model: ArmModel, motion: JointMotion, loads: Array, random: np.random.Generator,
+                 scale: float) -> tuple[bool, Array, dict[str, Any]]:
+    """Return whether loads drive a clearance, by how much its encoder leads (N, D), and how.
+
+    They do on half of the joints of which the load changes sign.
+    """
+    joint = int(random.integers(1, len(model.drives)))
+    slides_in_loop = model.robot.structure.loops and not model.units[joint].turns
+    span = scale * float(random.uniform(0.01, 0.03)) * (SHIFT_OF_SLIDE if slides_in_loop else 1.0)
+    load = loads[:, joint]
+    by_load = bool(load.min() < -CROSSED * load.max() < 0) and bool(random.integers(2))
+    driver = load if by_load else motion.velocity[:, joint]
+    lead = np.zeros_like(loads)
+    lead[:, joint] = ahead(span, driver, float(np.abs(driver).max()))
+    return by_load, lead, truth(
+        'lost_motion', [model.drives[joint]],
+        {model.drives[joint]: {'backlash' if by_load else 'play': span}},
+        'b / 2 x / sqrt(x^2 + (0.02 x_max)^2), x the load or the speed')
 
 
 def _hidden_joint(model: ArmModel, motion: JointMotion, plain: Array, random: np.random.Generator,

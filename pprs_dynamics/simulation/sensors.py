@@ -20,6 +20,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect, Range, SensorEffect
 
+CROSSING = 0.002  # [m/s], speed within which a play is crossed
 # Correlation times of the slow processes that add up to 1/f noise [samples], a factor 4 apart:
 # the sum follows 1/f within 10 % from 1/200 of the sampling rate down to 1/400 000 of it.
 PINK_TIMES = 2.0 * 4.0 ** np.arange(9)
@@ -82,6 +83,8 @@ class SensorFaults:
         By which they are late [s], at least 0.
     time_constant : (D,) array
         Mean delay of the filters of the efforts [s]; 0 for none.
+    play : (D,) array
+        Of the couplings between encoders and drives [m].
     """
 
     zero: Array
@@ -89,19 +92,24 @@ class SensorFaults:
     effort_delay: Array
     position_delay: Array
     time_constant: Array
+    play: Array
 
     @classmethod
     def of(cls, effects: Sequence[HiddenEffect], drives: int = COUNT) -> SensorFaults:
         """Return the faults among effects."""
         faults = [effect for effect in effects if isinstance(effect, SensorEffect)]
-        zero, gain, delay, time_constant = (
+        zero, gain, delay, time_constant, play = (
             np.sum([effect.values[name] for effect in faults if name in effect.values]
                    or [np.zeros(drives)], axis=0)
-            for name in ('zero', 'gain', 'delay', 'time_constant'))
+            for name in ('zero', 'gain', 'delay', 'time_constant', 'play'))
         # No sensor looks ahead: an effort that comes early is one whose encoders, all of them,
         # come late.
         late = max(0.0, -float(delay.min()))
-        return cls(zero, gain, delay + late, np.full(drives, late), time_constant)
+        return cls(zero, gain, delay + late, np.full(drives, late), time_constant, play)
+
+    def lead(self, velocity: Array) -> Array:
+        """Return by how much encoders lead their drives, (D,), at velocities (D,)."""
+        return self.play / 2 * velocity / np.hypot(velocity, CROSSING)
 
 
 class ButterworthFilter:
@@ -233,6 +241,8 @@ class Sensors:
         self._noise = EffortNoise(settings, rng, len(self._scale))
         self._past: deque[tuple[Array, Array, Array]] = deque()
         self.position, self.velocity, self.zero = np.zeros((3, len(self._scale)))
+        # Of what is recorded; the drives' own control has encoders without a play.
+        self._lead, self._lead_rate = np.zeros((2, len(self._scale)))
         self.use_effects(effects)
         self.smoothing = 1.0 if settings.true_velocity else 1 - float(
             np.exp(-2 * np.pi * settings.velocity_bandwidth * step))
@@ -252,6 +262,7 @@ class Sensors:
         self._past.clear()
         self._filter.forget()
         self.position, self.velocity = self._encoder(position), np.array(velocity)
+        self._lead, self._lead_rate = self._faults.lead(self.velocity), np.zeros(len(self._scale))
 
     def read_encoders(self, position: Array, velocity: Array) -> None:
         """Take the true positions and velocities, (D,), as the drives' electronics see them."""
@@ -262,6 +273,10 @@ class Sensors:
             change = (seen - self.position) / self._step
             self.velocity = self.velocity + self.smoothing * (change - self.velocity)
         self.position = seen
+        lead = self._faults.lead(velocity)
+        self._lead_rate = self._lead_rate + self.smoothing * (
+            (lead - self._lead) / self._step - self._lead_rate)
+        self._lead = lead
 
     def read_effort(self, before: Array, after: Array) -> None:
         """Take the efforts applied just before and after now, (D,) each, and remember them.
@@ -270,7 +285,8 @@ class Sensors:
         motion there. Either one alone would be half a step late or early.
         """
         effort = self._filter.samples((before + after)[None] / 2)[0]
-        self._past.appendleft((self.position, self.velocity, effort))
+        self._past.appendleft((self.position + self._lead, self.velocity + self._lead_rate,
+                               effort))
 
     def measure(self, time: float) -> Measurement:
         """Return the readings to publish now, with faults and noise."""
@@ -327,3 +343,11 @@ class TimeDelay(SensorEffect):
     form: ClassVar[str] = ('measured effort (t) = effort (t - delay), '
                            'by late encoders where delay < 0')
     ranges: ClassVar[dict[str, Range]] = {'delay': Range('s', 0.003, 0.015, 'signed', scales=True)}
+
+
+class LostMotion(SensorEffect):
+    """A play in an encoder's coupling: a smooth sign of the speed, the catalogue has a travel."""
+
+    name: ClassVar[str] = 'lost_motion'
+    form: ClassVar[str] = 'measured position = position + play v / (2 sqrt(v^2 + w^2))'
+    ranges: ClassVar[dict[str, Range]] = {'play': Range('m', 0.0003, 0.001, 'log', scales=True)}

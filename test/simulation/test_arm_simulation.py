@@ -106,12 +106,16 @@ def test_every_hidden_effect_shows(wrist: ArmModel, name: str) -> None:
     duration = 30.0 if name == 'counterbalance' else 10.0
     plain, hidden = (simulate_arm(model, names, 4, noise=0.0, duration=duration)
                      for names in ((), (name,)))
-    shown = hidden.position - plain.position if name == 'homing_error' else (
-        hidden.effort - plain.effort)
-    assert np.abs(shown).max() > (0.005 if name == 'homing_error' else 0.05)
+    moved, pushed = (np.abs(getattr(hidden, one) - getattr(plain, one)).max()
+                     for one in ('position', 'effort'))
+    if name in ('homing_error', 'lost_motion'):
+        assert moved > 0.005 or (pushed > 0.05 and name == 'lost_motion')
+    else:
+        assert pushed > 0.05
     assert hidden.effects[0]['name'] == name
     assert (hidden.effects[0]['drives'] is None) == (
-        name not in {*FORMS, 'effort_gain', 'effort_filter', 'time_delay', 'homing_error'})
+        name not in {*FORMS, 'effort_gain', 'effort_filter', 'time_delay', 'homing_error',
+                     'lost_motion'})
 
 
 def test_motors_without_a_map_rub_nowhere(model: ArmModel) -> None:

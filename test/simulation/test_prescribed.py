@@ -36,7 +36,7 @@ AGREEMENT = 1e-5  # [N]
 RATE = 500.0
 HOME = MODEL.mechanism(Excitation().motion([0.0])).position[0]
 MEMORY = ('hysteresis', 'friction_drift', 'friction_temperature')
-SENSORS = ('effort_filter', 'effort_gain', 'homing_error', 'time_delay')
+SENSORS = ('effort_filter', 'effort_gain', 'homing_error', 'lost_motion', 'time_delay')
 GROUPS = {
     'friction': ('viscous_friction', 'coulomb_friction', 'asymmetric_friction',
                  'stribeck_friction', 'quadratic_friction', 'load_friction'),

@@ -292,14 +292,14 @@ def test_every_effect_of_the_interface_is_there() -> None:
         'viscous_friction coulomb_friction asymmetric_friction stribeck_friction '
         'quadratic_friction load_friction hysteresis friction_drift friction_temperature '
         'effort_offset effort_gain '
-        'homing_error drive_spring force_ripple drive_inertia time_delay effort_filter '
+        'homing_error lost_motion drive_spring force_ripple drive_inertia time_delay effort_filter '
         'revolute_friction spherical_friction revolute_stiffness payload_mass payload_offset '
         'platform_inertia external_wrench base_tilt platform_drag rod_mass')
     assert not set(IN_CATALOGUE) & set(NOT_IN_CATALOGUE)
 
 
 @pytest.mark.parametrize('name', [name for name in HIDDEN_EFFECTS if name not in (
-    'effort_filter', 'effort_gain', 'homing_error', 'time_delay')])
+    'effort_filter', 'effort_gain', 'homing_error', 'lost_motion', 'time_delay')])
 def test_a_hidden_effect_changes_the_efforts_of_its_drives_alone(name: str) -> None:
     effect = drawn(name)
     error = rms(unexplained(simulate(MODEL.values, wave(0.5), [effect], control=WEIGHT_HELD,

@@ -145,8 +145,8 @@ class Sensitivities(ABC):
         in both directions; `OF_JOINTS` the former in all passive joints; `HOMING` per metre that
         each drive is measured too far, `INERTIA` per acceleration; the coefficients of each effect of `searched` by its name,
         and after `BARE` as they were if friction did not follow the loads; those of effects
-        that the given model has by their names after `PRESENT`. What a kind of model does not have
-        is left out.
+        that the given model has by their names after `PRESENT`. What a kind of model does not
+        have is left out.
 
         Parameters
         ----------
