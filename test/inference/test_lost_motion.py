@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import made_up_arm
 import numpy as np
 import pytest
+from planar_arm import planar_arm
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
@@ -18,6 +20,7 @@ from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.lost_motion import LostMotion, behind_play
 from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
 
 SWING = 1  # the joint that carries weight
@@ -32,7 +35,7 @@ def on_swing(**parameters: float) -> dict[str, object]:
             **{f'effects.lost_motion.swing.{name}': value for name, value in every.items()}}
 
 
-def recorded(model: ArmModel, position: Array, effort: Array, time: Array) -> Recording:
+def recorded(model: ForceModel, position: Array, effort: Array, time: Array) -> Recording:
     noise = NOISE * np.random.default_rng(3).normal(size=effort.shape)
     grain = 1e-5 * np.random.default_rng(4).normal(size=position.shape)
     return Recording.from_arrays('run', time, position + grain, None, effort + noise, model.drives)
@@ -46,7 +49,7 @@ def with_play(model: ArmModel, play: float, width: float = 0.05) -> Recording:
     return recorded(model, position, model.drive_forces(moved).total, moved.time)
 
 
-def with_backlash(model: ArmModel, backlash: float) -> Recording:
+def with_backlash(model: Any, backlash: float) -> Recording:
     """Record a motor that moves smoothly while the link falls to the side of its load."""
     moved = made_up_arm.motion(20.0)
     load = model.drive_forces(moved).mechanism.transmitted[:, SWING]
@@ -56,7 +59,7 @@ def with_backlash(model: ArmModel, backlash: float) -> Recording:
     return recorded(model, moved.position, forces, moved.time)
 
 
-def found_on(model: ArmModel, recording: Recording) -> tuple[Diagnosis, list[object]]:
+def found_on(model: ForceModel, recording: Recording) -> tuple[Diagnosis, list[object]]:
     found = diagnose(model, [recording])
     return found, [(one.name, one.drives) for one in found.effects]
 
@@ -114,10 +117,10 @@ def test_play_at_reversals_is_lost_motion(tmp_path: Path, size: float) -> None:
 
 
 def test_backlash_by_the_side_of_the_load_is_lost_motion(tmp_path: Path) -> None:
-    model = made_up_arm.real_arm(tmp_path)
+    model = planar_arm(tmp_path, 3)  # it hangs: loads change sign
     found, named = found_on(model, with_backlash(model, 0.03))
-    assert named[0] == ('lost_motion', ('swing',))
-    assert found.effects[0].parameters['swing.backlash'].value == pytest.approx(0.03, rel=0.15)
+    assert named[0] == ('lost_motion', ('j2',))
+    assert found.effects[0].parameters['j2.backlash'].value == pytest.approx(0.03, rel=0.15)
 
 
 @pytest.mark.parametrize(('name', 'values'), [

@@ -63,7 +63,7 @@ from pprs_dynamics.physics.effects.drive_effect import (
     DriveSamples,
     MeasurementEffect,
 )
-from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
@@ -72,6 +72,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
 
 SHARE = 0.1  # of what a model has of an effect that shifts positions, for derivatives
+SIZES = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # of what it usually is, that are tried where none is
 SHAPE_STEP = 1e-3  # amount of movement, for derivatives by shape parameters
 LONGEST_DELAY = 0.3  # [s], that a recording may show at once
 # By how many of its standard deviations a number of an effect may have been fitted wrong as long as
@@ -417,56 +418,68 @@ class Design:
                       shape: Mapping[str, float]) -> dict[int, Array]:
         """Return what positions of a drive that are measured wrong do to all, (k, M) by drive.
 
-        By steps, since what a play does is not in proportion to it: of `scale`, and around a model
-        that has the effect of `SHARE` of what it has.
+        What a play does is not in proportion to it. Around a model that has the effect it is told
+        by steps of `SHARE` of what it has; else by the one of `SIZES` that alone would explain most
+        of the drive's error.
         """
-        name, friction = self.drives[drive], self.friction()
+        name = self.drives[drive]
         there = next((one for one in self.model.effects
                       if isinstance(one, effect) and name in one.drives), None)
-        known = {} if there is None else effect.to_coefficients(there.drives[name])
-        width = float(self.model.reversal.widths(len(self.drives))[drive])
+        before = {c.name: 0.0 for c in effect.coefficients} if there is None else (
+            effect.to_coefficients(there.drives[name]))
 
-        def error(values: Mapping[str, float]) -> list[Array]:
-            one = effect({name: {**effect.from_coefficients(values), **shape}})
-            found = []
+        def changed(c: Parameter, step: float) -> dict[int, Array]:
+            values = [effect({name: {**effect.from_coefficients(one), **shape}})
+                      for one in (before, {**before, c.name: before[c.name] + step})]
+            parts = []
             for recording, read in zip(self.recordings, self.reconstructions or [None],
                                        strict=True):
-                q, q_dot, q_ddot = self._misread(one, recording, read, drive)
-                q = q + one.loaded_position_error(
-                    (name,), recording.transmitted[:, [drive]])[:, 0]
-                v = recording.velocity[:, drive]
-                own = np.zeros_like(v)
-                if friction is not None and np.any(q_dot):
-                    turned = smooth_sign(v - q_dot, width) - recording.direction[:, drive]
-                    own = (friction.dry(recording.guide_load)[:, drive] * turned
-                           - np.broadcast_to(friction.viscous, len(self.drives))[drive] * q_dot)
-                found.append(np.stack((q, q_ddot, own)))
-            return found
+                old, new = (self._misread(one, recording, read, drive) for one in values)
+                parts.append(recording.treat(self._felt(recording, drive, new - old).T).T)
+            q, q_ddot, own = np.concatenate(parts, axis=1)
+            return {d: self.homing[drive][d] * q + self.inertia[drive][d] * q_ddot
+                    + own * (d == drive) for d in range(len(self.drives))}
 
-        rows: list[dict[int, Array]] = []
+        error = np.nan_to_num(self.residuals.error[:, drive])
+        rows = []
         for c in effect.coefficients:
-            before = {one.name: known.get(one.name, 0.0) for one in effect.coefficients}
-            step = max(SHARE * abs(before[c.name]), SHARE * c.scale) if there else c.scale
-            after = error({**before, c.name: before[c.name] + step})
-            change = ([b - a for a, b in zip(error(before), after, strict=True)]
-                      if there else after)
-            q, q_ddot, own = np.concatenate(
-                [one.treat(each.T).T for one, each in zip(self.recordings, change, strict=True)],
-                axis=1) / step
-            rows.append({d: self.homing[drive][d] * q + self.inertia[drive][d] * q_ddot
-                         + own * (d == drive) for d in range(len(self.drives))})
+            usual = c.scale if c.expected is None else c.expected[self.given.units[drive].turns]
+            steps = ([SHARE * max(abs(before[c.name]), usual)] if there is not None
+                     or c.expected is None else [size * usual for size in SIZES])
+            found = [(step, changed(c, step)) for step in steps]
+            step, best = max(found, key=lambda one: float(
+                (2 * error - one[1][drive]) @ one[1][drive]))
+            rows.append({d: row / step for d, row in best.items()})
         return {d: np.stack([one[d] for one in rows]) for d in range(len(self.drives))}
 
+    def _felt(self, recording: FullRate, drive: int, change: Array) -> Array:
+        """Return errors of position and acceleration, and what the drive's own friction makes.
+
+        Of errors of position and its rates, (3, N) each.
+        """
+        q, q_dot, q_ddot = change
+        friction, v = self.friction(), recording.velocity[:, drive]
+        own = np.zeros_like(q)
+        if friction is not None and np.any(q_dot):
+            width = float(self.model.reversal.widths(len(self.drives))[drive])
+            turned = smooth_sign(v - q_dot, width) - recording.direction[:, drive]
+            own = (friction.dry(recording.guide_load)[:, drive] * turned
+                   - np.broadcast_to(friction.viscous, len(self.drives))[drive] * q_dot)
+        return np.stack((q, q_ddot, own))
+
     def _misread(self, effect: MeasurementEffect, recording: FullRate,
-                 read: Reconstruction | None, drive: int) -> tuple[Array, Array, Array]:
-        """Return the errors of a drive's position and rates, (N,); of a planned motion its own."""
-        name = self.drives[drive]
-        if read is not None:
-            q, q_dot, q_ddot = misread([effect], (name,), read.recorded, read.read, drive)
-            return q[:, 0], q_dot[:, 0], q_ddot[:, 0]
-        planned = effect.position_error((name,), recording.position[:, [drive]])[:, 0]
-        rate = np.gradient(planned, recording.time)
-        return planned, rate, np.gradient(rate, recording.time)
+                 read: Reconstruction | None, drive: int) -> Array:
+        """Return the errors of a drive's position and its rates, (3, N); `read` None: planned."""
+        name = (self.drives[drive],)
+        if read is None:
+            planned = effect.position_error(name, recording.position[:, [drive]])[:, 0]
+            rate = np.gradient(planned, recording.time)
+            found = np.stack((planned, rate, np.gradient(rate, recording.time)))
+        else:
+            found = np.concatenate(
+                misread([effect], name, read.recorded, read.read, drive), axis=1).T
+        found[0] += effect.loaded_position_error(name, recording.transmitted[:, [drive]])[:, 0]
+        return found
 
     def find_term(self, effect: type[CatalogueEffect], drive: int | None,
                   shape: Mapping[str, float]) -> Term:

@@ -143,10 +143,10 @@ class Sensitivities(ABC):
         `NUMBERS` per standard deviation by which each number grows away from 0; `OF_DRIVES` what
         other widths of turning over would change in every drive, and last a part that is alike
         in both directions; `OF_JOINTS` the former in all passive joints; `HOMING` per metre that
-        each drive is measured too far, `INERTIA` per acceleration; the coefficients of each effect of `searched` by its name,
-        and after `BARE` as they were if friction did not follow the loads; those of effects
-        that the given model has by their names after `PRESENT`. What a kind of model does not
-        have is left out.
+        each drive is measured too far, `INERTIA` per acceleration; the coefficients of each effect
+        of `searched` by its name, and after `BARE` as they were if friction did not follow the
+        loads; those of effects that the given model has by their names after `PRESENT`. What a
+        kind of model does not have is left out.
 
         Parameters
         ----------

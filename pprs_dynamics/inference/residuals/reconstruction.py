@@ -24,6 +24,7 @@ from pprs_dynamics.measurement.files.samples import Progress
 from pprs_dynamics.measurement.motion.drive_motion import (
     DriveMotion,
     smooth_drives,
+    smoothed_again,
     smoothed_as,
 )
 from pprs_dynamics.measurement.motion.rests import find_rests
@@ -331,6 +332,9 @@ def _followed_rightly(
     q, q_dot, q_ddot = misread(model.misreadings, model.drives, recording, read)
     drives = replace(read, position=read.position - q, velocity=read.velocity - q_dot,
                      acceleration=read.acceleration - q_ddot)
+    if np.any(q_dot):
+        drives = smoothed_again(drives, recording,
+                                lambda position: position - model.position_error(position))
     followed = follow(model, time, drives, progress)
     if not np.any(model.loaded_position_error(np.ones((1, len(model.drives))))):
         return drives, followed

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -133,6 +133,34 @@ def smooth_drives(recording: Recording, window: float | None = None,
     return DriveMotion(
         q, q_dot, q_ddot, np.concatenate(index), spans, np.concatenate(block_starts),
         block or block_length(longest.step, duration), smoothing, recorded, tuple(notes))
+
+
+def smoothed_again(motion: DriveMotion, recording: Recording,
+                   made: Callable[[Array], Array]) -> DriveMotion:
+    """Return a motion with the window that suits what is made of its positions, if it is shorter.
+
+    Bursts of an encoder that is not where its drive is are nothing that a window could suit.
+
+    Parameters
+    ----------
+    motion : DriveMotion
+        Whose velocities and accelerations from recorded velocities stay.
+    recording, made
+        See `smoothed_as`.
+    """
+    stretches = []
+    for part in recording.segments:
+        if part.stop - part.start > 2 * SHORTEST_WINDOW:
+            grid, _ = find_grid(recording.time[part], recording.position[part])
+            stretches.append(Stretch(made(grid.at_steps(recording.position[part])), grid.step))
+    smoothing = choose_smoothing(representative(stretches))
+    if smoothing.duration >= motion.smoothing.duration:
+        return motion
+    q, q_dot, q_ddot = smoothed_as(replace(motion, smoothing=smoothing), recording, made)
+    from_velocity, from_acceleration = motion.from_recorded
+    return replace(motion, position=q,
+                   velocity=np.where(from_velocity, motion.velocity, q_dot),
+                   acceleration=np.where(from_acceleration, motion.acceleration, q_ddot))
 
 
 def smoothed_as(motion: DriveMotion, recording: Recording,

@@ -17,6 +17,7 @@ M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash - a survey
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
@@ -28,6 +29,8 @@ from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
 
 # On either side of the travel through the play, of its length: there the link's speed is read.
 MARGIN = 0.5
+# Clearances of screws and gears [m, rad].
+USUAL = (5e-4, math.radians(1.0))
 
 
 class LostMotion(MeasurementEffect):
@@ -39,9 +42,9 @@ class LostMotion(MeasurementEffect):
     bends_columns: ClassVar[bool] = True
     linear = (
         Parameter('backlash', 'b', 'm', 'distance between the flanks, of which the load chooses '
-                  'one', -0.1, 0.1, 0.0, 5e-4, turning=(-0.5, 0.5)),
+                  'one', -0.1, 0.1, 0.0, 5e-4, expected=USUAL, turning=(-0.5, 0.5)),
         Parameter('play', 'b_r', 'm', 'travel of the encoder without the link at each reversal',
-                  -0.1, 0.1, 0.0, 5e-4, turning=(-0.5, 0.5)),
+                  -0.1, 0.1, 0.0, 5e-4, expected=USUAL, turning=(-0.5, 0.5)),
         Parameter('windup', 'c', 'm/N', 'by which the encoder leads per load', -1.0, 1.0, 0.0,
                   1e-6))
     variants = (('backlash',), ('play',), ('windup',))
