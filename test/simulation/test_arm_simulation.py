@@ -111,7 +111,8 @@ def test_every_hidden_effect_shows(wrist: ArmModel, name: str) -> None:
     assert np.abs(shown).max() > (0.005 if name == 'homing_error' else 0.05)
     assert hidden.effects[0]['name'] == name
     assert (hidden.effects[0]['drives'] is None) == (
-        name not in {*FORMS, 'effort_gain', 'effort_filter', 'time_delay', 'homing_error'})
+        name not in {*FORMS, 'effort_gain', 'effort_filter', 'time_delay', 'homing_error',
+                     'current_gain'})
 
 
 def test_motors_without_a_map_rub_nowhere(model: ArmModel) -> None:

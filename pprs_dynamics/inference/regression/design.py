@@ -55,6 +55,7 @@ from pprs_dynamics.physics.effects.drive_effect import (
     DriveEffect,
     DriveRange,
     DriveSamples,
+    GainEffect,
     MeasurementEffect,
 )
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -354,9 +355,12 @@ class Design:
         """Return the treated columns of an effect on one drive, (k, M)."""
         if issubclass(effect, MeasurementEffect):
             def seen(recording: FullRate, part: slice) -> Array:
-                time = recording.time[part]
-                effort = self.sensed(recording.effort[None, part, drive], time, drive, effect)[0]
-                return np.stack(effect.sensor_columns(effort, time, **shape))
+                effort = self.sensed(recording.effort[None, part, drive], recording, part, drive,
+                                     effect)[0]
+                if issubclass(effect, GainEffect):
+                    samples = recording.samples(part, drive)
+                    return np.stack([effort * one for one in effect.shares(samples, **shape)])
+                return np.stack(effect.sensor_columns(effort, recording.time[part], **shape))
 
             return self.treated(lambda recording: np.concatenate(
                 [seen(recording, part) for part in recording.segments], axis=1))
@@ -374,7 +378,7 @@ class Design:
         """Return forces on a drive, (k, N) of a recording, as its sensor shows them, (k, M)."""
         def behind_sensor(recording: FullRate) -> Array:
             whole = rows(recording)
-            return np.concatenate([self.sensed(whole[:, part], recording.time[part], drive)
+            return np.concatenate([self.sensed(whole[:, part], recording, part, drive)
                                    for part in recording.segments], axis=1)
         return self.treated(behind_sensor)
 
@@ -383,14 +387,21 @@ class Design:
         return np.concatenate([recording.treat(rows(recording).T).T
                                for recording in self.recordings], axis=1)
 
-    def sensed(self, rows: Array, time: Array, drive: int,
+    def sensed(self, rows: Array, recording: FullRate, part: slice, drive: int,
                without: type[CatalogueEffect] | None = None) -> Array:
-        """Return forces (k, N) on a drive as the model's sensors show them, but for one kind."""
+        """Return forces (k, N) on a drive in a segment as the model's sensors show them.
+
+        All but those of one kind.
+        """
         name = self.drives[drive]
         for effect in self.model.effects:
             if (isinstance(effect, MeasurementEffect) and name in effect.drives
                     and type(effect) is not without):
+                if isinstance(effect, GainEffect):
+                    rows = rows * effect.factor(recording.samples(part, drive), name)
+                    continue
                 alone = type(effect)({name: effect.drives[name]})
+                time = recording.time[part]
                 rows = np.reshape([alone.sensed(row[:, None], time, (name,))[:, 0]
                                    for row in rows], rows.shape)
         return rows
