@@ -47,7 +47,7 @@ from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState, couplings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 from pprs_dynamics.simulation.sensors import ButterworthFilter, EffortFilter
-from pprs_dynamics.simulation.temperatures import Climate, read_thermometers
+from pprs_dynamics.simulation.temperatures import REFERENCE, Climate, read_thermometers
 
 RATE = 100.0  # [Hz]
 CLIMATE = 45  # second seed of temperatures
@@ -469,7 +469,7 @@ def _hide_current_gain(model: ArmModel, motion: JointMotion, temperature: Array,
         form = 'F / (1 + a (sin(x) + sin(3 x) / 5)), x = 2 pi q / p + phi'
     else:
         weaker = scale * float(random.uniform(0.0015, 0.003))
-        reference = float(random.choice(temperature[:, j]))
+        reference = float(random.uniform(*REFERENCE))
         warmer = temperature[:, j] - reference
         constant = 1 - weaker * warmer * (1 + warmer / 300)
         parameters = {'temperature': weaker, 'reference': reference}
