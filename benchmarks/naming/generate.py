@@ -28,6 +28,7 @@ from benchmarks.naming.robots import ROBOTS, hidden_names, model_of
 from benchmarks.scores.diagnosis_table import SAME_FORM
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -178,8 +179,8 @@ def _of_arm(draw: Draw) -> tuple[ForceModel, Recording, Truth]:
         effects.append({'name': 'local_bump', 'drives': [drive], 'parameters': {}})
     sigma = LEVEL * largest
     if draw.snr:
-        signal = (_error(model, time, run.position, effort)
-                  - _error(model, time, plain.position, plain.effort)) / sigma
+        signal = _added(*(_residuals(model, time, *one) for one in (
+            (run.position, effort), (plain.position, plain.effort)))) / sigma
         strength = np.sqrt(np.nanmean(np.square(signal), axis=0))
         feels = strength > FELT * strength.max()
         total = float(np.sqrt(np.mean(np.square(strength[feels]))))
@@ -192,9 +193,16 @@ def _of_arm(draw: Draw) -> tuple[ForceModel, Recording, Truth]:
     return model, recording, _truth(draw, effects)
 
 
-def _error(model: ForceModel, time: Array, position: Array, effort: Array) -> Array:
+def _residuals(model: ForceModel, time: Array, position: Array, effort: Array) -> Residuals:
     recording = Recording.from_arrays('noise-free', time, position, None, effort, model.drives)
-    return measure_residuals(model, [recording])[0].error
+    return measure_residuals(model, [recording])[0]
+
+
+def _added(with_effects: Residuals, plain: Residuals) -> Array:
+    """Return what effects add to the error, (M, D), where both are known: rests may differ."""
+    both = [np.isin(one.time, other.time) for one, other in (
+        (with_effects, plain), (plain, with_effects))]
+    return np.asarray(with_effects.error[both[0]] - plain.error[both[1]])
 
 
 def _wave(draw: Draw, position: Array) -> Array:

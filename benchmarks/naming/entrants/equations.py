@@ -99,6 +99,22 @@ class Equations:
         found = inverse @ self.right[at]
         return found, inverse, float(self.total - self.right[at] @ found)
 
+    def compressed(self, without: Array | None = None) -> tuple[Array, Array]:
+        """Return as many rows as there are columns that say the same as all samples but some.
+
+        X' X and X' y are those of the samples; a library gets through these in a fraction of the
+        time.
+        """
+        gram, right = self.gram, self.right
+        if without is not None:
+            gram = gram - self.X[without].T @ self.X[without]
+            right = right - self.X[without].T @ self.y[without]
+        values, vectors = np.linalg.eigh(gram)
+        kept = values > 1e-9 * values.max()
+        root = np.sqrt(values[kept])
+        return (np.asfortranarray(root[:, None] * vectors[:, kept].T),
+                (vectors[:, kept].T @ right) / root)
+
     def gains(self, chosen: Sequence[int], groups: Sequence[Group]) -> Array:
         """Return by how much each group lowers the rest beside chosen columns."""
         at = np.asarray(chosen, dtype=int)
