@@ -74,7 +74,8 @@ def enter_all(folder: Path, entrants: Mapping[str, Entrant], workers: int,
     until = time.monotonic() + 60 * minutes
     keys = {name: one.key() for name, one in entrants.items()}
     todo = []
-    for file in sorted((folder / TRUTH).glob('*.json')):
+    # In an order that mixes robots: what is there when it is stopped is a sample of all.
+    for file in sorted((folder / TRUTH).glob('*.json'), key=lambda one: one.stem[::-1]):
         keys_here = {name: f'{key} {_key_of_problem(folder, file.stem)}'
                      for name, key in keys.items()}
         missing = {name: key for name, key in keys_here.items()
@@ -127,12 +128,18 @@ def _answer_file(folder: Path, name: str, problem: str) -> Path:
     return folder / ANSWERS / name / f'{problem}.json'
 
 
-def score_all(folder: Path) -> dict[str, list[tuple[Truth, Answer, Judged]]]:
-    """Return every entrant's answers with what is right about them; none counts as silence."""
+def score_all(folder: Path, by_all: bool = False) -> dict[str, list[tuple[Truth, Answer, Judged]]]:
+    """Return every entrant's answers with what is right about them; none counts as silence.
+
+    `by_all`: of a run that was stopped, the problems that every entrant has answered.
+    """
+    entrants = sorted(path.name for path in (folder / ANSWERS).glob('*'))
     truths = [Truth.from_dict(json.loads(file.read_text()))
-              for file in sorted((folder / TRUTH).glob('*.json'))]
+              for file in sorted((folder / TRUTH).glob('*.json'))
+              if not by_all or all(_answer_file(folder, entrant, file.stem).exists()
+                                   for entrant in entrants)]
     found = {}
-    for entrant in sorted(path.name for path in (folder / ANSWERS).glob('*')):
+    for entrant in entrants:
         scored = []
         for truth in truths:
             file = _answer_file(folder, entrant, truth.problem)
@@ -175,6 +182,8 @@ def main() -> int:
     parser.add_argument('--whole', action='store_true',
                         help='leave out this package without its parts')
     parser.add_argument('--page', type=Path, help='write the table and its picture')
+    parser.add_argument('--by-all', action='store_true',
+                        help='score what every entrant has answered, of a run that was stopped')
     parser.add_argument('--real', type=Path, metavar='FOLDER', help='of real machines, see real.py')
     options = parser.parse_args()
     if options.step == 'make':
@@ -185,9 +194,9 @@ def main() -> int:
         return min(enter_all(options.folder, chosen, options.workers, options.minutes), 1)
     if options.step == 'reveal':
         return reveal(options.folder, options.problem or '')
-    scored = score_all(options.folder)
+    scored = score_all(options.folder, options.by_all)
     if options.page:
-        real = score_all(options.real) if options.real and options.real.exists() else {}
+        real = score_all(options.real, options.by_all) if options.real and options.real.exists() else {}
         write_page(scored, real, options.page)
     for entrant, answers in scored.items():
         print(entrant, *(f'{name} {rate}' for name, rate in figures(answers).items()),

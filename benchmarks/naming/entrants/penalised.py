@@ -35,7 +35,7 @@ def lasso(problem: Problem, errors: float = 0.0) -> Answer:
         # scikit-learn's penalty is per row.
         count = len(equations.y) - (0 if without is None else np.count_nonzero(without))
         scale = np.sqrt(len(rows) / count)
-        return np.asarray(lasso_path(scale * rows, scale * seen, alphas=strengths, max_iter=2000,
+        return np.asarray(lasso_path(scale * rows, scale * seen, alphas=strengths, max_iter=300,
                                      tol=1e-3)[1])
 
     left = np.zeros((len(FOLDS), len(strengths)))
