@@ -196,7 +196,8 @@ def main() -> int:
         return reveal(options.folder, options.problem or '')
     scored = score_all(options.folder, options.by_all)
     if options.page:
-        real = score_all(options.real, options.by_all) if options.real and options.real.exists() else {}
+        there = options.real is not None and options.real.exists()
+        real = score_all(options.real, options.by_all) if there else {}
         write_page(scored, real, options.page)
     for entrant, answers in scored.items():
         print(entrant, *(f'{name} {rate}' for name, rate in figures(answers).items()),
