@@ -345,7 +345,7 @@ class _Answer:
         first, final, effects = self.ranking.first.design, self.final, self.effects
         regression = self.fits.regression
         noise = {self.drives[d]: one for d, one in regression.noise(self.best.fit).items()}
-        seen = noise_floors(self.fits, blocks=self.best.fit.blocks)
+        seen = noise_floors(self.fits, best=self.best.fit)
         # Where the noise cannot be told it is at most what the best set leaves.
         floors = {self.drives[d]: seen.get(self.drives[d], regression.noise_floor(
             self.best.fit, d)) for d in regression.drives}
