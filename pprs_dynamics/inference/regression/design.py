@@ -27,6 +27,7 @@ from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
     PresentCoefficient,
     PresentShape,
+    ReferenceDirection,
     ReversalShape,
     present_columns,
     present_values,
@@ -75,6 +76,25 @@ LEANING = 10.0
 TURNED, LEAST_MOVING = 2.0, 0.05
 
 
+@dataclass(frozen=True)
+class CarriedOver:
+    """What a reference run says of recordings; see `pprs_dynamics.inference.fit.reference`.
+
+    Parameters
+    ----------
+    mean : (M, D) array
+        Forces that the model lacks there as well [N].
+    directions : tuple of ReferenceDirection
+        In which they are uncertain.
+    covered : float
+        Share of the samples whose states the reference knows.
+    """
+
+    mean: Array
+    directions: tuple[ReferenceDirection, ...]
+    covered: float
+
+
 @dataclass
 class Design:
     """Measured efforts, the model's, and the columns that may explain the difference.
@@ -99,6 +119,8 @@ class Design:
         None: the given model.
     joining : str
         See `of`.
+    carried : CarriedOver, optional
+        Its mean is taken from what was measured, its directions are columns of every fit.
     """
 
     given: ForceModel
@@ -113,6 +135,7 @@ class Design:
     forces: Array = field(repr=False)
     point: OperatingPoint | None = None
     joining: str = ''
+    carried: CarriedOver | None = None
     _moved: dict[bytes, tuple[Reconstruction, ...]] = field(
         default_factory=dict, repr=False, compare=False)
     _own_rows: dict[tuple[type[CatalogueEffect], int], Array] = field(
@@ -167,10 +190,10 @@ class Design:
             point.model, self.given, self.reconstructed(point.model), None,
             {one.effect for one in point.effects} if alone else None,
             {(one.drive, one.number) for one in self.base if isinstance(one, ReversalShape)},
-            self.joining)
+            self.joining).beside(self.carried)
         shift = np.zeros_like(design.residuals.model)
         for column, c in zip(design.base, point.base, strict=True):
-            if not isinstance(column, ReversalShape):
+            if column.in_model:
                 for d, row in column.rows.items():
                     shift[:, d] += c * row
         for one in point.effects:
@@ -184,6 +207,29 @@ class Design:
                 shift[:, d] += row
         residuals = replace(design.residuals, model=design.residuals.model - shift)
         return replace(design, residuals=residuals, point=point)
+
+    def beside(self, carried: CarriedOver | None) -> Design:
+        """Return this with what a reference says of the recordings, or as it is for None."""
+        if carried is None:
+            return self
+        residuals = replace(self.residuals, measured=self.residuals.measured - carried.mean)
+        return replace(self, residuals=residuals, base=(*self.base, *carried.directions),
+                       carried=carried)
+
+    def carried_forces(self, coefficients: Array) -> Array:
+        """Return what the directions of a reference add to the forces, (M, D) [N].
+
+        Parameters
+        ----------
+        coefficients : (P,) array
+            Of the base columns first.
+        """
+        forces = np.zeros_like(self.residuals.model)
+        for column, c in zip(self.base, coefficients, strict=False):
+            if isinstance(column, ReferenceDirection):
+                for d, row in column.rows.items():
+                    forces[:, d] += c * row
+        return forces
 
     def reconstructed(self, model: ForceModel) -> tuple[Reconstruction, ...]:
         """Return the motion of the recordings with the zeros that a model's drives have."""
