@@ -317,7 +317,8 @@ def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recordin
     """
     def error(position: Array) -> Array:
         position = position if drive is None else position[:, [drive]]
-        return np.sum([one.position_error(names, position) for one in effects], axis=0)
+        errors: Array = np.sum([one.position_error(names, position) for one in effects], axis=0)
+        return errors
 
     return smoothed_as(read, recording, error)
 
