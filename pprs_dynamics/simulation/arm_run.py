@@ -19,7 +19,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
-from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction, friction_rows
+from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
 from pprs_dynamics.physics.mechanism.closures import ROWS
 from pprs_dynamics.physics.mechanism.description import (
     Frame,
@@ -29,6 +29,7 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Motion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.urdf import expanded
 from pprs_dynamics.physics.model.arm_model import ArmModel

@@ -101,7 +101,7 @@ class LinkagePlant:
             np.asarray(values[f'friction.{key}'], dtype=float)
             for key in ('viscous', 'coulomb', 'offset'))
         self._width = reversal.widths(len(s.drives))
-        self._passive = [effect.table(reversal) for effect in model.effects
+        self._passive = [effect.table(model.robot, reversal) for effect in model.effects
                          if isinstance(effect, LinkageFriction)]
         self._pushes: list[tuple[int, str, dict[str, float], JointMoment]] = []
         self.hidden = [self._hide(name, motion, efforts, random, scale)

@@ -272,7 +272,7 @@ def test_what_is_no_friction_does_not_push() -> None:
 
 
 def test_friction_in_joints_must_not_give_power_to_the_robot() -> None:
-    one = fit('revolute_friction', None, parameters={'torque': Estimate(-1.0, 0.1, 'N m')})
+    one = fit('joint_friction', None, parameters={'revolute.torque': Estimate(-1.0, 0.1, 'N m')})
     assert objections.of_physics(one, friction_residuals(0.09)) == []
     refused, = objections.of_physics(one, friction_residuals(0.2))
     assert refused.endswith('the joints would give power back in 20% of the moving time')

@@ -201,13 +201,13 @@ def test_a_search_that_is_far_is_not_gone_on_from(monkeypatch: pytest.MonkeyPatc
 def test_what_may_be_lack_of_fit_is_told_once_it_stands_out_of_the_noise(
         viscous: float, stands_out: bool) -> None:
     # Both are less than a tenth of what the drag is.
-    recording = recording_of({'platform_drag': {'coefficient': 12.0, 'rotational': 0.0},
-                              'revolute_friction': {'viscous': viscous, 'torque': 0.0}}, 0.02)
+    recording = recording_of({'tool_drag': {'coefficient': 12.0, 'rotational': 0.0},
+                              'joint_friction': {'revolute.viscous': viscous}}, 0.02)
     ranking = select(MODEL, [recording], DECISIONS)
-    assert names(ranking.best) == ['platform_drag', 'revolute_friction']
-    assert ('revolute_friction' in names(ranking.kept)) is stands_out
+    assert names(ranking.best) == ['tool_drag', 'joint_friction']
+    assert ('joint_friction' in names(ranking.kept)) is stands_out
     assert [one.candidate.name for one in ranking.remainders] == [
-        'revolute_friction'] * (not stands_out)
+        'joint_friction'] * (not stands_out)
 
 
 def test_a_wrench_on_preloaded_guides_hides_no_effect_and_makes_none() -> None:
@@ -251,8 +251,8 @@ def test_a_freer_form_of_what_was_found_is_no_rival() -> None:
 
 
 def test_one_cause_wins_over_several_that_imitate_it() -> None:
-    found = select(MODEL, [recording_of({'rod_mass': {'mass': 0.12}})], DECISIONS).best
-    assert names(found) == ['rod_mass']
+    found = select(MODEL, [recording_of({'link_mass': {'rods.mass': 0.12}})], DECISIONS).best
+    assert names(found) == ['link_mass']
 
 
 def test_a_line_on_one_drive_is_unknown_at_its_frequency() -> None:

@@ -80,6 +80,17 @@ class FittedTerm:
         return cls(effect, drive, shape, tuple(c.name for c in effect.coefficients),
                    np.array([c.scale for c in effect.coefficients] or [1.0]))
 
+    @classmethod
+    def at_places(cls, effect: type[CatalogueEffect]) -> list[FittedTerm]:
+        """Return an effect in the structure, once for each of its places, with all that it has."""
+        scale = {c.name: c.scale for c in effect.coefficients}
+        most: dict[tuple[tuple[str, ...], ...], tuple[str, ...]] = {}
+        for names in effect.variants:
+            place = effect.places_of(names)
+            most[place] = max(most.get(place, ()), names, key=len)
+        return [cls(effect, None, {}, names, np.array([scale[name] for name in names]))
+                for names in most.values()]
+
     @property
     def size(self) -> int:
         """Number of columns."""

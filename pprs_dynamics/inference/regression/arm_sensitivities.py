@@ -12,9 +12,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.sensitivities import RELATIVE_STEP, Number, Sensitivities
-from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
-from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
 from pprs_dynamics.physics.mechanism.mechanism import LinkageState
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.keys import is_gain
@@ -40,10 +38,6 @@ class ArmSensitivities(Sensitivities):
         """Return the size of the drives' dry friction in full motion, (N, D) [N, N m]."""
         return sum((effect.dry(state.guide_load) for effect in self.model.effects
                     if isinstance(effect, AxisFriction)), np.zeros_like(state.guide_load))
-
-    def is_in_passive_joints(self, effect: Effect) -> bool:
-        """Return whether an effect is the friction of passive joints."""
-        return isinstance(effect, LinkageFriction)
 
     def drives_of(self, number: Number) -> list[int] | None:
         """Return the drive that a number of its own friction, or its gain, acts on."""

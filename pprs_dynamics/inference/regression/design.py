@@ -299,7 +299,7 @@ class Design:
     def present(self, effect: type[CatalogueEffect], drive: int | None,
                 ) -> Mapping[str, float] | None:
         """Return the parameters that the given model has of an effect; None where it lacks it."""
-        there = next((e for e in self.given.effects if type(e) is effect), None)
+        there = next((e for e in self.given.effects if e.name == effect.name), None)
         name = None if drive is None else self.drives[drive]
         if there is None or (isinstance(there, DriveEffect) and name not in there.drives):
             return None
@@ -378,7 +378,7 @@ class Design:
         name = self.drives[drive]
         for effect in self.model.effects:
             if (isinstance(effect, MeasurementEffect) and name in effect.drives
-                    and type(effect) is not without):
+                    and (without is None or effect.name != without.name)):
                 alone = type(effect)({name: effect.drives[name]})
                 rows = np.reshape([alone.sensed(row[:, None], time, (name,))[:, 0]
                                    for row in rows], rows.shape)
@@ -441,7 +441,7 @@ class Design:
 
     def present_rows(self, column: PresentCoefficient | PresentShape) -> dict[int, Array]:
         """Return the rows, (M,) by drive, of what the model's effects may be otherwise."""
-        there = next(e for e in self.model.effects if type(e) is column.effect)
+        there = next(e for e in self.model.effects if e.name == column.effect.name)
         assert isinstance(there, CatalogueEffect)
         values = present_values(there, column.drive)
         drive = None if column.drive is None else self.drives.index(column.drive)

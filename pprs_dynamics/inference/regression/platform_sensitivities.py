@@ -15,9 +15,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.sensitivities import Number, Sensitivities
-from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
-from pprs_dynamics.physics.effects.laws.passive_friction import PassiveFriction
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.three_pprs.forward_motion import platform_rates, solve_forward_motion
@@ -43,10 +41,6 @@ class PlatformSensitivities(Sensitivities):
         """Return the size of the drives' dry friction in full motion, (N, 6) [N]."""
         friction = next(e for e in self.model.effects if isinstance(e, ActiveFriction))
         return friction.dry(state.guide_load)
-
-    def is_in_passive_joints(self, effect: Effect) -> bool:
-        """Return whether an effect is the friction of joints C_i and A_i."""
-        return isinstance(effect, PassiveFriction)
 
     def drives_of(self, number: Number) -> list[int] | None:
         """Return the drive that a coefficient is of, or the two of a mass's chain."""

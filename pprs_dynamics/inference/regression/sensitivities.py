@@ -38,6 +38,7 @@ DRIVE_WIDTHS = (0.2, 0.5, 2.0, 5.0)
 PASSIVE_WIDTHS = (0.05, 0.25, 4.0)
 # Names of columns; those of effects outside the drives have the effects' names.
 NUMBERS, HOMING, PRESENT, BARE = 'numbers', 'homing', 'present ', 'bare '
+PASSIVE_FRICTION = 'passive_friction'  # the model's own, in passive joints
 OF_DRIVES, OF_JOINTS = 'drive widths', 'passive widths'
 
 
@@ -155,7 +156,7 @@ class Sensitivities(ABC):
         columns = {NUMBERS: self._of_numbers(forces, reference), OF_DRIVES: self._sensed_each(
             reversal_columns(self.dry(state), state.velocity, state.direction,
                              np.asarray(self.model.reversal.velocity)), state)}
-        for friction in filter(self.is_in_passive_joints, following(self.model)):
+        for friction in (one for one in following(self.model) if one.name == PASSIVE_FRICTION):
             columns[OF_JOINTS] = self._sensed_each(
                 passive_reversal_columns(friction, state), state)
         homing = self.of_homing(state, reference) if self.homing_stride else None
@@ -177,10 +178,6 @@ class Sensitivities(ABC):
     @abstractmethod
     def dry(self, state: Any) -> Array:
         """Return the size of the drives' dry friction in full motion, (N, D) [N, N m]."""
-
-    @abstractmethod
-    def is_in_passive_joints(self, effect: Effect) -> bool:
-        """Return whether an effect is the model's own friction in the passive joints."""
 
     @abstractmethod
     def of_homing(self, state: Any, reference: Array) -> Array | None:
@@ -274,7 +271,7 @@ class Sensitivities(ABC):
         effect adds (a preloaded guide). Those of bodies are around none: `AddedBody.around` makes
         them exact for where one is.
         """
-        present = next((one for one in self.model.effects if type(one) is effect
+        present = next((one for one in self.model.effects if one.name == effect.name
                         and isinstance(one, StructureEffect)), None)
         if issubclass(effect, AddedBody) and effect in self.searched:
             present = None

@@ -167,7 +167,8 @@ class ArmModel(ForceModel):
             robot = _mechanism(structure, values)
             effects = (AxisFriction(values['friction.viscous'], values['friction.coulomb']),
                        AxisOffset(values['friction.offset']), *passive_friction(structure, values),
-                       *added_effects(parameters, cls, structure.drives, robot))
+                       *added_effects(parameters, cls, structure.drives, robot,
+                                      structure.turning))
             loaded = robot
             for effect in effects:
                 if isinstance(effect, BodyEffect):

@@ -28,6 +28,7 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.effects_block import added_effects
 from pprs_dynamics.physics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
+from pprs_dynamics.physics.model.former_names import with_general_names
 from pprs_dynamics.physics.model.keys import KEYS, is_axis, is_mechanism, title_of
 from pprs_dynamics.physics.model.limits import Limits
 from pprs_dynamics.physics.model.one_pass import OnePass
@@ -94,6 +95,11 @@ class DriveModel(ForceModel):
     equations: str = 'corrected'
 
     @property
+    def mechanism_of_effects(self) -> Robot:
+        """The robot as described."""
+        return self.robot
+
+    @property
     def effort_limits(self) -> Array:
         """Largest absolute effort that each drive can apply [N], (6,)."""
         return self.limits.efforts
@@ -108,6 +114,7 @@ class DriveModel(ForceModel):
                 raise ModelError(other, parameters[other], 'not be given: this needs a 3-PPRS, and '
                                  f'{title_of(parameters)} is for pprs compare, diagnose, adopt, '
                                  'fit and history')
+            parameters = with_general_names(parameters)
             values = checked_values(parameters)
             for stroke in ('limits.slide_stroke', 'limits.lift_stroke'):
                 if not values[stroke][0] < values[stroke][1]:
@@ -115,11 +122,13 @@ class DriveModel(ForceModel):
                                      'be a lower and a higher position [m]')
             robot = Robot(Geometry(**_group(values, 'geometry.')),
                           Masses(**_group(values, 'masses.')),
-                          gravity_in_efforts(values, 'gravity'))
+                          gravity_in_efforts(values, 'gravity'),
+                          (values['friction.revolute.diameter'] / 2,
+                           values['friction.spherical.diameter'] / 2))
             limits = Limits.of(values)
             effects = (ActiveFriction(**_group(values, 'friction.drives.')),
                        _passive_friction(values, limits),
-                       *added_effects(parameters, cls, cls.drives))
+                       *added_effects(parameters, cls, cls.drives, robot))
             _require_bodies(robot, effects)
             reversal = Reversal(_reversal_velocity(values), values['friction.reversal_rate'])
             return cls(robot=robot, effects=effects, limits=limits, reversal=reversal,

@@ -21,11 +21,12 @@ LISTS = ('effects.active', 'effects.measured')
 
 def added_effects(
     parameters: Mapping[str, Any], kind: type[ForceModel], drives: tuple[str, ...],
-    robot: Any = None,
+    robot: Any = None, turning: tuple[str, ...] = (),
 ) -> Iterator[CatalogueEffect]:
     """Yield the effects that are active in a model of a kind with drives, all blocks checked.
 
-    Parameters of some are those that they have on the `robot`.
+    Parameters of some are those that they have on the `robot`; of drives that are `turning` bounds
+    are others.
     """
     active = parameters.get('effects.active', [])
     if not isinstance(active, (list, tuple)) or not all(isinstance(n, str) for n in active):
@@ -46,7 +47,7 @@ def added_effects(
         found = found.bound(robot)
         # A block that is not active is checked all the same, but may still be incomplete.
         if issubclass(found, DriveEffect):
-            found.check_bounds(block, [] if robot is None else robot.structure.turning)
+            found.check_bounds(block, turning)
         effect = found.from_file(block, complete=name in active)
         if name in active:
             if name in of_sensors:

@@ -15,13 +15,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction, drive_friction
-from pprs_dynamics.physics.effects.laws.passive_friction import (
-    JointResistance,
-    Joints,
-    WholeMechanismFriction,
-    friction_forces,
-    joint_resistances,
-)
+from pprs_dynamics.physics.effects.laws.passive_friction import WholeMechanismFriction
 from pprs_dynamics.physics.mechanism.evaluation import evaluate
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_sample import motion_sample
@@ -44,7 +38,12 @@ from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
     chain_motions,
 )
 from pprs_dynamics.physics.three_pprs.joint_rates import turnover
-from pprs_dynamics.physics.three_pprs.kernel_parameters import RobotParameters
+from pprs_dynamics.physics.three_pprs.kernel_parameters import Joints, RobotParameters
+from pprs_dynamics.physics.three_pprs.passive_joints import (
+    JointResistance,
+    friction_forces,
+    joint_resistances,
+)
 from pprs_dynamics.physics.three_pprs.rigid_body import ThreeForces, body_forces
 from pprs_dynamics.physics.three_pprs.robot import Robot
 from pprs_dynamics.physics.three_pprs.state import MechanismKinematics, MechanismState

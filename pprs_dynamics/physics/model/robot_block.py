@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction, friction_rows
+from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
 from pprs_dynamics.physics.mechanism.description import (
     Description,
     Frame,
     Loop,
     Transmission,
 )
+from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
 from pprs_dynamics.physics.model.keys import ARM, POSE, drives_key, mechanism_block
@@ -130,10 +131,10 @@ def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[st
         if joint.spring is not None:
             stiffness, relaxed = joint.spring
             block_of_effect = f'{name}: {{stiffness: {stiffness:g}, position: {relaxed:g}}}'
-            way = ('take its stiffness off, and write effects: {active: [drive_spring], '
-                   f'drive_spring: {{{block_of_effect}}}}}'
-                   if name in structure.drives else 'springs of passive joints are not covered')
-            raise ModelError(f'{block}.mjcf', name, f'have no spring ({stiffness:g}): {way}')
+            effect = 'drive_spring' if name in structure.drives else 'joint_spring'
+            raise ModelError(f'{block}.mjcf', name, f'have no spring ({stiffness:g}): take its '
+                             f'stiffness off, and write effects: {{active: [{effect}], '
+                             f'{effect}: {{{block_of_effect}}}}}')
         if name in structure.drives:
             continue
         if joint.armature:
@@ -182,4 +183,4 @@ def passive_friction(structure: Structure, values: Mapping[str, Any]) -> Iterato
             raise ModelError(f'friction.joints.{name}.radius', blocks[name]['radius'],
                              'be greater than 0 beside coulomb: the load rubs at it [m]')
     if blocks:
-        yield LinkageFriction(structure, blocks)
+        yield LinkageFriction(blocks)

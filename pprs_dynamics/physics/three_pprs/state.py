@@ -20,6 +20,8 @@ from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import ChainKinematics, chain_table
 from pprs_dynamics.physics.three_pprs.jacobians import Jacobians, inverse_table
 from pprs_dynamics.physics.three_pprs.joint_rates import turnover_table
+from pprs_dynamics.physics.three_pprs.kernel_parameters import REVOLUTE, Joints
+from pprs_dynamics.physics.three_pprs.passive_joints import resistance_table, transferred
 from pprs_dynamics.physics.three_pprs.rigid_body import RigidBody, solve_bodies
 from pprs_dynamics.physics.three_pprs.robot import Geometry, Robot
 
@@ -194,6 +196,30 @@ class MechanismState:
     def direction(self) -> Array:
         """Sign of the drive velocities, sgn, turning over within the reversal velocity."""
         return self.kinematics.direction(self.reversal.velocity)
+
+    @property
+    def tool_velocity(self) -> Array:
+        """Velocity of o and angular velocity of the platform, in `base`, (N, 6)."""
+        return np.concatenate((self.motion.linear_velocity, self.motion.angular_velocity), axis=1)
+
+    def joint_position(self, joint: str) -> Array:
+        """Return the angles u_i of the joints C_i, (N, 3) [rad]."""
+        assert joint == REVOLUTE
+        angle: Array = np.arctan2(self.chains.sin_u, self.chains.cos_u)
+        return angle
+
+    def resistances(self, joints: Joints) -> Array:
+        """Return k_ri and k_si at the frictionless reactions, (N, 6) [N m s/rad], Eq. (9)."""
+        return resistance_table(joints, self.rigid_body.reaction_table,
+                                self.kinematics.turnover(self.reversal.rate))
+
+    def against_friction(self, joints: Joints, printed: bool = False) -> Array:
+        """Return the drive forces against friction of passive joints, (N, 6) [N].
+
+        By virtual power: a virtual motion of a drive moves every passive joint, Eq. (12).
+        """
+        return transferred(self.robot.geometry.kernel_parameters, self.kinematics.chain_table,
+                           self.kinematics.inverse_table, self.resistances(joints), printed)
 
     def turning_over(self, reversal: Reversal) -> MechanismState:
         """Return the state with a sgn of other widths; all else is computed once for both."""

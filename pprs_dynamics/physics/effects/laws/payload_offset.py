@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from pprs_dynamics.physics.effects.altered_masses import with_masses
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.three_pprs.robot import Robot
@@ -47,4 +46,4 @@ class PayloadOffset(BodyEffect):
         """Return the robot with the other centre of mass."""
         x, y, z = robot.masses.centre
         d_x, d_y, d_z = (self.values[axis] for axis in 'xyz')
-        return with_masses(robot, centre=(x + d_x, y + d_y, z + d_z))
+        return robot.with_masses(centre=(x + d_x, y + d_y, z + d_z))

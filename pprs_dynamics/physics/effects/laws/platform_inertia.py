@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from pprs_dynamics.physics.effects.altered_masses import with_masses
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.three_pprs.robot import Robot
@@ -46,4 +45,4 @@ class PlatformInertia(BodyEffect):
         """Return the robot with the other inertia."""
         inertia = tuple(moment + self.values[p.name] for moment, p in zip(
             robot.masses.inertia, self.parameters, strict=True))
-        return with_masses(robot, inertia=inertia)
+        return robot.with_masses(inertia=inertia)
