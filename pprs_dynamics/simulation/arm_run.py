@@ -417,12 +417,11 @@ def _hidden_joint(model: ArmModel, motion: JointMotion, plain: Array, random: np
 
 def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Array:
     """Return friction, offset and armature as the model file has them, under the true loads."""
-    values, v = model.values, motion.velocity
+    v = motion.velocity
     friction: Array = (
-        model.robot.armature * motion.acceleration
-        + np.array(values['friction.viscous']) * v
-        + np.array(values['friction.coulomb']) * np.tanh(v / np.asarray(model.reversal.velocity))
-        + np.array(values['friction.offset']))
+        model.robot.armature * motion.acceleration + np.asarray(model.friction.viscous) * v
+        + np.asarray(model.friction.coulomb) * np.tanh(v / np.asarray(model.reversal.velocity))
+        + np.asarray(model.offset.value))
     for effect in model.effects:
         if isinstance(effect, LinkageFriction):
             state = model.mechanism(motion).loaded(

@@ -11,14 +11,12 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.arm_sensitivities import ArmSensitivities
-from pprs_dynamics.inference.regression.axis_sensitivities import AxisSensitivities
 from pprs_dynamics.inference.regression.platform_sensitivities import PlatformSensitivities
 from pprs_dynamics.inference.regression.sensitivities import NUMBERS, Sensitivities
 from pprs_dynamics.inference.regression.terms import FullRate
 from pprs_dynamics.inference.residuals.reconstruction import Reconstruction
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.model.axis_model import AxisModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel, Forces
 from pprs_dynamics.physics.model.keys import is_gain
@@ -42,8 +40,6 @@ def sensitivities_of(model: ForceModel, given: ForceModel) -> Sensitivities:
     """Return the sensitivities of a model of any kind."""
     if isinstance(model, ArmModel):
         return ArmSensitivities(model, given)
-    if isinstance(model, AxisModel):
-        return AxisSensitivities(model, given)
     assert isinstance(model, DriveModel)
     return PlatformSensitivities(model, given)
 

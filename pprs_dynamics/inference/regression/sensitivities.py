@@ -127,7 +127,8 @@ class Sensitivities(ABC):
             bound for effect in catalogue().values() if issubclass(effect, StructureEffect)
             and given.offers(effect) and effect.name not in present
             if issubclass(bound := given.bound(effect), StructureEffect) and bound.coefficients)
-        self.homing_stride = HOMING_STRIDE
+        self.homing_stride = HOMING_STRIDE if any(
+            one.shifts_positions() and given.offers(one) for one in catalogue().values()) else 0
 
     def restrict(self, effects: Container[type[CatalogueEffect]]) -> None:
         """Leave out columns that effects other than these would need."""

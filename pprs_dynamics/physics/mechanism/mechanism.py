@@ -64,6 +64,8 @@ class Mechanism:
         In the base's frame [m/s^2].
     radii : mapping of str to float
         At which loads of joints rub [m], where known.
+    load_is_known : bool
+        Whether what rubs in the drives is what they carry, and no preload.
     """
 
     structure: Structure
@@ -72,6 +74,7 @@ class Mechanism:
     armature: Array
     gravity: tuple[float, float, float]
     radii: Mapping[str, float] = field(default_factory=dict)
+    load_is_known: bool = True
 
     @property
     def masses(self) -> Array:
@@ -385,8 +388,8 @@ class LinkageState(JointMotion):
 
     @lazy
     def guide_load(self) -> Array:
-        """What a drive's gear carries [N m, N]: the size of what it passes on."""
-        load: Array = np.abs(self.transmitted)
+        """What a drive's gear carries [N m, N]: the size of what it passes on; 0 if not known."""
+        load: Array = np.abs(self.transmitted) * self.robot.load_is_known
         return load
 
     @lazy

@@ -128,7 +128,7 @@ class DriveModel(ForceModel):
             limits = Limits.of(values)
             effects = (ActiveFriction(**_group(values, 'friction.drives.')),
                        _passive_friction(values, limits),
-                       *added_effects(parameters, cls, cls.drives, robot))
+                       *added_effects(parameters, cls.kind, cls.drives, robot))
             _require_bodies(robot, effects)
             reversal = Reversal(_reversal_velocity(values), values['friction.reversal_rate'])
             return cls(robot=robot, effects=effects, limits=limits, reversal=reversal,

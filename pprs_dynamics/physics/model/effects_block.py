@@ -12,7 +12,6 @@ from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.catalogue import REPLACED, catalogue, find_effect
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.keys import Key, title_of
 
 # Keys of the block `effects` that are no effect.
@@ -20,7 +19,7 @@ LISTS = ('effects.active', 'effects.measured')
 
 
 def added_effects(
-    parameters: Mapping[str, Any], kind: type[ForceModel], drives: tuple[str, ...],
+    parameters: Mapping[str, Any], kind: str, drives: tuple[str, ...],
     robot: Any = None, turning: tuple[str, ...] = (),
 ) -> Iterator[CatalogueEffect]:
     """Yield the effects that are active in a model of a kind with drives, all blocks checked.
@@ -62,10 +61,10 @@ def _unknown(name: str, place: str) -> UnknownNameError:
     return UnknownNameError('effect', name, catalogue(), place, instead=REPLACED.get(name, ''))
 
 
-def _check_place(name: str, block: Any, effect: type[CatalogueEffect], kind: type[ForceModel],
+def _check_place(name: str, block: Any, effect: type[CatalogueEffect], kind: str,
                  drives: tuple[str, ...], title: str) -> None:
     """Raise ModelError where an effect is not one of this kind of model, or on another drive."""
-    if not kind.offers(effect):
+    if kind not in effect.acts_in:
         raise ModelError(f'effects.{name}', block, 'be an effect that acts in ' + title)
     if issubclass(effect, DriveEffect) and isinstance(block, Mapping):
         for drive in block:

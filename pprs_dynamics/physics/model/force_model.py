@@ -131,8 +131,6 @@ class ForceModel(ABC):
 
     Class attributes
     ----------------
-    kind : {'platform', 'axis', 'arm'}
-        Effects say in which kinds they act.
     motions : tuple of type
         Kinds of motion that it has forces for.
     default_file : str
@@ -140,12 +138,13 @@ class ForceModel(ABC):
 
     Attributes
     ----------
+    kind : {'platform', 'axis', 'arm'}
+        Effects say in which kinds they act.
     drives : tuple of D str
     keys : dict of str to Key
         Of its files.
     """
 
-    kind: ClassVar[str]
     motions: ClassVar[tuple[type, ...]]
     default_file: ClassVar[str] = ''
 
@@ -185,6 +184,11 @@ class ForceModel(ABC):
             For a key that is unknown, missing, of the wrong type or impossible, and for those of
             another kind of model.
         """
+
+    @property
+    @abstractmethod
+    def kind(self) -> str:
+        """One of 'platform', 'axis', 'arm'."""
 
     @property
     @abstractmethod
@@ -294,10 +298,9 @@ class ForceModel(ABC):
         """Means of efforts that are compared in a period of the motion; 0 for means of 10 ms."""
         return 0.0
 
-    @classmethod
-    def offers(cls, effect: type[CatalogueEffect]) -> bool:
+    def offers(self, effect: type[CatalogueEffect]) -> bool:
         """Return whether an effect of the catalogue can act in what this is a model of."""
-        return cls.kind in effect.acts_in
+        return self.kind in effect.acts_in
 
     @property
     def mechanism_of_effects(self) -> Any:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -15,17 +16,23 @@ import numpy as np
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
 from pprs_dynamics.physics.mechanism.description import (
+    PARAMETERS,
+    PRISMATIC,
     Description,
     Frame,
+    Joint,
     Loop,
     Transmission,
+    body_at,
 )
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
 from pprs_dynamics.physics.model.keys import ARM, POSE, drives_key, mechanism_block
 from pprs_dynamics.system.package_files import located
 
+AXIS = 'axis'  # the joint, and drive, of a single axis
 # Joints whose motors do not move one joint each.
 COUPLED = ('differential', 'fourbar')
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] where no description has it
@@ -58,6 +65,36 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
                 if key.startswith((f'{block}.home.', f'{block}.loops.')))
     return _structure(description, block, values[f'{block}.base'], values[f'{block}.tool'],
                       values[drives_key(block)], own)
+
+
+def axis_mechanism(mass: float, gravity: float) -> Mechanism:
+    """Return a carriage on a slide, at the slope at which gravity along it is what is given.
+
+    Parameters
+    ----------
+    mass : float
+        [kg]
+    gravity : float
+        Along the positive direction [m/s^2]. Without any, what rubs is preload and the weight on
+        the guide, constant and unknown.
+    """
+    g = max(abs(gravity), -STANDARD_GRAVITY[2])
+    structure = _slide(gravity / g)
+    rows = np.array([structure.rows[AXIS]])
+    carriage = body_at(mass, (0.0, 0.0, 0.0), np.zeros((3, 3)))[None]
+    return Mechanism(structure, rows, carriage, np.zeros(1), (0.0, 0.0, -g),
+                     load_is_known=gravity != 0)
+
+
+@lru_cache(maxsize=64)
+def _slide(down: float) -> Structure:
+    """Return the structure of an axis; `down`, the sine of its slope."""
+    carriage = body_at(1.0, (0.0, 0.0, 0.0), np.zeros((3, 3)))
+    joint = Joint(AXIS, PRISMATIC, 'base', 'carriage', Frame(),
+                  np.array([math.sqrt(1 - down * down), 0.0, -down]))
+    return build_structure(
+        Description('', {'base': np.zeros(PARAMETERS), 'carriage': carriage}, {AXIS: joint}, ''),
+        'base', 'carriage', (AXIS,))
 
 
 @lru_cache(maxsize=64)

@@ -32,7 +32,6 @@ from pprs_dynamics.physics.three_pprs.kernel_parameters import (
 )
 
 RODS = 'rods'
-AXIS = 'axis'  # the drive of a single axis
 ELBOWS = ('up', 'down')
 
 

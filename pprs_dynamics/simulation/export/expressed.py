@@ -27,7 +27,6 @@ from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.model.axis_model import AxisModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import Model, build_model
@@ -81,7 +80,7 @@ class _Sorting:
         self.loops = [loop.name for loop in model.robot.structure.loops] if isinstance(
             model, ArmModel) else []
         # Joints of a format that passive joints of the model are; those without do not turn alone.
-        self.passive = {} if isinstance(model, AxisModel) else {
+        self.passive = {
             one.name: HINGES if isinstance(model, DriveModel) else (one.name,)
             for one in model.robot.passive_joints if one.has_position}  # type: ignore[attr-defined]
         self.joints: dict[str, dict[str, float]] = {}
@@ -172,8 +171,6 @@ def express(model: ForceModel, kind: str) -> Expressed:
         _sort_platform(model, sorting)
     elif isinstance(model, ArmModel):
         _sort_arm(model, sorting)
-    else:
-        _sort_drive_friction(model, sorting, 'axis')
     for effect in model.effects:
         if effect.name in model.values.get(ACTIVE, ()):
             sorting.add(effect)
@@ -200,16 +197,14 @@ def _sort_platform(model: DriveModel, sorting: _Sorting) -> None:
     sorting.exchange('equations', 'corrected')
 
 
-def _sort_drive_friction(model: ForceModel, sorting: _Sorting, block: str) -> None:
-    sorting.keep(f'{block}.viscous', model.drives, DAMPING)
-    sorting.keep(f'{block}.coulomb', model.drives, FRICTION)
-    sorting.drop(f'{block}.offset')
-
-
 def _sort_arm(model: ArmModel, sorting: _Sorting) -> None:
     """Sort rotors and friction, also of passive joints; of these no loads."""
-    _sort_drive_friction(model, sorting, 'friction')
-    sorting.keep(f'{model.block}.armature', model.drives, ARMATURE)
+    friction = 'friction' if model.is_described else model.block
+    sorting.keep(f'{friction}.viscous', model.drives, DAMPING)
+    sorting.keep(f'{friction}.coulomb', model.drives, FRICTION)
+    sorting.drop(f'{friction}.offset')
+    if model.is_described:
+        sorting.keep(f'{model.block}.armature', model.drives, ARMATURE)
     for key in model.values:
         name, _, parameter = key.removeprefix('friction.joints.').rpartition('.')
         if not key.startswith('friction.joints.') or parameter == 'radius':
@@ -222,11 +217,11 @@ def _sort_arm(model: ArmModel, sorting: _Sorting) -> None:
 
 def _under_standard_gravity(model: ForceModel, sorting: _Sorting) -> None:
     """Take the gravity that is assumed where a file has none."""
-    if isinstance(model, AxisModel):
-        # The axis is put at a slope that gives its share of it.
-        most = -STANDARD_GRAVITY[2]
-        sorting.exchange('axis.gravity', min(max(model.gravity, -most), most))
-    elif isinstance(model, ArmModel):
+    if isinstance(model, ArmModel) and model.is_described:
         sorting.exchange(f'{model.block}.gravity', STANDARD_GRAVITY)
+    elif isinstance(model, ArmModel):
+        # The axis is put at a slope that gives its share of it.
+        most, along = -STANDARD_GRAVITY[2], model.values['axis.gravity']
+        sorting.exchange('axis.gravity', min(max(along, -most), most))
     else:
         sorting.exchange('gravity', STANDARD_GRAVITY)
