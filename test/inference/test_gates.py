@@ -135,8 +135,9 @@ def fit(effect: str, drives: tuple[str, ...] | None = ('lift_2',), evidence: flo
         own_share: float = 1.0, parameters: dict[str, Estimate] | None = None,
         model: Any = PLAIN) -> Any:
     """Return what the gates look at of a fit."""
-    return SimpleNamespace(request=EffectRequest(CATALOGUE[effect], drives), drives=drives,
-                           evidence=evidence, own_share=own_share, parameters=parameters or {},
+    return SimpleNamespace(request=EffectRequest(model.bound(CATALOGUE[effect]), drives),
+                           drives=drives, evidence=evidence, own_share=own_share,
+                           parameters=parameters or {},
                            model=model, plain=model, nothing_left=())
 
 

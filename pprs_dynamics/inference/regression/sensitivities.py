@@ -25,7 +25,7 @@ from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.force_model import PASSIVE_FRICTION, ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
 
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
@@ -38,7 +38,6 @@ DRIVE_WIDTHS = (0.2, 0.5, 2.0, 5.0)
 PASSIVE_WIDTHS = (0.05, 0.25, 4.0)
 # Names of columns; those of effects outside the drives have the effects' names.
 NUMBERS, HOMING, PRESENT, BARE = 'numbers', 'homing', 'present ', 'bare '
-PASSIVE_FRICTION = 'passive_friction'  # the model's own, in passive joints
 OF_DRIVES, OF_JOINTS = 'drive widths', 'passive widths'
 
 

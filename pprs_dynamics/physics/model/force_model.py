@@ -35,6 +35,8 @@ from pprs_dynamics.physics.model.recorded_names import effort_kind, joint_names,
 from pprs_dynamics.physics.three_pprs.state import DriveStates
 
 RIGID_BODY = 'rigid_body'
+# The model's own friction, in its drives and in its passive joints.
+ACTIVE_FRICTION, PASSIVE_FRICTION = 'active_friction', 'passive_friction'
 
 
 def total_force(parts: tuple[Any, ...]) -> Any:
