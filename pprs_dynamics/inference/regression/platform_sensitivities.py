@@ -15,9 +15,9 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.sensitivities import Number, Sensitivities
-from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 from pprs_dynamics.physics.three_pprs.forward_motion import platform_rates, solve_forward_motion
 from pprs_dynamics.physics.three_pprs.state import MechanismState
 

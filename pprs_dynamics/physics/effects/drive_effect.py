@@ -15,7 +15,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, SINGLE_AXIS, CatalogueEffect, names
-from pprs_dynamics.physics.three_pprs.state import DriveStates
+from pprs_dynamics.physics.mechanism.drive_states import DriveStates
 
 ALONE = 'drive'  # name of one whose name does not matter
 

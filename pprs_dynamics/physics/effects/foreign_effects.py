@@ -23,8 +23,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import EffectError, ModelError, WorkspaceError
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, names
+from pprs_dynamics.physics.mechanism.drive_states import DriveStates
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.three_pprs.state import DriveStates
 from pprs_dynamics.system.plain_text import displayed
 
 # Errors that an effect may raise on purpose: a file's values are wrong ...

@@ -16,13 +16,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import PLATFORM, Effect
-from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
-from pprs_dynamics.physics.effects.laws.passive_friction import (
-    IndependentChainsFriction,
-    JointCoefficients,
-    PassiveFriction,
-    WholeMechanismFriction,
-)
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
@@ -35,7 +28,14 @@ from pprs_dynamics.physics.model.one_pass import OnePass
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
 from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
+from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
+from pprs_dynamics.physics.three_pprs.passive_friction import (
+    IndependentChainsFriction,
+    JointCoefficients,
+    PassiveFriction,
+    WholeMechanismFriction,
+)
 from pprs_dynamics.physics.three_pprs.robot import Geometry, Masses, Robot
 from pprs_dynamics.physics.three_pprs.state import MechanismState, solve_mechanism
 

@@ -27,12 +27,12 @@ from pprs_dynamics.errors import EffectError, MotionError
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.drive_states import DriveStates
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.keys import FILES, Key, title_of
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.physics.model.recorded_names import effort_kind, joint_names, recorded_columns
-from pprs_dynamics.physics.three_pprs.state import DriveStates
 
 RIGID_BODY = 'rigid_body'
 # The model's own friction, in its drives and in its passive joints.

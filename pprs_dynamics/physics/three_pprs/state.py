@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -24,42 +24,6 @@ from pprs_dynamics.physics.three_pprs.kernel_parameters import REVOLUTE, Joints
 from pprs_dynamics.physics.three_pprs.passive_joints import resistance_table, transferred
 from pprs_dynamics.physics.three_pprs.rigid_body import RigidBody, solve_bodies
 from pprs_dynamics.physics.three_pprs.robot import Geometry, Robot
-
-
-class DriveStates(Protocol):
-    """Protocol of N samples of D drives, whatever they move, as effects on drives take them."""
-
-    @property
-    def drives(self) -> tuple[str, ...]:
-        """Names of the drives."""
-
-    @property
-    def time(self) -> Array | None:
-        """[s], (N,), where known."""
-
-    @property
-    def position(self) -> Array:
-        """[m], (N, D)."""
-
-    @property
-    def velocity(self) -> Array:
-        """[m/s], (N, D)."""
-
-    @property
-    def acceleration(self) -> Array:
-        """[m/s^2], (N, D)."""
-
-    @property
-    def direction(self) -> Array:
-        """Sign of the velocities, sgn, (N, D)."""
-
-    @property
-    def guide_load(self) -> Array:
-        """[N], (N, D)."""
-
-    @property
-    def transmitted(self) -> Array:
-        """What gears or screws pass on to the mechanism, without friction [N], (N, D)."""
 
 
 class MechanismKinematics:
