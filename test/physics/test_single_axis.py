@@ -19,8 +19,8 @@ from pprs_dynamics import ArmModel, DriveModel, JointMotion, load_model
 from pprs_dynamics.errors import ModelError, MotionError
 from pprs_dynamics.inference.adoption.request import EffectRequest, EffectRequestError
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
-from pprs_dynamics.inference.regression.collecting import sensitivities_of
 from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.sensitivities import Sensitivities
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
@@ -184,7 +184,7 @@ def test_a_number_below_zero_of_a_robot_moves_the_way_it_is_told_to() -> None:
               'tolerances.masses.centre': 0.1, 'tolerances.gravity': 0.1}
     model = DriveModel.from_parameters(values)
     forces = model.drive_forces(HelicalPath().motion(np.arange(0.0, 1.0, 0.1)))
-    found = sensitivities_of(model, model)
+    found = Sensitivities(model, model)
     columns = found.columns(forces)['numbers']
     assert len(found.numbers) == 3
     for number, column in zip(found.numbers, columns, strict=True):

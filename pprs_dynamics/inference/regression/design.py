@@ -33,7 +33,6 @@ from pprs_dynamics.inference.regression.base_columns import (
 )
 from pprs_dynamics.inference.regression.collecting import (
     ColumnCollector,
-    sensitivities_of,
     stacked_columns,
 )
 from pprs_dynamics.inference.regression.sensitivities import (
@@ -43,6 +42,7 @@ from pprs_dynamics.inference.regression.sensitivities import (
     OF_DRIVES,
     OF_JOINTS,
     PRESENT,
+    Sensitivities,
 )
 from pprs_dynamics.inference.regression.terms import FullRate, OperatingPoint, Term
 from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
@@ -208,7 +208,7 @@ class Design:
         They are those of the given model around every other one: a sensor that says nothing of
         small efforts, say, would leave some of them without a column.
         """
-        sensitivities = sensitivities_of(model, given)
+        sensitivities = Sensitivities(model, given)
         if effects is not None:
             sensitivities.restrict(effects)
         tables: list[dict[Any, Array]] = []

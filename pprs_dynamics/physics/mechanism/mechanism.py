@@ -414,6 +414,17 @@ class LinkageState(JointMotion):
                            + t.offset[row])
         return position
 
+    @property
+    def position_step(self) -> float:
+        """By which a drive is moved for derivatives [rad, m]."""
+        return 1e-4
+
+    def moved(self, drive: int, step: float) -> LinkageState:
+        """Return the state with a drive at other positions, which moves as it did."""
+        position = self.position.copy()
+        position[:, drive] += step
+        return replace(self, position=position, known=None)
+
     def against_friction(self, friction: JointFriction) -> Array:
         """Return the drives' efforts against friction of joints, (N, D)."""
         linkage = self.linkage

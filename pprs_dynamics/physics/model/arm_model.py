@@ -74,6 +74,7 @@ class ArmModel(ForceModel):
     """
 
     motions: ClassVar[tuple[type, ...]] = (JointMotion, PlatformMotion)
+    takes_long: ClassVar[bool] = True
 
     robot: Mechanism
 
@@ -239,6 +240,10 @@ class ArmModel(ForceModel):
             motion, known = self.tool_pose.linkage(motion)
         return LinkageState(motion.position, motion.velocity, motion.acceleration, motion.time,
                             robot=self.robot, reversal=self.reversal, known=known)
+
+    def at_drives(self, state: LinkageState) -> LinkageState:
+        """Return the state in which the links follow drives that move as in another."""
+        return self.mechanism(state)
 
     def variables(self, state: LinkageState) -> dict[str, Array]:
         """Return the loads of the gears, where they are known."""

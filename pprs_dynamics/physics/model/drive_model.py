@@ -29,6 +29,7 @@ from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
 from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
 from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
+from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.passive_friction import (
     IndependentChainsFriction,
@@ -150,6 +151,12 @@ class DriveModel(ForceModel):
             return solve_mechanism(
                 self.robot, motion, reversal=self.reversal, printed=self.equations == 'printed',
                 minimum_sine=self.limits.rod_sine, condition_limit=self.limits.condition_number)
+
+    def at_drives(self, state: MechanismState) -> MechanismState:
+        """Return the state in which the platform follows drives that move as in another."""
+        found = solve_forward_motion(self.robot.geometry, state.position, state.velocity,
+                                     state.acceleration, state.motion[:1]).motion
+        return self.mechanism(found if state.time is None else found.with_time(state.time))
 
     def drive_forces(
         self, motion: PlatformMotion, state: ModelState | None = None,

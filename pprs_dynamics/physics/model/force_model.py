@@ -135,6 +135,8 @@ class ForceModel(ABC):
     ----------------
     motions : tuple of type
         Kinds of motion that it has forces for.
+    takes_long : bool
+        Whether forces take so long that several are evaluated in threads.
     default_file : str
         Model file that is read without another one; empty where there is none.
 
@@ -149,6 +151,7 @@ class ForceModel(ABC):
 
     motions: ClassVar[tuple[type, ...]]
     default_file: ClassVar[str] = ''
+    takes_long: ClassVar[bool] = False
 
     effects: tuple[Effect, ...]
     reversal: Reversal
@@ -316,6 +319,10 @@ class ForceModel(ABC):
     @abstractmethod
     def mechanism(self, motion: Any) -> Any:
         """Return what effects take of a motion of this kind; see `drive_forces`."""
+
+    @abstractmethod
+    def at_drives(self, state: Any) -> Any:
+        """Return what effects take where drives move as in a state of a model of this kind."""
 
     def drive_forces(self, motion: Any, state: ModelState | None = None) -> Forces:
         """Return the forces that the drives must apply for a motion of this kind.

@@ -17,6 +17,7 @@ from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.three_pprs.forward_motion import platform_rates
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import ChainKinematics, chain_table
 from pprs_dynamics.physics.three_pprs.jacobians import Jacobians, inverse_table
 from pprs_dynamics.physics.three_pprs.joint_rates import turnover_table
@@ -24,6 +25,8 @@ from pprs_dynamics.physics.three_pprs.kernel_parameters import REVOLUTE, Joints
 from pprs_dynamics.physics.three_pprs.passive_joints import resistance_table, transferred
 from pprs_dynamics.physics.three_pprs.rigid_body import RigidBody, solve_bodies
 from pprs_dynamics.physics.three_pprs.robot import Geometry, Robot
+
+POSITION_STEP = 3e-5  # of a rod's length, for derivatives by a drive's position
 
 
 class MechanismKinematics:
@@ -160,6 +163,34 @@ class MechanismState:
     def direction(self) -> Array:
         """Sign of the drive velocities, sgn, turning over within the reversal velocity."""
         return self.kinematics.direction(self.reversal.velocity)
+
+    def __getitem__(self, samples: Any) -> MechanismState:
+        """Return the samples that a slice, a mask or indices select, with their load."""
+        return replace(self._along(self.motion[samples]),
+                       load=None if self.load is None else self.load.at(samples))
+
+    def _along(self, motion: PlatformMotion) -> MechanismState:
+        """Return a state of the same robot along another motion."""
+        kinematics = self.kinematics
+        return replace(self, motion=motion, kinematics=MechanismKinematics(
+            kinematics.geometry, motion, kinematics.minimum_sine, kinematics.condition_limit))
+
+    @property
+    def position_step(self) -> float:
+        """By which a drive is moved for derivatives [m]."""
+        return POSITION_STEP * self.robot.geometry.rod_length
+
+    def moved(self, drive: int, step: float) -> MechanismState:
+        """Return the state with a drive at other positions, to first order; all move as before."""
+        from scipy.spatial.transform import Rotation  # here: commands start without it
+
+        move = step * self.jacobians.J[:, :, drive]
+        turned = Rotation.from_quat(self.motion.orientation)
+        rates = platform_rates(self.robot.geometry, PlatformMotion.at_rest(
+            self.motion.position + move[:, :3],
+            (Rotation.from_rotvec(move[:, 3:]) * turned).as_quat()),
+            self.velocity, self.acceleration)
+        return self._along(rates if self.time is None else rates.with_time(self.time))
 
     @property
     def tool_velocity(self) -> Array:
