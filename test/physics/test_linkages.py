@@ -504,7 +504,7 @@ def test_a_robot_from_mjcf_is_that_of_mujoco(tmp_path: Path) -> None:
 def test_it_is_told_as_a_robot_with_loops(tmp_path: Path) -> None:
     file = robots.five_bar().write(tmp_path)
     assert load_model(file).title == 'a robot with loops'
-    values = {**load_model(file).values, 'effects.platform_drag.translation': 0.1}
+    values = {**load_model(file).values, 'effects.payload_offset.x': 0.1}
     with pytest.raises(ModelError, match='acts in a robot with loops'):
         ArmModel.from_parameters(values, str(file))
 

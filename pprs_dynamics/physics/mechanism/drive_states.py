@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol
 
 from pprs_dynamics.arrays import Array
@@ -20,6 +21,10 @@ class DriveStates(Protocol):
     @property
     def time(self) -> Array | None:
         """[s], (N,), where known."""
+
+    @property
+    def channels(self) -> Mapping[str, Array]:
+        """What was measured beside the motion, by name, (N, D) each."""
 
     @property
     def position(self) -> Array:

@@ -64,6 +64,8 @@ class Mechanism:
         In the base's frame [m/s^2].
     radii : mapping of str to float
         At which loads of joints rub [m], where known.
+    motors : mapping of str to (D,) sequence
+        Turns of motors per turn of each drive, of motors that move more than one.
     load_is_known : bool
         Whether what rubs in the drives is what they carry, and no preload.
     """
@@ -74,6 +76,7 @@ class Mechanism:
     armature: Array
     gravity: tuple[float, float, float]
     radii: Mapping[str, float] = field(default_factory=dict)
+    motors: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     load_is_known: bool = True
 
     @property

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.effects.catalogue import REPLACED, catalogue, find_effect
+from pprs_dynamics.physics.effects.catalogue import FORMER, REPLACED, catalogue, find_effect
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.keys import Key, title_of
@@ -58,7 +58,8 @@ def added_effects(
 
 
 def _unknown(name: str, place: str) -> UnknownNameError:
-    return UnknownNameError('effect', name, catalogue(), place, instead=REPLACED.get(name, ''))
+    instead = FORMER[name].effect if name in FORMER else REPLACED.get(name, '')
+    return UnknownNameError('effect', name, catalogue(), place, instead=instead)
 
 
 def _check_place(name: str, block: Any, effect: type[CatalogueEffect], kind: str,

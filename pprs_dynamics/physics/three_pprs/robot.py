@@ -196,6 +196,7 @@ class Robot:
 
     # Its bodies and passive joints are three of a kind each, which no two of them are alike to.
     structure: ClassVar[None] = None
+    motors: ClassVar[Mapping[str, tuple[float, ...]]] = {}
 
     @property
     def passive_joints(self) -> tuple[PassiveJoint, ...]:
