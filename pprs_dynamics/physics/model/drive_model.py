@@ -155,7 +155,8 @@ class DriveModel(ForceModel):
     def at_drives(self, state: MechanismState) -> MechanismState:
         """Return the state in which the platform follows drives that move as in another."""
         found = solve_forward_motion(self.robot.geometry, state.position, state.velocity,
-                                     state.acceleration, state.motion[:1]).motion
+                                     state.acceleration, state.motion[:1]).motion.with_channels(
+                                         state.channels)
         return self.mechanism(found if state.time is None else found.with_time(state.time))
 
     def drive_forces(

@@ -194,7 +194,7 @@ class MechanismState:
         rates = platform_rates(self.robot.geometry, PlatformMotion.at_rest(
             self.motion.position + move[:, :3],
             (Rotation.from_rotvec(move[:, 3:]) * turned).as_quat()),
-            self.velocity, self.acceleration)
+            self.velocity, self.acceleration).with_channels(self.channels)
         return self._along(rates if self.time is None else rates.with_time(self.time))
 
     @property

@@ -61,7 +61,7 @@ class CoupledDrives(StructureEffect):
 
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
-        force = np.zeros_like(state.velocity)
+        force: Array = np.zeros_like(state.velocity)
         widths = state.reversal.widths(state.velocity.shape[1])
         for motor, ratios in self.maps.items():
             row = np.array(ratios)
