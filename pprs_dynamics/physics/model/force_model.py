@@ -244,6 +244,11 @@ class ForceModel(ABC):
         return hashlib.sha256(text.encode()).hexdigest()
 
     @property
+    def is_described(self) -> bool:
+        """Whether its bodies and joints are those of a description, as of a URDF."""
+        return False
+
+    @property
     def gain(self) -> tuple[float, ...] | None:
         """Effort per ampere of each drive; None for a model without."""
         return None
@@ -466,7 +471,7 @@ class ForceModel(ABC):
         state = self.initial_state() if state is None else state
         for effect in sensors:
             memory = state.memories[effect.name]
-            after = (effect.sensed(total, mechanism.time, mechanism.drives, memory)
+            after = (effect.seen(total, mechanism, memory)
                      if isinstance(effect, MeasurementEffect)
                      else total + effect.force(mechanism, memory))
             parts[effect.name], total = after - total, after
