@@ -137,7 +137,8 @@ class ArmModel(ForceModel):
     @property
     def gear_ratios(self) -> tuple[float, ...]:
         """Turns of the motor per turn of each drive."""
-        return self.values.get(f'{self.block}.gear_ratio', super().gear_ratios)
+        ratios: tuple[float, ...] = self.values.get(f'{self.block}.gear_ratio', super().gear_ratios)
+        return ratios
 
     @property
     def effort_limits(self) -> Array:
