@@ -25,7 +25,7 @@ from pprs_dynamics.physics.model.model_file import build_model, load_model
 from pprs_dynamics.simulation.arm_run import draw_motion
 from pprs_dynamics.simulation.export.exported_robot import TreePositions, export_robot
 from pprs_dynamics.simulation.export.expressed import MJCF, URDF, express
-from pprs_dynamics.simulation.export.replay import Replay, replay_excitation
+from pprs_dynamics.simulation.export.replay import DURATION, Replay, replay_excitation
 from pprs_dynamics.simulation.export.writers import closures, written
 
 EXACT = 1e-9  # of the largest effort
@@ -273,7 +273,10 @@ def test_a_single_axis(kind: str, gravity: float, tmp_path: Path) -> None:
     (tmp_path / 'axis.yaml').write_text(text)
     _, result = exported(tmp_path / 'axis.yaml', kind, tmp_path)
     assert result['not_expressed'] == ['axis.offset']
-    assert result['replay_error'] == pytest.approx(3.165, abs=0.01)
+    # The offset, and dry friction that turns over at once and not within 0.3 mm/s.
+    v = draw_motion(load_model(tmp_path / 'axis.yaml'), DURATION, 0).velocity
+    left = -3.165 + 20.394 * (np.tanh(v / 0.0003) - np.tanh(v / 1e-9))
+    assert result['replay_error'] == pytest.approx(np.sqrt(np.mean(left ** 2)), abs=1e-3)
     assert result['replay_error'] == pytest.approx(result['expected_error'], abs=1e-9)
 
 
