@@ -31,6 +31,8 @@ from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
 MARGIN = 0.5
 # Clearances of screws and gears [m, rad].
 USUAL = (5e-4, math.radians(1.0))
+# Compliances of screws and belts, of gears and shafts [m/N, rad/(N m)].
+SOFT = (2e-6, 3e-4)
 
 
 class LostMotion(MeasurementEffect):
@@ -46,7 +48,7 @@ class LostMotion(MeasurementEffect):
         Parameter('play', 'b_r', 'm', 'travel of the encoder without the link at each reversal',
                   -0.1, 0.1, 0.0, 5e-4, expected=USUAL, turning=(-0.5, 0.5)),
         Parameter('windup', 'c', 'm/N', 'by which the encoder leads per load', -1.0, 1.0, 0.0,
-                  1e-6))
+                  1e-6, expected=SOFT, turning=(-10.0, 10.0)))
     variants = (('backlash',), ('play',), ('windup',))
     unphysical_below: ClassVar[Mapping[str, float]] = {
         'backlash': 0.0, 'play': 0.0, 'windup': 0.0}
