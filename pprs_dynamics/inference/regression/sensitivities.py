@@ -218,7 +218,7 @@ class Sensitivities:
 
         before, still = efforts(0, 0.0), self._at(self.model, seldom).rigid_force
         drives = range(len(self.model.drives))
-        return tuple(np.stack(list(self.each(one, drives))) for one in (column, inertia))
+        return np.stack(list(self.each(column, drives))), np.stack(list(self.each(inertia, drives)))
 
     def sensed(self, column: Array, state: Any) -> Array:
         """Return what the model's sensors make of a change of the drives' forces, (N, D)."""
