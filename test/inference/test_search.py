@@ -28,6 +28,11 @@ from pprs_dynamics.inference.search.fitted_model import (
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.ranking import select
+from pprs_dynamics.inference.search.relinearisation import (
+    ExactSet,
+    next_operating_point,
+    search_around_fitted,
+)
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -79,10 +84,7 @@ def small_catalogue(monkeypatch: pytest.MonkeyPatch) -> None:
       'effort_gain': {'gain': 0.05}}, 3),
     ({'quadratic_friction': {'coefficient': 30.0}, 'drive_spring': {
         'stiffness': 20.0, 'position': -0.05}}, 4)])
-def test_the_search_ends_at_the_best_of_all_sets(
-        hidden: dict, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    # All sets within one design, those that would be relinearised around, too.
-    monkeypatch.setattr(Search, 'is_beyond_point', False)
+def test_the_search_ends_at_the_best_of_all_sets(hidden: dict, seed: int) -> None:
     design = Design.of(build_model(AXIS_VALUES), [axis_recording(hidden, seed)])
     search = Search(FittedSets(design, DECISIONS))
     found = search.run()
@@ -176,25 +178,52 @@ def test_without_an_effect_that_bent_the_columns_the_search_begins_again() -> No
 TILTED = EffectCandidate.of([Component.of(CATALOGUE['base_tilt'], None, {}, ('x', 'y'))])
 
 
-@pytest.mark.parametrize(('tilt', 'is_far'), [(0.02, False), (0.9, True)])
-def test_a_set_is_far_where_exact_forces_leave_more_than_linear_ones(
-        tilt: float, is_far: bool) -> None:
-    recording = recording_of({'base_tilt': {'x': tilt, 'y': 0.0}})
-    fits = FittedSets(Design.of(MODEL, [recording]), DECISIONS)
-    found = fits.evaluate((TILTED,))
-    assert names(found) == ['base_tilt']
-    assert relinearisation._is_far(fits, found) is is_far
+def test_what_a_set_costs_by_its_exact_forces_does_not_depend_on_where_it_was_found() -> None:
+    fits = FittedSets(Design.of(MODEL, [recording_of({'base_tilt': {'x': 0.1, 'y': -0.05}})]),
+                      DECISIONS)
+    tilted = fits.evaluate((TILTED,))
+    # Around a model with a wrench and a delay, the linear cost is another.
+    point = next_operating_point(fits, fits.evaluate(tuple(
+        EffectCandidate.of([Component.of(CATALOGUE[name], drive, shape, coefficients)])
+        for name, drive, shape, coefficients in (
+            ('external_wrench', None, {}, CATALOGUE['external_wrench'].variants[-1]),
+            ('time_delay', 0, {'delay': 0.01}, ())))))
+    assert point is not None
+    elsewhere = FittedSets(fits.design.around(point), DECISIONS, fits.regression.error_scale)
+    there = elsewhere.evaluate((TILTED,))
+    assert abs(there.total - tilted.total) > 3
+    costs = [ExactSet.of(*one).cost for one in ((fits, tilted), (elsewhere, there))]
+    assert costs[0] == pytest.approx(costs[1], abs=1)
+    # That of the true set is below its linear cost, of which tilts by 6 degrees are no small part.
+    assert costs[0] < tilted.total
 
 
-def test_a_search_that_is_far_is_not_gone_on_from(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_relinearised_set_is_on_the_drives_where_it_costs_least() -> None:
+    hidden = {drive: {'zero': 0.004} for drive in DRIVES[:2]}
+    fits = FittedSets(Design.of(MODEL, [recording_of({'homing_error': hidden})]), DECISIONS)
+    zeros = [Component.of(CATALOGUE['homing_error'], d, {}, CATALOGUE['homing_error'].variants[0])
+             for d in range(3)]
+    for drives in ((0,), (0, 1, 2)):
+        found = fits.evaluate((EffectCandidate.of(zeros[d] for d in drives),))
+        assert ExactSet.of(fits, found).found.effects[0].drives == (0, 1)
+
+
+def test_what_costs_least_by_exact_forces_is_the_best_whatever_its_linear_cost(
+        monkeypatch: pytest.MonkeyPatch) -> None:
     recording = recording_of({'base_tilt': {'x': 0.05, 'y': 0.0}})
     first = Search(FittedSets(Design.of(MODEL, [recording]), DECISIONS))
-    best = first.run()
-    search, found = relinearisation.around_fitted(first, best, lambda share: None)
+    search, found, _ = search_around_fitted(first, lambda share: None)
     assert search is not first
     assert names(found) == ['base_tilt']
-    monkeypatch.setattr(relinearisation, '_is_far', lambda fits, found: True)
-    assert relinearisation.around_fitted(first, best, lambda share: None) == (first, best)
+    # Were all but the empty set dear by their exact forces, nothing would be found.
+    monkeypatch.setattr(ExactSet, 'cost', property(lambda one: float(len(one.found.candidates))))
+    monkeypatch.setattr(relinearisation, '_shortlist', lambda fits, margin: [
+        fits.evaluate(()), fits.evaluate((TILTED,))])
+    first = Search(FittedSets(Design.of(MODEL, [recording]), DECISIONS))
+    search, found, exact = search_around_fitted(first, lambda share: None)
+    assert names(found) == []
+    assert search is first
+    assert exact == {frozenset(): 0.0, frozenset({'base_tilt'}): 1.0}
 
 
 @pytest.mark.parametrize(('viscous', 'stands_out'), [(0.02, False), (0.08, True)])

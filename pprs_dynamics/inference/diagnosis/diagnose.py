@@ -33,7 +33,7 @@ from pprs_dynamics.inference.residuals.measured_effort import kinds_of, looks_li
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.paired_errors import certainty, rms
+from pprs_dynamics.inference.residuals.paired_errors import rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import (
     DURING,
@@ -457,8 +457,8 @@ class _Answer:
     def _is_predicted(self, without: CandidateSet, found: CandidateSet) -> bool:
         """Return whether held-out blocks are predicted better for certain with an effect more."""
         before, after = (hold_out(self.fits, self.fits.at_noise_of(
-            self.kept, one.candidates)).losses for one in (without, found))
-        return certainty(before - after) > self.decisions.sure
+            self.kept, one.candidates)) for one in (without, found))
+        return before.gain(after).certainty > self.decisions.sure
 
     def _is_needed(self, without: CandidateSet, error: float, held_out: float) -> bool:
         """Return whether all that was found, with its errors, is better than without one of them.

@@ -18,16 +18,16 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
+    Claims,
     Component,
     EffectCandidate,
-    bends,
 )
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_model import linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder, without_remainders
-from pprs_dynamics.inference.search.relinearisation import LEAST_CHANGE, around_fitted, exact_cost
+from pprs_dynamics.inference.search.relinearisation import search_around_fitted
 from pprs_dynamics.inference.search.scan import Place
 from pprs_dynamics.inference.search.search import Search, patterns_of
 from pprs_dynamics.inference.search.unknown import PatternLibrary
@@ -36,7 +36,6 @@ from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 
-SHORTLIST = 4  # sets of different claims that are ranked by exact forces
 SAME = 1e-6  # of a column's square may lie outside the span of others that do the same
 
 
@@ -97,7 +96,7 @@ class Ranking:
     order: tuple[EffectCandidate, ...] = field(repr=False)
     path: tuple[CandidateSet, ...] = field(repr=False)
     refuted: frozenset[Place]
-    exact: Mapping[frozenset[str], float] = field(
+    exact: Mapping[Claims, float] = field(
         default_factory=lambda: MappingProxyType({}), repr=False)
 
     @classmethod
@@ -124,7 +123,7 @@ class Ranking:
         """
         places = {(one.effect, one.drive) for one in gone.components}
         refuted = self.refuted | places
-        if bends(gone) and not places <= self.refuted:
+        if gone.effect.bends_columns and not places <= self.refuted:
             return _searched(FittedSets(self.first.design, self.first.decisions), refuted)
         kept = self.last.pruned(self.without[gone])
         return replace(self._keeping(self.first, self.last, self.patterns, self.best, kept,
@@ -157,8 +156,8 @@ class Ranking:
         """
         found = list(self.of_last)
         if self.first is not self.last:
-            found = [one for one in self.of_last if _is_bent(one)] + [
-                one for one in self.of_first if not _is_bent(one)]
+            found = [one for one in self.of_last if one.is_bent] + [
+                one for one in self.of_first if not one.is_bent]
         return (self.best, *_by_cost([one for one in found
                                       if one is not self.best and one.is_admissible]))
 
@@ -200,7 +199,7 @@ class Ranking:
         """
         # Of one claim that was ranked by exact forces, these stand for all its sets.
         others = [one for one in self._judged if not _has(one, candidate)
-                  and (_claims(one) not in self.exact or one in self._exact_costs)]
+                  and (one.claims not in self.exact or one in self._exact_costs)]
         return min((self.without[candidate], *others),
                    key=lambda one: self.difference(one, self.best).total)
 
@@ -215,9 +214,9 @@ class Ranking:
     @cached_property
     def _exact_costs(self) -> Mapping[CandidateSet, float]:
         """What the sets of the shortlist cost: of each claim the first."""
-        first: dict[frozenset[str], CandidateSet] = {}
+        first: dict[Claims, CandidateSet] = {}
         for one in self.sets:
-            first.setdefault(_claims(one), one)
+            first.setdefault(one.claims, one)
         return {first[claims]: cost for claims, cost in self.exact.items() if claims in first}
 
     @property
@@ -254,7 +253,7 @@ class Ranking:
 
     def _is_beaten(self, other: CandidateSet, margin: float) -> bool:
         """Return whether a set is no rival by the exact forces of its own model."""
-        mine, theirs = (self.exact.get(_claims(one)) for one in (self.best, other))
+        mine, theirs = (self.exact.get(one.claims) for one in (self.best, other))
         return mine is not None and theirs is not None and theirs > mine + margin
 
     def _at_one_load(self) -> Iterator[Rival]:
@@ -344,53 +343,14 @@ def without_search(model: ForceModel, recordings: Sequence[Recording], decisions
 def _searched(first: FittedSets, refuted: frozenset[Place],
               report: Callable[[float], None] = lambda share: None) -> Ranking:
     search = Search(first, patterns_of(first), refuted, lambda share: report(0.25 + 0.35 * share))
-    last, best = around_fitted(search, search.run(), report)
-    # Rivals that bend no columns are judged where none are bent: the best of each kind.
-    seen = {_claims(best)}
-    for one in _by_cost(last.fits.sets) if last is not search else ():
-        if one.cost > best.cost + first.decisions.rival_margin:
-            break
-        if one.effects and not one.unknowns and not _is_bent(one) and _claims(one) not in seen:
-            seen.add(_claims(one))
-            first.refined(first.evaluate(one.candidates))
-    found = _by_exact_forces(Ranking.of(first, last, best, refuted), search)
+    last, best, exact = search_around_fitted(search, report)
+    found = replace(Ranking.of(first, last, best, refuted), exact=MappingProxyType(exact))
     report(1.0)
     return found
 
 
 def _has(found: CandidateSet, candidate: EffectCandidate) -> bool:
     return any(one.claim == candidate.claim for one in found.effects)
-
-
-def _by_exact_forces(found: Ranking, first: Search) -> Ranking:
-    """Return a ranking whose best set is that of the shortlist whose exact forces cost least.
-
-    Linear costs around the model as given, and around another set's, are not those of a set
-    around itself: what is near the best by them is ranked by its own model.
-    """
-    near: dict[frozenset[str], CandidateSet] = {}
-    for one in found.sets:
-        if one.cost > found.best.cost + first.fits.decisions.rival_margin:
-            break
-        near.setdefault(_claims(one), one)
-    if len(near) == 1:
-        return found
-    exact = {claims: exact_cost(found.fits_of(one), one)
-             for claims, one in list(near.items())[:SHORTLIST]}
-    best = min(exact, key=lambda claims: exact[claims])
-    fits = found.fits_of(near[best])
-    if exact[best] < exact[_claims(found.best)] - LEAST_CHANGE:
-        found = Ranking.of(found.first, first if fits is first.fits else Search(
-            found.last, found.patterns, found.refuted), near[best], found.refuted)
-    return replace(found, exact=MappingProxyType(exact))
-
-
-def _is_bent(found: CandidateSet) -> bool:
-    return any(map(bends, found.candidates))
-
-
-def _claims(found: CandidateSet) -> frozenset[str]:
-    return frozenset(candidate.claim for candidate in found.effects)
 
 
 def _by_cost(sets: Sequence[CandidateSet]) -> tuple[CandidateSet, ...]:

@@ -18,13 +18,12 @@ from itertools import combinations
 import numpy as np
 
 from pprs_dynamics.inference.search.candidates import (
-    Candidate,
     CandidateSet,
-    Component,
     EffectCandidate,
     UnknownCandidate,
 )
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
+from pprs_dynamics.inference.search.neighbours import exchanged, simplified, with_instead
 from pprs_dynamics.inference.search.scan import Place, Scan, with_fast_noise
 from pprs_dynamics.inference.search.unknown import PatternLibrary, Shared, best_patterns
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -59,38 +58,35 @@ class Search:
                  progress: Callable[[float], None] | None = None) -> None:
         self.fits, self.patterns = fits, tuple(patterns)
         self.refuted, self.scan = refuted, Scan(fits, refuted)
-        self._report, self._steps = progress or (lambda share: None), 0
+        self._report, self._steps, self.is_ended = progress or (lambda share: None), 0, False
 
     @property
     def best(self) -> CandidateSet:
         """The set of lowest cost so far."""
         return self.fits.best
 
-    def run(self, *starts: Candidates) -> CandidateSet:
-        """Return the best set that the search reaches from all starts, by effects alone at first.
+    def run(self, start: Candidates = (), until_bent: bool = False) -> CandidateSet:
+        """Return the best set that the search reaches, by effects alone at first.
 
-        A pattern of no catalogue stands only beside what effects explain. Where an effect joins
-        that bends the columns, the search ends: what would come next might only make good that
-        they are not bent.
+        A pattern of no catalogue stands only beside what effects explain. `until_bent`: where an
+        effect joins that bends the columns the search ends before its end, since what would come
+        next might only make good that they are not bent.
         """
-        self.fits.stepped = self._stepped
+        self.fits.stepped, self.is_ended = self._stepped, False
         try:
-            return self._found(starts)
+            self.fits.evaluate(())
+            if start:
+                self.rescanned(self.fits.evaluate(start))
+            self._descend(False, until_bent)
+            if not until_bent or not self.best.is_bent:
+                if self.patterns:
+                    self._descend(True, False)
+                self.is_ended = True
+            return self.best
         finally:
             # The fits hold hundreds of megabytes, and are let go of where nothing names them.
             self.fits.stepped = lambda: None
             self._report(1.0)
-
-    def _found(self, starts: Sequence[Candidates]) -> CandidateSet:
-        self.fits.evaluate(())
-        for number, start in enumerate(starts):
-            improve = self.fits.refined if number else self.rescanned
-            improve(self.fits.evaluate(start))
-        if len(starts) != 1:
-            self._descend(False)
-        if self.patterns and not self.is_beyond_point:
-            self._descend(True)
-        return self.best
 
     def release(self) -> None:
         """Let go of what only further scans and fits would need."""
@@ -98,28 +94,20 @@ class Search:
         for patterns in self.patterns:
             patterns.release()
 
-    @property
-    def is_beyond_point(self) -> bool:
-        """Whether the best set has an effect that bends columns, and these are not bent by it."""
-        point = self.fits.design.point
-        known = {(one.effect, one.drive) for one in point.effects} if point else set()
-        return any(one.effect.bends_columns and (one.effect, one.drive) not in known
-                   for one in self.best.blocks)
-
     def _stepped(self) -> None:
         """Report progress: how much is to be done nobody knows, but it never stands still."""
         self._steps += 1
         self._report(self._steps / (self._steps + USUAL_STEPS))
 
-    def _descend(self, with_patterns: bool) -> None:
+    def _descend(self, with_patterns: bool, until_bent: bool) -> None:
         """Move from the best set to better neighbours until there is none."""
         while True:
             before = self.best.cost
             self._try(self._additions(with_patterns))
             if self.best.cost > before - LEAST_IMPROVEMENT:
                 self._try(self._replacements(self.best))
-            self._simplify(self.best)
-            if self.best.cost > before - LEAST_IMPROVEMENT or self.is_beyond_point:
+            simplified(self.fits, self.best)
+            if self.best.cost > before - LEAST_IMPROVEMENT or (until_bent and self.best.is_bent):
                 return
 
     # Moves
@@ -143,7 +131,7 @@ class Search:
                 self.fits.refined(found)
         # A scan puts it where each drive pays by itself: beside others that is seldom right.
         for found in [one for one in new if len(one.candidates) == len(one.effects) == 1]:
-            self._simplify(found)
+            simplified(self.fits, found)
 
     def _all_but_constants(self, found: CandidateSet) -> float:
         """Return the cost of a set if its drives' constants were what their noise expects."""
@@ -222,7 +210,7 @@ class Search:
         for component in candidate.components:
             for names in candidate.effect.variants:
                 if names != component.names:
-                    yield self._with(candidate, component,
+                    yield with_instead(candidate, component,
                                      self.fits.library.variant(component, names))
 
     def replaced(self, found: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
@@ -252,8 +240,8 @@ class Search:
                          for names in candidate.effect.variants
                          if set(names) < set(component.names)]
                 for kept in ([], *([one] for one in fewer)):
-                    less = self._with(candidate, component, *kept)
-                    rests.append((self._exchanged(best, candidate, less), component.drive))
+                    less = with_instead(candidate, component, *kept)
+                    rests.append((exchanged(best, candidate, less), component.drive))
         for rest, drive in rests:
             base = self.fits.at_noise_of(best, rest)
             least = RECOVERED * (base.total - best.total) - REPLACED
@@ -262,7 +250,7 @@ class Search:
             yield from self.scan.proposals(base, None if one_gone else REPLACEMENTS, drive, least)
         for candidate in best.effects:
             for other in self._alternatives(candidate):
-                yield self._exchanged(best, candidate, other)
+                yield exchanged(best, candidate, other)
             if len(candidate.hypotheses) > 1:
                 yield from self._two_for(best, candidate)
 
@@ -285,51 +273,6 @@ class Search:
             yield EffectCandidate.of(
                 replace(one, shape=tuple(sorted(others[number].items())))
                 for one, others in zip(candidate.components, shapes, strict=True))
-
-    def _simplify(self, found: CandidateSet) -> None:
-        """Drop candidates and drives, and try variants, as long as that lowers the cost."""
-        while True:
-            simpler = min(map(self.fits.evaluate, self._simpler(found)),
-                          key=lambda one: one.cost, default=found)
-            if not simpler.cost < found.cost - LEAST_IMPROVEMENT:  # both may be inadmissible: inf
-                return
-            found = self.fits.refined(simpler)
-
-    def _simpler(self, best: CandidateSet) -> Iterable[Candidates]:
-        for candidate in best.candidates:
-            if len(best.candidates) > 1:
-                yield best.without(candidate)
-            if not isinstance(candidate, EffectCandidate):
-                continue
-            effect = candidate.effect
-            # The drives where it matters most; fewer of them may be better though one less is not.
-            strength = {one: self.fits.drop_cost(best, one) for one in candidate.components}
-            ranked = sorted(candidate.components, key=lambda one: -strength[one])
-            most = 3 * self.fits.decisions.rival_margin
-            for count in range(1, len(ranked)):
-                if sum(strength[one] for one in ranked[count:]) < most:
-                    yield self._exchanged(best, candidate,
-                                          EffectCandidate.of(ranked[:count]))
-            if len({one.names for one in candidate.components}) > 1:
-                for names in effect.variants:
-                    yield self._exchanged(best, candidate, EffectCandidate.of(
-                        self.fits.library.variant(one, names) for one in candidate.components))
-            for component in candidate.components:
-                for names in effect.variants:
-                    # The others take part in every scan.
-                    if names != component.names and not set(names) <= set(effect.scanned):
-                        yield self._exchanged(best, candidate, self._with(
-                            candidate, component, self.fits.library.variant(component, names)))
-
-    @staticmethod
-    def _with(candidate: EffectCandidate, gone: Component, *instead: Component) -> EffectCandidate:
-        """Return the candidate with something else, or nothing, for one of its components."""
-        return EffectCandidate.of([*(one for one in candidate.components if one is not gone),
-                                   *instead])
-
-    @staticmethod
-    def _exchanged(found: CandidateSet, old: Candidate, new: Candidate) -> Candidates:
-        return tuple(new if c is old else c for c in found.candidates)
 
 
 def patterns_of(fits: FittedSets) -> list[PatternLibrary]:
