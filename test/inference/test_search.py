@@ -148,7 +148,7 @@ def names(found: CandidateSet) -> list[str]:
 def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects: dict) -> None:
     recording = recording_of(effects)
     ranking = select(MODEL, [recording], DECISIONS)
-    found, last = ranking.kept, ranking.last
+    found, last = ranking.reported, ranking.last
     assert names(found) == sorted(effects)
     # Around the last point the linear forces are those of the model that is handed on.
     exact = exact_forces(last.design, fitted_model(last, found))
@@ -161,7 +161,7 @@ def test_without_an_effect_that_bent_the_columns_the_search_begins_again() -> No
     ranking = select(MODEL, [recording_of({
         'time_delay': delayed, 'stribeck_friction': {'lift_1': {'force': 1.0, 'velocity': 0.02}}})],
         DECISIONS)
-    delay, stribeck = (next(one for one in ranking.kept.effects if one.name == name)
+    delay, stribeck = (next(one for one in ranking.reported.effects if one.name == name)
                        for name in ('time_delay', 'stribeck_friction'))
     without = ranking.less(delay)
     assert without.refuted == {(delay.effect, d) for d in range(6)}
@@ -172,7 +172,7 @@ def test_without_an_effect_that_bent_the_columns_the_search_begins_again() -> No
     # One that bends none takes along what paid beside it, and the search stands.
     simpler = ranking.less(stribeck)
     assert simpler.last is ranking.last
-    assert names(simpler.kept) == ['time_delay']
+    assert names(simpler.reported) == ['time_delay']
 
 
 TILTED = EffectCandidate.of([Component.of(CATALOGUE['base_tilt'], None, {}, ('x', 'y'))])
@@ -233,8 +233,8 @@ def test_what_may_be_lack_of_fit_is_told_once_it_stands_out_of_the_noise(
     recording = recording_of({'platform_drag': {'coefficient': 12.0, 'rotational': 0.0},
                               'revolute_friction': {'viscous': viscous, 'torque': 0.0}}, 0.02)
     ranking = select(MODEL, [recording], DECISIONS)
-    assert names(ranking.best) == ['platform_drag', 'revolute_friction']
-    assert ('revolute_friction' in names(ranking.kept)) is stands_out
+    assert names(ranking.map_set) == ['platform_drag', 'revolute_friction']
+    assert ('revolute_friction' in names(ranking.reported)) is stands_out
     assert [one.candidate.name for one in ranking.remainders] == [
         'revolute_friction'] * (not stands_out)
 
@@ -253,25 +253,25 @@ def test_a_wrench_on_preloaded_guides_hides_no_effect_and_makes_none() -> None:
         recording = Recording.from_arrays('made', TIME, forces.mechanism.position,
                                           effort=total + 0.05 * rng.normal(size=total.shape))
         found = select(MODEL, [recording], DECISIONS)
-        assert names(found.kept) == ['external_wrench'], follows
+        assert names(found.reported) == ['external_wrench'], follows
 
 
 def test_coulomb_and_viscous_friction_are_two_and_not_one_that_is_asymmetric() -> None:
     hidden = {'coulomb_friction': {'lift_1': {'force': 0.5}},
               'viscous_friction': {'lift_1': {'coefficient': 6.0}}}
     found = select(MODEL, [recording_of(hidden)], DECISIONS)
-    assert names(found.best) == ['coulomb_friction', 'viscous_friction']
+    assert names(found.map_set) == ['coulomb_friction', 'viscous_friction']
     assert found.rivals(DECISIONS.rival_margin) == []
     # One that is both is told with its cost.
-    assert found.sets[0] is found.best
+    assert found.sets[0] is found.map_set
     both = next(one for one in found.sets if names(one) == ['asymmetric_friction'])
-    assert both.cost > found.best.cost
+    assert both.cost > found.map_set.cost
 
 
 def test_a_freer_form_of_what_was_found_is_no_rival() -> None:
     found = select(MODEL, [recording_of({'viscous_friction': {'slide_3': {'coefficient': 6.0}}})],
                    DECISIONS)
-    assert names(found.kept) == ['viscous_friction']
+    assert names(found.reported) == ['viscous_friction']
     # It is among the sets, near or not, and never told as another explanation.
     assert any(names(one) == ['asymmetric_friction'] for one in found.sets)
     assert 'asymmetric_friction' not in {
@@ -280,7 +280,7 @@ def test_a_freer_form_of_what_was_found_is_no_rival() -> None:
 
 
 def test_one_cause_wins_over_several_that_imitate_it() -> None:
-    found = select(MODEL, [recording_of({'rod_mass': {'mass': 0.12}})], DECISIONS).best
+    found = select(MODEL, [recording_of({'rod_mass': {'mass': 0.12}})], DECISIONS).map_set
     assert names(found) == ['rod_mass']
 
 
@@ -289,7 +289,7 @@ def test_a_line_on_one_drive_is_unknown_at_its_frequency() -> None:
     effort = recording.effort.copy()
     effort[:, 3] += 0.9 * np.sin(2 * np.pi * 6.1 * TIME)
     found = select(MODEL, [Recording.from_arrays('made', TIME, recording.position, effort=effort)],
-                   DECISIONS).best
+                   DECISIONS).map_set
     assert not found.effects
     assert [c.drives for c in found.unknowns] == [(3,)]
     assert found.unknowns[0].pattern.scale == pytest.approx(6.1, rel=0.001)
