@@ -247,7 +247,8 @@ def diagnose(
                          claims=False)
         report(1.0)
         return replace(answer.diagnosis(found), verdict='unknown')
-    while weak := [one for one in answer.effects if one.objection or not one.is_confirmed]:
+    while weak := [one for one in answer.effects
+                   if one.objection or one.certainty < -decisions.sure]:
         unconfirmed.append(min(weak, key=lambda one: one.evidence))
         gone = answer.ranking.order[answer.effects.index(unconfirmed[-1])]
         answer = _Answer(answer.ranking.less(gone), validate, decisions)
@@ -355,10 +356,6 @@ class _Answer:
                 final.fits.library.force(final.found, last, self.remaining.shape),
                 without.cost, errors[k], errors[k + 1], held_out[k], held_out[k + 1],
                 said.at_bound, self.ranking.shares[k], self._certainty(candidate),
-                (errors[k + 1] < errors[k] and (
-                    held_out[k + 1] < held_out[k]
-                    or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
-                or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1]),
                 impossible or nothing, bool(impossible),
                 without, in_model, moments=said.moments))
         return found
@@ -466,23 +463,6 @@ class _Answer:
         noise = {self.drives[d]: one for d, one in self.fits.regression.noise(
             self.reported.fit).items()}
         return paired_gain(before, after, noise).certainty
-
-    def _is_predicted(self, without: CandidateSet, found: CandidateSet) -> bool:
-        """Return whether held-out blocks are predicted better for certain with an effect more."""
-        before, after = (hold_out(self.fits, self.fits.at_noise_of(
-            self.reported, one.candidates)) for one in (without, found))
-        return before.gain(after).certainty > self.decisions.sure
-
-    def _is_needed(self, without: CandidateSet, error: float, held_out: float) -> bool:
-        """Return whether all that was found, with its errors, is better than without one of them.
-
-        Before what explains most is there, what another effect adds may look like an error.
-        """
-        if linear_error(self.fits, without) <= error:
-            return False
-        if self.validate:
-            return self._error_held_out(settled(self.fits, without).model) > held_out
-        return self._is_predicted(without, self.reported)
 
     def _above_noise(self, floors: Mapping[str, float]) -> dict[str, float]:
         """Return the drives that keep an error above their noise, as multiples of it."""

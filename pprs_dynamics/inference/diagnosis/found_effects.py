@@ -103,11 +103,8 @@ class FoundEffect(FittedEffect):
         over drives, each as a multiple of its noise.
     certainty : float
         Standard errors by which all that was found predicts held-out data better than without it,
-        in units of the noise: see `PairedGain`.
-    is_confirmed : bool
-        Whether the error falls with it, and that on held-out data: either their rms, or for
-        certain that of each frequency in units of its noise. In the former slow noise and the
-        model's own numbers have a share.
+        in units of the noise: see `PairedGain`. In their rms slow noise and the model's own
+        numbers have a share.
     objection : str
         Why it is no finding whatever the error does, as a clause; '' where nothing speaks against.
     is_impossible : bool
@@ -131,7 +128,6 @@ class FoundEffect(FittedEffect):
     at_bound: tuple[str, ...] = ()
     share: float = 0.0
     certainty: float = np.inf
-    is_confirmed: bool = True
     objection: str = ''
     is_impossible: bool = False
     without: RankedSet | None = None

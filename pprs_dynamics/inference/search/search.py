@@ -11,7 +11,7 @@ noise decides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -103,25 +103,20 @@ class Search:
         """Move from the best set to better neighbours until there is none."""
         while True:
             before = self.best.cost
-            self._try(self._additions(with_patterns))
+            self._fit(self._additions(with_patterns))
             if self.best.cost > before - LEAST_IMPROVEMENT:
-                self._try(self._replacements(self.best))
+                self._fit(self._replacements(self.best))
             simplified(self.fits, self.best)
             if self.best.cost > before - LEAST_IMPROVEMENT or (until_bent and self.best.is_bent):
                 return
 
     # Moves
 
-    def _try(self, sets: Iterable[Candidates]) -> None:
-        """Fit sets, and refine the shapes of the best few."""
-        new = []
-        for candidates in sets:
-            if not self.fits.has(candidates) and self._is_bounded(candidates):
-                new.append(self.fits.evaluate(candidates))
-        # No noise takes a constant: what lacks nothing else is judged once it has it.
-        for found in [one for one in new if self._all_but_constants(one) < self.best.cost]:
-            new += [self.fits.evaluate(more) for more in self.scan.proposals(found, 1)
-                    if self._is_bounded(more)]
+    def _fit(self, sets: Iterable[Candidates]) -> None:
+        """Fit sets, and bring those that may be the best to where they cost least."""
+        new = [self.fits.evaluate(one) for one in sets
+               if not self.fits.has(one) and self._is_bounded(one)]
+        new += self._with_constants(new)
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
         shaped = [found for found in new if any(one.effect.shape or one.centre
                                                 for one in found.blocks)]
@@ -130,8 +125,18 @@ class Search:
             if number < REFINED or len(found.candidates) == 1:
                 self.fits.refined(found)
         # A scan puts it where each drive pays by itself: beside others that is seldom right.
-        for found in [one for one in new if len(one.candidates) == len(one.effects) == 1]:
-            simplified(self.fits, found)
+        for found in new:
+            if len(found.candidates) == len(found.effects) == 1:
+                simplified(self.fits, found)
+
+    def _with_constants(self, sets: Iterable[CandidateSet]) -> list[CandidateSet]:
+        """Return sets with one effect more, where they would be the best but for constants.
+
+        No noise takes a constant: what lacks nothing else is judged once it has it.
+        """
+        near = [one for one in sets if self._all_but_constants(one) < self.best.cost]
+        return [self.fits.evaluate(more) for found in near
+                for more in self.scan.proposals(found, 1) if self._is_bounded(more)]
 
     def _all_but_constants(self, found: CandidateSet) -> float:
         """Return the cost of a set if its drives' constants were what their noise expects."""
@@ -217,42 +222,43 @@ class Search:
                  ) -> CandidateSet:
         """Return the best of a set and those in which something else stands for one or two."""
         before = len(self.fits.sets)
-        self._try(self._replacements(found))
+        self._fit(self._replacements(found))
         better = [one for one in self.fits.sets[before:]
                   if one.cost < found.total - LEAST_IMPROVEMENT]
         return next((one for one in sorted(better, key=lambda one: one.cost) if is_allowed(one)),
                     found)
 
-    def _replacements(self, best: CandidateSet) -> Iterable[Candidates]:
-        """Yield sets in which something else stands for one or two candidates, or for a drive's.
+    def _replacements(self, best: CandidateSet) -> Iterator[Candidates]:
+        """Yield sets in which something else stands for candidates, or for one on a drive.
 
         Under the noise of the set, so that a replacement that explains as much is seen to.
         """
-        rests: list[tuple[Candidates, int | None]] = []
-        for size in (1, 2):
-            for gone in combinations(best.candidates, size):
-                if size == 1 or any(isinstance(c, EffectCandidate) for c in gone):
-                    rests.append((best.without(*gone), None))
+        for candidate in best.candidates:
+            # Whatever stands for one effect as well is a rival: all of them are fitted.
+            yield from self._instead(best, best.without(candidate), None)
+        for pair in combinations(best.candidates, 2):
+            if any(isinstance(one, EffectCandidate) for one in pair):
+                yield from self._instead(best, best.without(*pair), REPLACEMENTS)
         for candidate in best.effects:
             for component in candidate.components if len(candidate.components) > 1 else ():
                 # On one of its drives it, or some of its coefficients, may stand for another.
-                fewer = [self.fits.library.variant(component, names)
+                fewer = [(self.fits.library.variant(component, names),)
                          for names in candidate.effect.variants
                          if set(names) < set(component.names)]
-                for kept in ([], *([one] for one in fewer)):
-                    less = with_instead(candidate, component, *kept)
-                    rests.append((exchanged(best, candidate, less), component.drive))
-        for rest, drive in rests:
-            base = self.fits.at_noise_of(best, rest)
-            least = RECOVERED * (base.total - best.total) - REPLACED
-            # Whatever stands for one effect as well is a rival: all of them are fitted.
-            one_gone = drive is None and len(rest) == len(best.candidates) - 1
-            yield from self.scan.proposals(base, None if one_gone else REPLACEMENTS, drive, least)
-        for candidate in best.effects:
+                for kept in ((), *fewer):
+                    rest = exchanged(best, candidate, with_instead(candidate, component, *kept))
+                    yield from self._instead(best, rest, REPLACEMENTS, component.drive)
             for other in self._alternatives(candidate):
                 yield exchanged(best, candidate, other)
             if len(candidate.hypotheses) > 1:
                 yield from self._two_for(best, candidate)
+
+    def _instead(self, best: CandidateSet, rest: Candidates, count: int | None,
+                 drive: int | None = None) -> list[Candidates]:
+        """Return a part of a set with an effect that makes good most of what it lacks."""
+        base = self.fits.at_noise_of(best, rest)
+        return self.scan.proposals(base, count, drive,
+                                   RECOVERED * (base.total - best.total) - REPLACED)
 
     def _two_for(self, best: CandidateSet, gone: EffectCandidate) -> Iterable[Candidates]:
         """Yield sets in which two other effects stand for one that claims more than one thing."""
