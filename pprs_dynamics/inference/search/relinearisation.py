@@ -11,9 +11,8 @@ costs around all points mean the same.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -47,17 +46,24 @@ class ExactSet:
 
     Parameters
     ----------
-    fits : FittedSets
-        Around its model, where nothing else is to be added.
     found : CandidateSet
+    point : OperatingPoint, optional
+        Around which it is linear; None: the given model.
+    effects : tuple of PlacedEffect
+        Its effects with their coefficients.
+    cost : float
+        J_exact = J + |exact - linear|^2, whitened, by the exact forces of its fitted model.
+        However the set was come by, it costs the same. Infinite where its values are no model's.
     """
 
-    fits: FittedSets
     found: CandidateSet
+    point: OperatingPoint | None
+    effects: tuple[PlacedEffect, ...]
+    cost: float
 
     @classmethod
     def of(cls, fits: FittedSets, found: CandidateSet) -> ExactSet:
-        """Return a set around its own model; as it is where its values are those of no model."""
+        """Return a set of some fits around its own model."""
         last, moved = fits, found
         try:
             for _ in range(MOST_STEPS):
@@ -65,25 +71,15 @@ class ExactSet:
                 before, moved = moved, on_best_drives(last, moved)
                 if moved is before:
                     break
-        except PprsError:
-            return cls(fits, found)
-        return cls(last, moved)
-
-    @cached_property
-    def cost(self) -> float:
-        """J_exact = J + |exact - linear|^2, whitened, by the exact forces of its fitted model.
-
-        However the set was come by, it costs the same. Infinite where its values are no model's.
-        """
-        try:
-            one = settled(self.fits, self.found)
+            one = settled(last, moved)
             # Widths that are not settled are columns yet, and not the model's.
-            model = fitted_model(one.fits, one.found) if one.fits is self.fits else one.model
+            model = fitted_model(last, moved) if one.fits is last else one.model
             exact = exact_forces(one.fits.design, model)
         except PprsError:
-            return np.inf
-        return one.found.cost + squared(one.fits, one.found,
-                                        exact - linear_prediction(one.fits, one.found))
+            return cls(found, fits.design.point, parts_of(fits, found)[1], np.inf)
+        return cls(moved, last.design.point, parts_of(last, moved)[1],
+                   one.found.cost + squared(one.fits, one.found,
+                                            exact - linear_prediction(one.fits, one.found)))
 
 
 def search_around_fitted(first: Search, report: Callable[[float], None],
@@ -101,11 +97,11 @@ def search_around_fitted(first: Search, report: Callable[[float], None],
             known = exact.get(one.claims)
             if known is None or one.cost < known.cost - LEAST_CHANGE:
                 new = ExactSet.of(search.fits if one.is_bent else first.fits, one)
-                exact[one.claims] = _cheapest([one for one in (known, new) if one is not None])
-        best = _cheapest(exact.values())
+                exact[one.claims] = new if known is None else min(known, new, key=_cost)
+        best = min(exact.values(), key=_cost)
         if best is at or _is_where(search, best):
             break
-        at, point = best, best.fits.design.point
+        at, point = best, best.point
         search.release()
         if point is None:
             search = first
@@ -117,12 +113,11 @@ def search_around_fitted(first: Search, report: Callable[[float], None],
                                                      0.4 / MOST_SEARCHES))
         search.run(best.found.candidates)
     return (search, search.fits.evaluate(best.found.candidates),
-            {claims: one.cost for claims, one in exact.items()} if len(exact) > 1 else {})
+            {claims: one.cost for claims, one in exact.items()})
 
 
-def _cheapest(sets: Collection[ExactSet]) -> ExactSet:
-    """Return the set of lowest exact cost, which is not computed of one alone."""
-    return min(sets, key=lambda one: one.cost) if len(sets) > 1 else next(iter(sets))
+def _cost(one: CandidateSet | ExactSet) -> float:
+    return one.cost
 
 
 def _shortlist(fits: FittedSets, margin: float) -> list[CandidateSet]:
@@ -133,7 +128,7 @@ def _shortlist(fits: FittedSets, margin: float) -> list[CandidateSet]:
     """
     best, near = fits.best, dict[Claims, CandidateSet]()
     is_beyond = not _is_bent_by(fits.design.point, parts_of(fits, best)[1])
-    for one in sorted(fits.sets, key=lambda one: one.cost):
+    for one in sorted(fits.sets, key=_cost):
         if one.cost <= best.cost + margin or (
                 is_beyond and one.is_bent and one.is_admissible):
             near.setdefault(one.claims, one)
@@ -144,7 +139,7 @@ def _is_where(search: Search, best: ExactSet) -> bool:
     """Return whether a search was to its end around the model of a set, as nearly as matters."""
     there = search.fits.evaluate(best.found.candidates)
     return search.is_ended and abs(there.total - best.found.total) < LEAST_CHANGE and _is_bent_by(
-        search.fits.design.point, parts_of(best.fits, best.found)[1])
+        search.fits.design.point, best.effects)
 
 
 def _share_of(report: Callable[[float], None], start: float, width: float,
@@ -272,6 +267,12 @@ def settled(fits: FittedSets, found: CandidateSet) -> SettledSet:
     ModelError
         For values that no model may have.
     """
+    if found.key not in fits.settled:
+        fits.settled[found.key] = _settled(fits, found)
+    return fits.settled[found.key]  # type: ignore[return-value]
+
+
+def _settled(fits: FittedSets, found: CandidateSet) -> SettledSet:
     before = SettledSet(fits, found, estimate_widths(fits, found))
     if not (before.widths and found.effects):
         return before
