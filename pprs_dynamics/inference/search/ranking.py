@@ -109,8 +109,8 @@ class Ranking:
 
     @classmethod
     def _reporting(cls, first: FittedSets, last: FittedSets, patterns: tuple[PatternLibrary, ...],
-                 map_set: CandidateSet, reported: CandidateSet, remainders: tuple[Remainder, ...],
-                 refuted: frozenset[Place]) -> Ranking:
+                   map_set: CandidateSet, reported: CandidateSet, remainders: tuple[Remainder, ...],
+                   refuted: frozenset[Place]) -> Ranking:
         without = {gone: last.evaluate(reported.without(gone)) for gone in reported.candidates}
         order, path = _falling(last, map_set, reported)
         return cls(first, last, patterns, _by_cost(first.sets), _by_cost(last.sets), map_set,
@@ -128,12 +128,12 @@ class Ranking:
             return _searched(FittedSets(self.first.design, self.first.decisions), refuted)
         reported = self.last.pruned(self.without[gone])
         return replace(self._reporting(self.first, self.last, self.patterns, self.map_set, reported,
-                                     self.remainders, refuted), exact=self.exact)
+                                       self.remainders, refuted), exact=self.exact)
 
     def claiming_nothing(self) -> Ranking:
         """Return the ranking with nothing reported, under the noise that the best set leaves."""
         return self._reporting(self.first, self.last, self.patterns, self.map_set,
-                             self.last.evaluate(()), (), self.refuted)
+                               self.last.evaluate(()), (), self.refuted)
 
     @cached_property
     def shares(self) -> tuple[float, ...]:
@@ -159,8 +159,8 @@ class Ranking:
         if self.first is not self.last:
             found = [one for one in self.of_last if one.is_bent] + [
                 one for one in self.of_first if not one.is_bent]
-        return (self.map_set, *_by_cost([one for one in found
-                                      if one is not self.map_set and one.is_admissible]))
+        return (self.map_set, *_by_cost([
+            one for one in found if one is not self.map_set and one.is_admissible]))
 
     def barred(self, margin: float) -> tuple[CandidateSet, ...]:
         """Return the sets that would cost less than a margin more than the best, and may not be."""

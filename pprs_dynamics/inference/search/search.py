@@ -216,7 +216,7 @@ class Search:
             for names in candidate.effect.variants:
                 if names != component.names:
                     yield with_instead(candidate, component,
-                                     self.fits.library.variant(component, names))
+                                       self.fits.library.variant(component, names))
 
     def replaced(self, found: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
                  ) -> CandidateSet:
