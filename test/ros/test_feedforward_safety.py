@@ -254,7 +254,7 @@ def test_late_messages_are_rejected_and_do_not_keep_alive() -> None:
 
 def test_of_setpoints_that_wait_the_latest_are_executed_and_the_others_are_told() -> None:
     motion = random_motion(np.random.default_rng(2), 30)
-    with feedforward_bench() as node:
+    with feedforward_bench(lag_warning=0.02) as node:
         node.answer(message_of(motion[:1]))
         for k in range(len(motion)):  # nobody spins
             node.publisher.publish(message_of(motion[k:k + 1]))
