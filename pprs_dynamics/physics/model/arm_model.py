@@ -40,6 +40,7 @@ from pprs_dynamics.physics.model.recorded_names import CURRENT, gravity_in_effor
 from pprs_dynamics.physics.model.robot_block import (
     described_values,
     joint_radii,
+    motor_map,
     passive_friction,
     read_structure,
 )
@@ -197,7 +198,8 @@ class ArmModel(ForceModel):
         if isinstance(motion, PlatformMotion):
             motion, known = self.tool_pose.linkage(motion)
         return LinkageState(motion.position, motion.velocity, motion.acceleration, motion.time,
-                            robot=self.robot, reversal=self.reversal, known=known)
+                            channels=motion.channels, robot=self.robot, reversal=self.reversal,
+                            known=known)
 
     def variables(self, state: LinkageState) -> dict[str, Array]:
         """Return the loads of the gears."""
@@ -234,7 +236,8 @@ def _mechanism(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
             name = next(name for name, at in structure.rows.items() if at == row)
             raise ModelError('links.mass', float(mass), f'be greater than 0 for what {name} moves')
     robot = Mechanism(structure, bodies, inertial, np.array(values[f'{block}.armature']),
-                      gravity_in_efforts(values, f'{block}.gravity'), joint_radii(values))
+                      gravity_in_efforts(values, f'{block}.gravity'), joint_radii(values),
+                      motor_map(structure, values))
     if block != ARM_BLOCK:
         _require_driven_bodies(robot)
     return robot
