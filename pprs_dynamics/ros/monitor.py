@@ -63,6 +63,8 @@ PARAMETERS = (
                   'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0, stays=True),
     own_parameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
                   upper=3600.0, stays=True),
+    own_parameter('diagnose_since', (), 'recordings of days on which the machine was right: '
+                  'windows are diagnosed for what has changed since then', stays=True),
 )
 
 # Of the samples of a second: from fewer compared ones on the stream is called broken.
@@ -79,7 +81,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
 
     def __init__(self, **options: Any) -> None:
         ManagedNode.__init__(self, 'monitor', allow_undeclared_parameters=True, **options)
-        self._worker, self._changed = DiagnosisWorker(), ''
+        self._worker = DiagnosisWorker()
         self._input: Any = None
         self._publishers_made: list[Any] = []
         self._clocks: list[Timer] = []
@@ -108,7 +110,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
             self._settings.model, own['window'], own['error_span'])
         self._states = MeasuredStates(self._names.joints)
         self._windows = StreamWindows(own['diagnose_every'], own['diagnose_span'])
-        self._begins_anew = self._cannot_begin = False
+        self._begins_anew, self._cannot_begin, self._changed = False, False, ''
         self._origin: int | None = None
         self._latest: tuple[int, Array] | None = None
 
@@ -257,7 +259,8 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
             self._diagnosis.publish(String(data=json.dumps(for_json(answer))))
         if not self._worker.busy and (samples := self._windows.take()) is not None:
             model = self._settings.model
-            self._worker.submit(model.values, model.source, samples)
+            self._worker.submit(model.values, model.source, samples,
+                                tuple(self._settings.own['diagnose_since']))
 
     def destroy_node(self) -> None:
         """Take the process that diagnoses along."""
