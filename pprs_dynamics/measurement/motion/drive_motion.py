@@ -55,6 +55,8 @@ class DriveMotion:
     block : int
         Samples per block, in the longest segment.
     smoothing : Smoothing
+    grids : tuple of SamplingGrid
+        Of the segments.
     from_recorded : (2, D) bool array
         Drives whose velocity, and those whose acceleration, come from recorded velocities.
     notes : tuple of str
@@ -68,6 +70,7 @@ class DriveMotion:
     block_starts: np.ndarray
     block: int
     smoothing: Smoothing
+    grids: tuple[SamplingGrid, ...]
     from_recorded: np.ndarray
     notes: tuple[str, ...]
 
@@ -132,7 +135,8 @@ def smooth_drives(recording: Recording, window: float | None = None,
     q, q_dot, q_ddot = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return DriveMotion(
         q, q_dot, q_ddot, np.concatenate(index), spans, np.concatenate(block_starts),
-        block or block_length(longest.step, duration), smoothing, recorded, tuple(notes))
+        block or block_length(longest.step, duration), smoothing, tuple(used), recorded,
+        tuple(notes))
 
 
 def smoothed_again(motion: DriveMotion, recording: Recording,
@@ -148,12 +152,9 @@ def smoothed_again(motion: DriveMotion, recording: Recording,
     recording, made
         See `smoothed_as`.
     """
-    stretches = []
-    for part in recording.segments:
-        if part.stop - part.start > 2 * SHORTEST_WINDOW:
-            grid, _ = find_grid(recording.time[part], recording.position[part])
-            stretches.append(Stretch(made(grid.at_steps(recording.position[part])), grid.step))
-    smoothing = choose_smoothing(representative(stretches))
+    smoothing = choose_smoothing(representative([
+        Stretch(made(grid.at_steps(recording.position[part])), grid.step)
+        for grid, part in zip(motion.grids, _segments_of(motion, recording), strict=True)]))
     if smoothing.duration >= motion.smoothing.duration:
         return motion
     q, q_dot, q_ddot = smoothed_as(replace(motion, smoothing=smoothing), recording, made)
@@ -176,17 +177,23 @@ def smoothed_as(motion: DriveMotion, recording: Recording,
         Takes the positions of a segment at equal steps, (n, D), and returns as many.
     """
     parts = []
-    for span in motion.segments:
-        first, last = int(motion.index[span.start]), int(motion.index[span.stop - 1])
-        part = next(one for one in recording.segments if one.start <= first < one.stop)
-        grid, _ = find_grid(recording.time[part], recording.position[part])
+    for span, grid, part in zip(motion.segments, motion.grids, _segments_of(motion, recording),
+                                strict=True):
         filter_ = motion.smoothing.polynomial(grid.step)
-        kept = slice(first - part.start, last + 1 - part.start)
+        kept = slice(int(motion.index[span.start]) - part.start,
+                     int(motion.index[span.stop - 1]) + 1 - part.start)
         values = made(grid.at_steps(recording.position[part]))
         parts.append([grid.at_samples(one, filter_.half, kept)
                       for one in filter_.differentiated(values)])
     q, q_dot, q_ddot = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return q, q_dot, q_ddot
+
+
+def _segments_of(motion: DriveMotion, recording: Recording) -> list[slice]:
+    """Return the segments of a recording that those of a motion are of."""
+    firsts = [int(motion.index[span.start]) for span in motion.segments]
+    return [next(part for part in recording.segments if part.start <= first < part.stop)
+            for first in firsts]
 
 
 def _grids(
