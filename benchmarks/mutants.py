@@ -58,7 +58,7 @@ TESTS = {
     'inference/search/search.py': ('inference/test_search.py',),
     'inference/adoption/objections.py': ('inference/test_gates.py',),
     'app/workbench/server/access.py': ('app/test_workbench_safety.py',),
-    'app/fleet/changes.py': ('app/test_changes.py',),
+    'app/fleet/change_points.py': ('app/test_change_points.py',),
 }
 
 

@@ -25,9 +25,11 @@ def displayed(name: object) -> str:
 
 
 def counted(count: int, thing: str) -> str:
-    """Return '1 step' or '3 steps'; `thing` may go on after its noun: 'number of the model'."""
+    """Return '1 step', '3 steps' or '2 bodies'; `thing` may go on: 'number of the model'."""
     noun, _, rest = thing.partition(' ')
-    return f'{count} {noun}{"s" * (count != 1)}{" " * bool(rest)}{rest}'
+    if count != 1:
+        noun = f'{noun[:-1]}ies' if noun.endswith('dy') else f'{noun}s'
+    return f'{count} {noun}{" " * bool(rest)}{rest}'
 
 
 def for_json(content: Any) -> Any:

@@ -22,7 +22,7 @@ from benchmarks.fleets.cluster_kills import write_axis
 from pprs_dynamics import __version__
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.fleet import engine
-from pprs_dynamics.app.fleet.changes import find_changes
+from pprs_dynamics.app.fleet.change_points import find_change_points
 from pprs_dynamics.app.fleet.engine import cluster, run_each, run_survey
 from pprs_dynamics.app.fleet.manifest import ManifestEntry, ManifestError, entries, find_recordings
 from pprs_dynamics.app.fleet.store import DONE, FAILED, Store, key_of, schema
@@ -61,7 +61,7 @@ def write_values(store: Store, robot: str, values: np.ndarray, parameter: str = 
 def test_noise_is_no_change() -> None:
     """Of series without a change at most the promised share is told."""
     time = np.arange(float(DAYS))
-    alarms = [bool(find_changes(time, np.random.default_rng(seed).normal(size=DAYS),
+    alarms = [bool(find_change_points(time, np.random.default_rng(seed).normal(size=DAYS),
                                 0.1).found) for seed in range(200)]
     assert np.mean(alarms) < 0.1
 
@@ -70,7 +70,7 @@ def test_a_step_is_found_with_its_day_and_size() -> None:
     time = np.arange(float(DAYS))
     for seed in RNG_SEEDS:
         noise = np.random.default_rng(seed).normal(size=DAYS)
-        found = find_changes(time, noise + 6.0 * (time >= 17), THRESHOLD).found
+        found = find_change_points(time, noise + 6.0 * (time >= 17), THRESHOLD).found
         assert [one.kind for one in found] == ['step']
         assert abs(found[0].time - 17) <= 1
         assert abs(found[0].size - 6.0) < 4 * found[0].size_std
@@ -81,7 +81,7 @@ def test_slopes_lie_within_their_intervals() -> None:
     right, days, slopes = [], [], 0
     for seed in range(200):
         noise = np.random.default_rng(seed).normal(size=DAYS)
-        found = find_changes(time, noise + 0.7 * np.maximum(time - 12, 0), THRESHOLD).found
+        found = find_change_points(time, noise + 0.7 * np.maximum(time - 12, 0), THRESHOLD).found
         if [one.kind for one in found] == ['slope']:
             slopes += 1
             days.append(abs(found[0].time - 12))
@@ -96,15 +96,15 @@ def test_one_bad_day_is_no_change() -> None:
     time = np.arange(float(DAYS))
     value = np.random.default_rng(3).normal(size=DAYS)
     value[13] += 50.0
-    assert not find_changes(time, value, THRESHOLD).found
+    assert not find_change_points(time, value, THRESHOLD).found
 
 
 def test_recordings_at_one_time_are_no_trend() -> None:
     noise = np.random.default_rng(5).normal(size=DAYS)
-    assert not find_changes(np.zeros(DAYS), noise, THRESHOLD).found
+    assert not find_change_points(np.zeros(DAYS), noise, THRESHOLD).found
     # Many at the end, as of a robot that was recorded ten times on its last day.
     time = np.minimum(np.arange(float(DAYS)), 20.0)
-    (found,) = find_changes(time, noise + 8.0 * (time >= 10), THRESHOLD).found
+    (found,) = find_change_points(time, noise + 8.0 * (time >= 10), THRESHOLD).found
     assert (found.kind, found.time) == ('step', 10.0)
 
 

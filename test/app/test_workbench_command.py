@@ -10,13 +10,12 @@ import http.client
 import json
 import os
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ros_processes import executable
+from pprs_command import pprs
 from workbench_bench import write_hidden
 from workbench_server import workbench
 
@@ -138,8 +137,7 @@ def test_mistakes_of_usage_are_one_line_before_anything_is_served(tmp_path: Path
                             (('--model', 'no.yaml'), 'no.yaml'), ((str(bad),), 'bad.csv'),
                             ((str(bad), str(bad)), 'twice'),
                             (('--host', '0.0.0.0'), 'one address')):
-        done = subprocess.run([executable('pprs'), 'workbench', '--no-browser', *arguments],
-                              capture_output=True, text=True, timeout=60)
+        done = pprs('workbench', '--no-browser', *arguments)
         assert done.returncode == 2, arguments
         assert done.stdout == ''
         assert done.stderr.count('\n') == 1

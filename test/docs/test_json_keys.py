@@ -20,7 +20,7 @@ from pprs_dynamics.app.front_door.changed import ChangeResult
 from pprs_dynamics.app.front_door.compare import ComparisonResult
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun
-from pprs_dynamics.inference.diagnosis.change import Change
+from pprs_dynamics.inference.diagnosis.changed_number import ChangedNumber
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect, RankedEffect, RankedSet
@@ -41,7 +41,8 @@ WRITERS: dict[str, tuple[Callable[..., Any], ...]] = {
                Estimate.to_dict, Calibration.to_dict, diagnose._adopt_all, AdoptionRun.to_dict,
                AdoptionRunResult.to_dict, Refit.to_dict),
     CHANGED: (ChangeResult.to_dict,), ADOPT: (Adoption.to_dict,)}
-WRITTEN_WHOLE = {COMPARE: (Summary, DriveSummary), DIAGNOSE: (CostTerms,), CHANGED: (Change,)}
+WRITTEN_WHOLE = {COMPARE: (Summary, DriveSummary), DIAGNOSE: (CostTerms,),
+                 CHANGED: (ChangedNumber,)}
 
 
 def words_of(heading: str) -> set[str]:

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any
 import made_up_arm as arm
 import numpy as np
 import pytest
-from ros_processes import executable
+from pprs_command import pprs
 from short_recordings import short_recordings
 
 from benchmarks.hidden import recordings
@@ -258,21 +257,18 @@ def test_commands_say_it_before_they_compare(tmp_path: Path) -> None:
     write_recording(tmp_path / 'minus.csv', recording(scaled(effort=-1.0)(robot())))
     write_recording(tmp_path / 'mm.csv', recording(scaled(motion=1e3)(robot())))
     for command in (('info',), ('compare', '--as-it-is')):
-        done = subprocess.run([executable('pprs'), *command, 'minus.csv'], cwd=tmp_path,
-                              capture_output=True, text=True, timeout=100)
+        done = pprs(*command, 'minus.csv', cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         said = ' '.join(done.stdout.split())
         assert 'the effort of all drives looks like minus what the model says' in said
         assert 'nothing wrong found' not in said
-    done = subprocess.run([executable('pprs'), 'info', 'mm.csv'], cwd=tmp_path,
-                          capture_output=True, text=True, timeout=100)
+    done = pprs('info', 'mm.csv', cwd=tmp_path)
     assert 'look like millimetres' in ' '.join(done.stdout.split())
     # No mechanism follows such positions: the sentence is about their unit, not about a pose.
     for command in (('compare', 'mm.csv'), ('diagnose', 'mm.csv', '--validate', 'minus.csv'),
                     ('adopt', 'viscous_friction', 'mm.csv', '--output', 'x.yaml'),
                     ('next-experiment', 'mm.csv', '--output', 'x.csv')):
-        done = subprocess.run([executable('pprs'), *command], cwd=tmp_path, capture_output=True,
-                              text=True, timeout=100)
+        done = pprs(*command, cwd=tmp_path)
         assert done.returncode == 1
         scales = ', '.join(f'{drive}: {{position_scale: 0.001}}' for drive in DRIVES)
         stopped = (f'pprs {command[0]}: mm.csv: the positions of all drives look like '

@@ -6,13 +6,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ros_processes import executable
+from pprs_command import pprs
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
@@ -399,14 +398,10 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
 
 # The command.
 
-def pprs(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([executable('pprs'), 'next-experiment', *map(str, arguments)],
-                          capture_output=True, text=True, timeout=300, cwd=cwd)
-
-
 def test_commission_writes_poses_json_and_page(tmp_path: Path) -> None:
-    done = pprs('--purpose', 'commission', '--output', 'first.csv', '--duration', '5', '--json',
-                'first.json', '--report', 'first.html', '--velocity', '0.2', cwd=tmp_path)
+    done = pprs('next-experiment', '--purpose', 'commission', '--output', 'first.csv',
+                '--duration', '5', '--json', 'first.json', '--report', 'first.html',
+                '--velocity', '0.2', cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     motion = read_poses(tmp_path / 'first.csv', 100.0)
     assert motion.time is not None
@@ -442,7 +437,7 @@ def test_commission_writes_poses_json_and_page(tmp_path: Path) -> None:
 def test_mistakes_are_told_in_one_line(
     tmp_path: Path, arguments: tuple[str, ...], sentence: str,
 ) -> None:
-    done = pprs(*arguments, cwd=tmp_path)
+    done = pprs('next-experiment', *arguments, cwd=tmp_path)
     assert done.returncode == 2
     assert sentence in done.stderr
     assert len(done.stderr.splitlines()) == 1

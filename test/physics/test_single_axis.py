@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pprs_command import pprs
 from ros_processes import environment, executable
 
 from pprs_dynamics import AxisModel, AxisMotion, DriveModel, load_model
@@ -65,11 +66,6 @@ def bench(seed: int, hidden: bool = True, duration: float = 20.0, offset: float 
     return Recording.from_arrays(
         f'bench_{seed}', time, (encoder * np.round(q / encoder))[:, None], None,
         (force + NOISE * rng.standard_normal(len(time)))[:, None], (AXIS,))
-
-
-def pprs(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([executable('pprs'), *map(str, arguments)], capture_output=True,
-                          text=True, timeout=300, cwd=cwd)
 
 
 @pytest.fixture(scope='module')

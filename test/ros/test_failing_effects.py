@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from failing_effects import FAULTS, fail, install, model_file, parameters
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
+from monitor_bench import MonitorBench
 from node_bench import Bench, bench, overrides
 from rclpy.parameter import Parameter
 from ros_processes import environment, executable, node_process
 from std_msgs.msg import Float64MultiArray
-from test_monitor_node import MonitorBench
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion

@@ -17,7 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.app.fleet.changes import NORMAL, Change, Changes, find_changes
+from pprs_dynamics.app.fleet.change_points import (
+    NORMAL,
+    ChangePoint,
+    ChangePoints,
+    find_change_points,
+)
 from pprs_dynamics.app.fleet.store import AUTO, OWN, Store
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.catalogue import find_effect
@@ -88,7 +93,7 @@ class Trend:
     value, std : (N,) arrays
     recordings : tuple of N str
         SHA-256.
-    changes : Changes
+    changes : ChangePoints
     flagged : bool
         True where the robot counts as changed by it.
     from_fleet, from_first : float
@@ -103,7 +108,7 @@ class Trend:
     value: Array
     std: Array
     recordings: tuple[str, ...]
-    changes: Changes
+    changes: ChangePoints
     flagged: bool
     from_fleet: float
     from_first: float
@@ -178,7 +183,7 @@ def fleet_trends(store: Store, limits: Mapping[str, float] | None = None) -> Fle
     spreads = _fleet_levels(series)
     for (robot, quantity), values in series.items():
         time, value = values.time, values.value
-        changes = find_changes(time, value, FALSE_ALARMS / per_robot[robot])
+        changes = find_change_points(time, value, FALSE_ALARMS / per_robot[robot])
         level, spread = spreads.get(quantity, (np.nan, np.nan))
         trends.append(Trend(
             robot, quantity, time, value, values.std, values.recordings, changes,
@@ -323,7 +328,7 @@ def _deviations(difference: float, spread: float) -> float:
     return difference / spread if spread > 0 and np.isfinite(difference) else float('nan')
 
 
-def _reach(changes: Changes, time: Array, value: Array, limit: float | None) -> Reach | None:
+def _reach(changes: ChangePoints, time: Array, value: Array, limit: float | None) -> Reach | None:
     """Return when a slope reaches a limit; None without one, or where it is reached already."""
     if limit is None or not changes.found or changes.found[0].kind != 'slope':
         return None
@@ -343,6 +348,6 @@ def _natural(name: str) -> tuple[Any, ...]:
     return (''.join(c for c in name if not c.isdigit()), int(digits or 0), name)
 
 
-def main_change(trend: Trend) -> Change:
+def main_change(trend: Trend) -> ChangePoint:
     """Return the change that is told of a flagged trend: the largest."""
     return max(trend.changes.found, key=lambda one: abs(one.size) / max(one.size_std, 1e-300))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pprs_dynamics.app.front_door.diagnose import DiagnosisResult, diagnose
 from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings
 from pprs_dynamics.app.front_door.result import Result, data_frame
-from pprs_dynamics.inference.diagnosis.change import Change
+from pprs_dynamics.inference.diagnosis.changed_number import ChangedNumber
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.paired_errors import rms, rms_by_drive
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -42,7 +42,7 @@ class ChangeResult(Result):
     second: DiagnosisResult
 
     @property
-    def changes(self) -> tuple[Change, ...]:
+    def changes(self) -> tuple[ChangedNumber, ...]:
         """All numbers that changed, those of the effect that explains most first."""
         known = {(one.name, key): estimate.std for one in self.first.effects
                  for key, estimate in one.parameters.items()}
@@ -54,11 +54,11 @@ class ChangeResult(Result):
                 if one.in_model and key not in one.in_model:
                     continue
                 before = one.in_model.get(key, 0.0 if last in strengths else None)
-                found.append(Change(
+                found.append(ChangedNumber(
                     one.name, (place,) if one.drives is not None and place in one.drives
                     else one.drives, key, before, estimate.value,
                     hypot(estimate.std, known.get((one.name, key), 0.0)), estimate.unit))
-        found += [Change('model', None, one.key, one.before, one.after, one.std, one.unit)
+        found += [ChangedNumber('model', None, one.key, one.before, one.after, one.std, one.unit)
                   for one in self.second.diagnosis.calibrated]
         return tuple(found)
 

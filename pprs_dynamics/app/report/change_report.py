@@ -10,15 +10,15 @@ from typing import Any
 
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.terminal import escape, stacked, text_table
-from pprs_dynamics.inference.diagnosis.change import Change
+from pprs_dynamics.inference.diagnosis.changed_number import ChangedNumber
 from pprs_dynamics.inference.diagnosis.quantities import in_unit, with_uncertainty
 
 HEADINGS = ('what', 'on', 'parameter', 'before', 'after', 'how sure')
 SURE = 'after ± two standard deviations of the difference'
 
 
-def change_view(changes: Sequence[Change], verdict: str, before: float, after: float, unit: str,
-                details: Any = None) -> Any:
+def change_view(changes: Sequence[ChangedNumber], verdict: str, before: float, after: float,
+                unit: str, details: Any = None) -> Any:
     """Return what the terminal shows."""
     parts = [escape(headline(changes, verdict, before, after, unit))]
     if changes:
@@ -27,8 +27,8 @@ def change_view(changes: Sequence[Change], verdict: str, before: float, after: f
     return stacked(*parts, *(() if details is None else (details,)))
 
 
-def change_page(changes: Sequence[Change], verdict: str, before: float, after: float, unit: str,
-                recordings: Sequence[str]) -> Page:
+def change_page(changes: Sequence[ChangedNumber], verdict: str, before: float, after: float,
+                unit: str, recordings: Sequence[str]) -> Page:
     """Return the page."""
     page = Page('What changed')
     page.text(headline(changes, verdict, before, after, unit), 'lead')
@@ -38,8 +38,8 @@ def change_page(changes: Sequence[Change], verdict: str, before: float, after: f
     return page
 
 
-def headline(changes: Sequence[Change], verdict: str, before: float, after: float, unit: str,
-             ) -> str:
+def headline(changes: Sequence[ChangedNumber], verdict: str, before: float, after: float,
+             unit: str) -> str:
     """Return what changed in a sentence or two."""
     names = list(dict.fromkeys(one.name for one in changes))
     if not names:
@@ -54,14 +54,14 @@ def headline(changes: Sequence[Change], verdict: str, before: float, after: floa
     return f'{said}{fall}.{doubt.get(verdict, "")}'
 
 
-def rows(changes: Sequence[Change]) -> list[tuple[str, ...]]:
+def rows(changes: Sequence[ChangedNumber]) -> list[tuple[str, ...]]:
     """Return what changed, for a table."""
     return [(one.name, ', '.join(one.drives) if one.drives else 'structure', one.parameter,
              'none' if one.before is None else in_unit(one.before, one.unit),
              with_uncertainty(one.after, one.std, one.unit), _odds(one)) for one in changes]
 
 
-def _odds(one: Change) -> str:
+def _odds(one: ChangedNumber) -> str:
     if one.before is None or not one.std > 0:
         return ''
     return f'{abs(one.after - one.before) / one.std:.1f} standard deviations'

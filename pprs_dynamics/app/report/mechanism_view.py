@@ -15,6 +15,7 @@ from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.skeleton import Skeleton
+from pprs_dynamics.system.plain_text import counted
 
 COLOURS = {'driven': '#0072B2', 'passive': '#009E73', 'held': '#999999'}
 LOOP = '#E69F00'
@@ -52,10 +53,10 @@ def mechanism_lines(model: ArmModel) -> list[str]:
     s = model.robot.structure
     held = f': {", ".join(found["held"])} held' if found['held'] else ''
     lines = [
-        f'{len(found["bodies"])} bodies of {model.robot.masses.sum():.4g} kg, '
-        f'{len(s.rows)} joints, {len(s.loops)} loops',
-        f'{found["degrees_of_freedom"]} degrees of freedom, {len(s.drives)} drives '
-        f'({", ".join(s.drives)}){held}']
+        f'{counted(len(found["bodies"]), "body")} of {model.robot.masses.sum():.4g} kg, '
+        f'{counted(len(s.rows), "joint")}, {counted(len(s.loops), "loop")}',
+        f'{counted(found["degrees_of_freedom"], "degree of freedom")}, '
+        f'{counted(len(s.drives), "drive")} ({", ".join(s.drives)}){held}']
     if s.loops:
         lines.append('loops: ' + ', '.join(f'{one["name"]} ({one["type"]}, {one["a"]} on '
                                            f'{one["b"]})' for one in found['loops']))

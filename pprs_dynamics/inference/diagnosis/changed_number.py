@@ -10,7 +10,7 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Change:
+class ChangedNumber:
     """A number of the machine that is another one afterwards.
 
     Parameters

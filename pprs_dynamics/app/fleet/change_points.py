@@ -37,7 +37,7 @@ ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
-class Change:
+class ChangePoint:
     """A step, or a slope from some day on.
 
     Parameters
@@ -60,12 +60,12 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Changes:
+class ChangePoints:
     """What became of a series.
 
     Parameters
     ----------
-    found : tuple of Change
+    found : tuple of ChangePoint
         None, one slope, or steps in order.
     probability : float
         Of so clear a change by chance, if nothing changed; at all places together.
@@ -79,7 +79,7 @@ class Changes:
         Begins [days], slopes [unit per day] and levels [unit] that the values allow, for a slope.
     """
 
-    found: tuple[Change, ...]
+    found: tuple[ChangePoint, ...]
     probability: float
     statistic: float
     scatter: float
@@ -87,7 +87,7 @@ class Changes:
     draws: Array
 
 
-def find_changes(time: Array, value: Array, threshold: float) -> Changes:
+def find_change_points(time: Array, value: Array, threshold: float) -> ChangePoints:
     """Return the changes of a series.
 
     Parameters
@@ -99,8 +99,8 @@ def find_changes(time: Array, value: Array, threshold: float) -> Changes:
         Probability below which a change is told.
     """
     series = _Series(time, value)
-    constant = Changes((), 1.0, 0.0, series.scatter, np.full(len(time), np.median(value)),
-                       np.zeros((0, 3)))
+    constant = ChangePoints((), 1.0, 0.0, series.scatter, np.full(len(time), np.median(value)),
+                            np.zeros((0, 3)))
     # Without times, e.g. where stamps begin at 0, there is no order to look for changes in.
     if len(time) < LEAST_VALUES or time[0] == time[-1] or (
             series.scatter <= ROUNDING * float(np.abs(value).max())):
@@ -113,7 +113,7 @@ def find_changes(time: Array, value: Array, threshold: float) -> Changes:
     rest = float(np.sqrt(best.squares / max(len(time) - best.count - 1, 1)))
     found, draws = (series.told_slope() if best is slope
                     else (series.told_steps(best), constant.draws))
-    return Changes(found, probability, statistic, rest, best.fitted, draws)
+    return ChangePoints(found, probability, statistic, rest, best.fitted, draws)
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ class _Series:
         places = comb(self.n, fit.count)
         return float(min(places * fdtrc(fit.count, freedom, max(F, 0.0)), 1.0)), float(F)
 
-    def told_slope(self) -> tuple[tuple[Change, ...], Array]:
+    def told_slope(self) -> tuple[tuple[ChangePoint, ...], Array]:
         """Return the slope, averaged over the days at which it may have begun."""
         places, c, squares, spreads = self._hinges
         noise = squares.min() / max(self.n - 3, 1)
@@ -210,10 +210,10 @@ class _Series:
         day, size, level = draws.mean(axis=0)
         between = float(np.median(np.diff(places))) / 12 ** 0.5 if len(places) > 1 else 0.0
         day_std = float(np.hypot(draws[:, 0].std(), between))
-        return (Change('slope', float(day), day_std, float(size), float(draws[:, 1].std()),
-                       float(level)),), draws
+        return (ChangePoint('slope', float(day), day_std, float(size), float(draws[:, 1].std()),
+                            float(level)),), draws
 
-    def told_steps(self, fit: _Fit) -> tuple[Change, ...]:
+    def told_steps(self, fit: _Fit) -> tuple[ChangePoint, ...]:
         """Return the steps of a fit."""
         noise = fit.squares / max(self.n - fit.count - 1, 1)
         bounds = (0, *fit.places, self.n)
@@ -221,9 +221,9 @@ class _Series:
         for before, place, after in zip(bounds, fit.places, bounds[2:], strict=False):
             left, right = self.value[before:place], self.value[place:after]
             std = float(np.sqrt(noise * (1 / len(left) + 1 / len(right))))
-            found.append(Change('step', float(self.time[place]),
-                                self._day_std(before, place, after, noise),
-                                float(right.mean() - left.mean()), std, float(left.mean())))
+            found.append(ChangePoint('step', float(self.time[place]),
+                                     self._day_std(before, place, after, noise),
+                                     float(right.mean() - left.mean()), std, float(left.mean())))
         return tuple(found)
 
     def _day_std(self, first: int, place: int, last: int, noise: float) -> float:

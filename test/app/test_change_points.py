@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.stats import f as f_distribution
 
-from pprs_dynamics.app.fleet.changes import LEAST_VALUES, find_changes
+from pprs_dynamics.app.fleet.change_points import LEAST_VALUES, find_change_points
 
 DAYS = np.arange(20_000.0, 20_030.0)
 
@@ -31,7 +31,7 @@ def least_squares(columns: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, f
 @pytest.mark.parametrize('size', [8.0, -8.0])
 def test_a_step_is_a_difference_of_means_with_its_standard_error(size: float) -> None:
     value = 5.0 + alternating() + size * (DAYS[14] <= DAYS)
-    found = find_changes(DAYS, value, 1e-4)
+    found = find_change_points(DAYS, value, 1e-4)
     step, = found.found
     before, after = value[:14], value[14:]
     assert step.kind == 'step'
@@ -54,7 +54,7 @@ def test_a_step_is_a_difference_of_means_with_its_standard_error(size: float) ->
 
 def test_the_day_of_a_small_step_is_as_uncertain_as_its_neighbours_allow() -> None:
     value = alternating() + 3.0 * (DAYS[14] <= DAYS)
-    step, = find_changes(DAYS, value, 1e-3).found
+    step, = find_change_points(DAYS, value, 1e-3).found
     at = int(np.searchsorted(DAYS, step.time))
     squares = np.array([np.sum((value[:k] - value[:k].mean()) ** 2)
                         + np.sum((value[k:] - value[k:].mean()) ** 2) for k in range(1, 30)])
@@ -67,7 +67,7 @@ def test_the_day_of_a_small_step_is_as_uncertain_as_its_neighbours_allow() -> No
 
 def test_two_steps_are_two() -> None:
     value = alternating() + 9.0 * (DAYS[10] <= DAYS) - 4.5 * (DAYS[20] <= DAYS)
-    found = find_changes(DAYS, value, 1e-4)
+    found = find_change_points(DAYS, value, 1e-4)
     first, second = found.found
     assert (first.time, second.time) == (DAYS[10], DAYS[20])
     parts = np.split(value, [10, 20])
@@ -82,7 +82,7 @@ def test_two_steps_are_two() -> None:
 @pytest.mark.parametrize('slope', [0.9, -0.9])
 def test_a_slope_is_a_line_from_the_day_that_fits_best(slope: float) -> None:
     value = 3.0 + alternating() + slope * np.maximum(DAYS - DAYS[12], 0)
-    found = find_changes(DAYS, value, 1e-4)
+    found = find_change_points(DAYS, value, 1e-4)
     change, = found.found
     assert change.kind == 'slope'
     fits = [least_squares(np.column_stack((np.ones(30), np.maximum(DAYS - day, 0))), value)
@@ -114,7 +114,7 @@ def test_values_that_follow_each_other_count_less() -> None:
     quick = alternating(30)
     slow = np.repeat(quick[:10], 3)
     step = 4.0 * (DAYS[15] <= DAYS)
-    fast, lasting = (find_changes(DAYS, scatter + step, 1.0) for scatter in (quick, slow))
+    fast, lasting = (find_change_points(DAYS, scatter + step, 1.0) for scatter in (quick, slow))
     rest = slow + step - lasting.fitted
     follows = float(rest[1:] @ rest[:-1] / (rest @ rest))
     assert follows > 0.2
@@ -129,10 +129,10 @@ def test_values_that_follow_each_other_count_less() -> None:
 def test_too_few_values_or_no_scatter_or_one_time_tell_nothing() -> None:
     value = alternating(8) * 0.1 + 9.0 * (np.arange(8) >= 4)
     assert LEAST_VALUES == 8
-    assert find_changes(DAYS[:8], value, 0.01).found
+    assert find_change_points(DAYS[:8], value, 0.01).found
     for time, series in ((DAYS[:7], value[:7]), (np.zeros(8), value),
                          (DAYS[:8], 1e7 + value * 1e-6), (DAYS[:8], np.full(8, 3.0))):
-        nothing = find_changes(time, series, 0.01)
+        nothing = find_change_points(time, series, 0.01)
         assert nothing.found == ()
         assert (nothing.probability, nothing.statistic) == (1.0, 0.0)
         assert np.array_equal(nothing.fitted, np.full(len(time), np.median(series)))
@@ -141,12 +141,12 @@ def test_too_few_values_or_no_scatter_or_one_time_tell_nothing() -> None:
 
 def test_a_change_that_chance_gives_is_not_told_but_how_likely_it_was() -> None:
     value = alternating() + 2.0 * (DAYS[14] <= DAYS)
-    told = find_changes(DAYS, value, 1.0)
+    told = find_change_points(DAYS, value, 1.0)
     assert told.found
-    kept = find_changes(DAYS, value, 0.5 * told.probability)
+    kept = find_change_points(DAYS, value, 0.5 * told.probability)
     assert kept.found == ()
     assert (kept.probability, kept.statistic) == (told.probability, told.statistic)
-    assert find_changes(DAYS, value, 1.01 * told.probability).found
+    assert find_change_points(DAYS, value, 1.01 * told.probability).found
 
 
 def test_a_bad_day_is_drawn_in_to_its_neighbours() -> None:
@@ -154,19 +154,19 @@ def test_a_bad_day_is_drawn_in_to_its_neighbours() -> None:
     for place in (0, 1, 13, 28, 29):
         bad = clean.copy()
         bad[place] += 60.0
-        found = find_changes(DAYS, bad, 1.0)
+        found = find_change_points(DAYS, bad, 1.0)
         # Drawn in to 3.5 deviations from the median about it; as it was, it would be 11.
         assert found.scatter < 3.0
-        assert find_changes(DAYS, bad, 1e-4).found == ()
+        assert find_change_points(DAYS, bad, 1e-4).found == ()
     # Two good levels are no bad days.
-    assert find_changes(DAYS, clean + 60.0 * (DAYS[27] <= DAYS), 1e-3).found
+    assert find_change_points(DAYS, clean + 60.0 * (DAYS[27] <= DAYS), 1e-3).found
 
 
 @pytest.mark.parametrize('unit', [1e-3, 1e3])
 def test_changes_do_not_depend_on_the_unit(unit: float) -> None:
     value = alternating() + 3.0 * (DAYS[14] <= DAYS)
     value[20] += 40.0
-    here, there = find_changes(DAYS, value, 0.01), find_changes(DAYS, unit * value, 0.01)
+    here, there = (find_change_points(DAYS, one, 0.01) for one in (value, unit * value))
     assert there.probability == pytest.approx(here.probability, rel=1e-6)
     assert [one.time for one in there.found] == [one.time for one in here.found]
     assert [one.size for one in there.found] == pytest.approx(
