@@ -75,12 +75,12 @@ def determining(t: Tables, rows: Integers, passive: Integers, units: Array, q: A
     places = t.places.copy()
     places[:, PASSIVE_OF] = columns_of(passive, len(q))
     lists = order.swap, order.below, order.right
+    swap, below, right = (np.array([place for row in one for place in row], dtype=np.int64)
+                          for one in lists)
     return t._replace(
         rows=t.rows[every], row_reals=t.row_reals[every], passive=passive,
-        passive_unit=units[passive], places=places,
-        starts=np.column_stack([np.cumsum([0, *map(len, one)]) for one in lists]),
-        **{name: np.array([place for row in one for place in row], dtype=np.int64)
-           for name, one in zip(('swap', 'below', 'right'), lists, strict=True)})
+        passive_unit=units[passive], places=places, swap=swap, below=below, right=right,
+        starts=np.column_stack([np.cumsum([0, *map(len, one)]) for one in lists]))
 
 
 def given(t: Tables, drives: Integers, count: int) -> Tables:
@@ -139,6 +139,9 @@ def elimination_order(A: Array, pattern: Array) -> Order:
         rows.append(int(r))
         columns.append(int(c))
     of_row, of_column = np.argsort(rows), np.argsort(columns)
-    return Order(np.array(rows), np.array(columns),
-                 *([sorted(of_row[one].tolist()) for one in lists] for lists in (swap, below)),
-                 [sorted(of_column[one].tolist()) for one in right])
+
+    def places(lists: list[list[int]], of: Integers) -> list[list[int]]:
+        return [sorted(of[one].tolist()) for one in lists]
+
+    return Order(np.array(rows), np.array(columns), places(swap, of_row), places(below, of_row),
+                 places(right, of_column))

@@ -18,7 +18,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.arithmetic import elements
-from pprs_dynamics.physics.mechanism.evaluation import FEW, compiled_or_none
+from pprs_dynamics.physics.mechanism.evaluation import TREE_FEW, compiled_or_none
 from pprs_dynamics.physics.mechanism.linkage_equations import (
     WARM_STEPS,
     Integers,
@@ -272,7 +272,7 @@ class Evaluation:
         loop = compiled_or_none(_evaluate, len(found))
         if loop is not None:
             return int(loop(*arguments))
-        if len(found) <= FEW:
+        if len(found) <= TREE_FEW:
             try:
                 return _evaluate(*arguments)
             except (ZeroDivisionError, OverflowError, ValueError):

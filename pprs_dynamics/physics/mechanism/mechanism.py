@@ -213,7 +213,7 @@ class Linkage:
         if not len(implied):
             return
         m = samples_last(self.motion)
-        gaps = np.stack([residual(t, m, r) for r in implied], axis=-1)
+        gaps = np.stack([residual(t, m, int(r)) for r in implied], axis=-1)
         size = np.abs(gaps) / t.row_unit[implied]
         if np.all(size < OPEN_IN_MOTION):
             return

@@ -89,9 +89,8 @@ def packed_tables(t: Tables) -> PackedTables:
     """Return tables as rows of numbers."""
     sizes = np.array(Sizes.of(t), dtype=np.int64)
     first = Tables._fields.index(FIRST_OF_REALS)
-    integers, reals = (np.concatenate([np.ravel(values) for values in part]).astype(kind)
-                       for part, kind in ((t[:first], np.int64), (t[first:], np.float64)))
-    return PackedTables(sizes, integers, reals)
+    return PackedTables(sizes, np.concatenate([np.ravel(values) for values in t[:first]]),
+                        np.concatenate([np.ravel(values) for values in t[first:]]))
 
 
 def length_of(kind: type, sizes: Integers) -> int:
@@ -104,7 +103,7 @@ def length_of(kind: type, sizes: Integers) -> int:
 def views(kind: Callable[..., N], sizes: Integers, table: Array) -> N:
     """Return what rows (N, K) hold by name, the samples first."""
     return kind(*(table[:, start:end].reshape(len(table), *shape) for start, end, shape in _places(
-        kind, tuple(sizes.tolist()))))  # type: ignore[arg-type]
+        kind, tuple(sizes.tolist()))))
 
 
 @cache

@@ -105,8 +105,7 @@ class ToolPose:
         q, v, a = self._coordinates(motion)
         closed = {} if closed is None else closed
         try:
-            tied = Linkage.of(self._tied, *(np.ascontiguousarray(each[:, self.chosen])
-                                            for each in (q, v, a)),
+            tied = Linkage.of(self._tied, q[:, self.chosen], v[:, self.chosen], a[:, self.chosen],
                               nearby=closed.get(self._tied))
         except SingularityError as error:
             raise SingularityError(
@@ -215,7 +214,7 @@ def _tied_tables(structure: Structure, row: int, frame: Frame, home: Frame, chos
     every = np.ones(count)
     every[t.coordinate[(t.coordinate >= 0) & (t.turns == 0)]] = size
     along = [*((j, 1) for j in joints[::-1]), *((j, -1) for j in way)]
-    added = {
+    added: dict[str, Any] = {
         'joints': np.column_stack(([0, *joints[:-1]], [0] * 3 + [1] * 3, count + np.arange(6))),
         'frames': np.concatenate((turned, origins[:, None], axes[:, None]), axis=1).reshape(-1, 3),
         'ratio': np.ones(6), 'offset': np.zeros(6),
