@@ -38,8 +38,9 @@ from pprs_dynamics.simulation.arm_run import draw_motion
 
 SECONDS, RATE = 20.0, 200.0
 # What an effect's force is drawn over, where it is not the drive's velocity.
-OVER = {'drive_inertia': 'acceleration', 'drive_spring': 'position', 'effort_gain': 'effort',
-        'effort_offset': 'time', 'force_ripple': 'position', 'friction_drift': 'time',
+OVER = {'counterbalance': 'position', 'drive_inertia': 'acceleration',
+        'drive_spring': 'position', 'effort_gain': 'effort', 'effort_offset': 'time',
+        'force_ripple': 'position', 'friction_drift': 'time',
         'homing_error': 'position', 'link_mass': 'position', 'joint_friction': 'velocity',
         'payload_mass': 'position', 'payload_offset': 'position',
         'platform_inertia': 'acceleration', 'revolute_stiffness': 'position',
@@ -47,6 +48,9 @@ OVER = {'drive_inertia': 'acceleration', 'drive_spring': 'position', 'effort_gai
 # Values of one drive or of the structure where the parameters' scales do not show the law.
 TYPICAL = {'asymmetric_friction': {'force_forward': 0.8, 'force_backward': 0.4},
            'force_ripple': {'force': 0.3, 'phase': 0.0, 'pitch': 0.01},
+           'counterbalance': {'force': 10.0, 'stiffness': 0.0, 'ratio': 0.6, 'position': 0.0},
+           'coupled_drives': {'wrist.coulomb': 1.0},
+           'friction_temperature': {'coulomb': -0.02, 'viscous': -0.2, 'reference': 40.0},
            'hysteresis': {'force': 0.5, 'distance': 0.002},
            'homing_error': {'zero': 0.002},
            'joint_friction': {'fork_4.torque': 0.3},
@@ -76,7 +80,10 @@ def block(effect: type[CatalogueEffect], drive: str) -> dict[str, Any]:
 @cache
 def platform() -> tuple[DriveModel, PlatformMotion]:
     """Return the paper's robot and a motion of it."""
-    return DriveModel.load(), Excitation(SECONDS, seed=3).motion(np.arange(0, SECONDS, 1 / RATE))
+    time = np.arange(0, SECONDS, 1 / RATE)
+    warming = {'temperature': np.tile(20 + time, (6, 1)).T}  # a kelvin a second
+    return (DriveModel.load(),
+            Excitation(SECONDS, seed=3).motion(time).with_channels(warming))
 
 
 def platform_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, str]:
@@ -108,7 +115,8 @@ def arm_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, 
             model = ArmModel.load('config/hexapod.yaml')
             motion = draw_motion(model, SECONDS, 3)
         else:
-            model = made_up_arm.real_arm(Path(folder))
+            model = made_up_arm.real_arm(Path(folder), **{
+                'friction.motors.wrist.turn': 1.0, 'friction.motors.wrist.swing': 1.0})
             motion = made_up_arm.motion(SECONDS, RATE, seed=3)
         changed = build_model({**model.values, **block(effect, 'swing')}, model.source)
     assert isinstance(changed, ArmModel)

@@ -47,8 +47,10 @@ from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState, couplings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 from pprs_dynamics.simulation.sensors import ButterworthFilter, EffortFilter
+from pprs_dynamics.simulation.temperatures import Climate, read_thermometers
 
 RATE = 100.0  # [Hz]
+CLIMATE = 45  # second seed of temperatures
 HARMONICS = 8
 FASTEST, WIDEST = 0.35, 1.5  # of the top speed; from the middle of the range [rad, m]
 QUICKEST = 3.0  # [rad/s^2, m/s^2]
@@ -71,12 +73,15 @@ class ArmRun:
         As measured.
     effects : tuple of dict
         What was hidden.
+    channels : mapping of str to (N, n) array
+        What thermometers say, where temperature matters.
     """
 
     motion: JointMotion
     position: Array
     effort: Array
     effects: tuple[dict[str, Any], ...]
+    channels: Mapping[str, Array]
 
 
 class ArmEngine:
@@ -294,7 +299,8 @@ def draw_motion(model: ArmModel, duration: float, seed: int, rate: float = RATE)
 
 def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float = 1.0,
                  noise: float | None = None, duration: float = 40.0, path_seed: int = 0,
-                 progress: Callable[[float], None] | None = None) -> ArmRun:
+                 progress: Callable[[float], None] | None = None, thermometers: bool = False,
+                 ) -> ArmRun:
     """Return a recording of an arm with hidden effects.
 
     Parameters
@@ -314,6 +320,8 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
     path_seed : int
         Of the motion.
     progress : callable, optional
+    thermometers : bool
+        Whether they take part where no effect needs them.
 
     Raises
     ------
@@ -321,10 +329,11 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         For another name.
     """
     random = np.random.default_rng(seed)
-    choices = sorted((*FORMS, 'payload_mass'))
+    motion = draw_motion(model, duration, path_seed)
+    choices = sorted((*(name for name in FORMS if able_joints(name, model, motion)),
+                      'payload_mass'))
     chosen = tuple(str(random.choice(choices)) if name == 'random' else name for name in names)
     require_known(chosen)
-    motion = draw_motion(model, duration, path_seed)
     engine = ArmEngine(model)
     if progress is not None:
         progress(0.1)
@@ -358,10 +367,16 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         progress(0.8)
     efforts = bodies + _own_friction(model, engine, motion)
     largest = np.abs(efforts).max(axis=0)
+    assert motion.time is not None
+    # Random numbers of its own, so that what else is drawn does not depend on the weather.
+    temperature = Climate.draw(np.random.default_rng((seed, CLIMATE)), len(largest)).along(
+        motion.time, motion.velocity)
     for name in chosen:
         if name in FORMS:
             hidden.append(_add(name, model, motion, bodies, largest, efforts, random,
-                               scale))
+                               scale, temperature))
+    if 'coupled_drives' in chosen:
+        hidden.append(_hide_motor_friction(model, motion, largest, efforts, random, scale))
     if 'effort_gain' in chosen:
         joint = int(random.integers(len(model.drives)))
         gain = scale * float(random.uniform(0.04, 0.1))
@@ -391,7 +406,9 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
     sigma = np.full(len(largest), noise) if noise is not None else 0.005 * largest
     position = motion.position + shift + ENCODER * random.uniform(-0.5, 0.5, motion.position.shape)
     return ArmRun(motion, position, efforts + _noise(random, efforts.shape) * sigma,
-                  tuple(hidden))
+                  tuple(hidden), {
+                      'temperature': read_thermometers(motion.time, temperature)}
+                  if thermometers or 'friction_temperature' in chosen else {})
 
 
 def _hidden_joint(model: ArmModel, motion: JointMotion, plain: Array, random: np.random.Generator,
@@ -414,6 +431,28 @@ def _hidden_joint(model: ArmModel, motion: JointMotion, plain: Array, random: np
     return name, torque * rate / np.sqrt(rate ** 2 + width ** 2), {'torque': torque}
 
 
+def _hide_motor_friction(model: ArmModel, motion: JointMotion, largest: Array, efforts: Array,
+                         random: np.random.Generator, scale: float) -> dict[str, Any]:
+    """Let a motor rub that moves several joints, and return how."""
+    motors = model.robot.motors
+    if not motors:
+        raise HiddenEffectError('coupled_drives needs a motor that moves several joints: write '
+                                'friction: {motors: {MOTOR: {JOINT: 1.0, OTHER: 1.0}}}')
+    name = str(random.choice(sorted(motors)))
+    row = np.array(motors[name])
+    speed = motion.velocity @ row
+    top = float(np.abs(speed).max())
+    # As large on the joint that feels it most as a hidden force on a drive is.
+    felt = float(np.min(largest[row != 0] / np.abs(row[row != 0])))
+    dry, viscous = (scale * SIZE(random) * felt for _ in range(2))
+    friction = (dry * speed / np.hypot(speed, STEEPNESS * top)
+                + viscous * 2 * np.arcsinh(speed / (2 * top)))
+    efforts += np.outer(friction, row)
+    return truth('coupled_drives', None, {
+        f'{name}.coulomb': dry, f'{name}.viscous': viscous / top},
+        "A' (F v / sqrt(v^2 + w^2) + c v_1 asinh(v / v_1)), v the speed of the motor")
+
+
 def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Array:
     """Return friction, offset and armature as the model file has them, under the true loads."""
     values, v = model.values, motion.velocity
@@ -431,15 +470,35 @@ def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Ar
     return friction
 
 
+def able_joints(name: str, model: ArmModel, motion: JointMotion) -> list[int]:
+    """Return the joints that a hidden force can act in along a motion."""
+    turn, stroke = FORMS[name].needs_turn, np.ptp(motion.position, axis=0)
+    return [j for j, unit in enumerate(model.units)
+            if not turn or (unit.turns and stroke[j] >= turn)]
+
+
+def one_able_joint(name: str, model: ArmModel, motion: JointMotion,
+                   random: np.random.Generator) -> int:
+    """Return one of the joints that a hidden force can act in along a motion."""
+    able = able_joints(name, model, motion)
+    if not able:
+        raise HiddenEffectError(f'{name} needs a joint that turns by '
+                                f'{FORMS[name].needs_turn:g} rad')
+    return able[int(random.integers(len(able)))]
+
+
 def _add(name: str, model: ArmModel, motion: JointMotion, load: Array, largest: Array,
-         efforts: Array, random: np.random.Generator, scale: float) -> dict[str, Any]:
+         efforts: Array, random: np.random.Generator, scale: float, temperature: Array,
+         ) -> dict[str, Any]:
     """Add a hidden force on one joint, or on all, and return what it is."""
     form, drives = FORMS[name], model.drives
     everywhere = bool(random.random() < 0.25)
-    chosen = range(len(drives)) if everywhere else [int(random.integers(len(drives)))]
+    one = one_able_joint(name, model, motion, random) if not everywhere else None
+    chosen = able_joints(name, model, motion) if one is None else [one]
     parameters = {}
     for j in chosen:
-        moment = JointMoment.along(motion, j, load[:, j], largest[j], model.gear_ratios[j])
+        moment = JointMoment.along(motion, j, load[:, j], largest[j], model.gear_ratios[j],
+                                   temperature)
         drawn = draw_form(name, random, moment, scale)
         efforts[:, j] += form.force(drawn, moment)
         parameters[drives[j]] = drawn

@@ -17,7 +17,7 @@ IN_CATALOGUE: dict[str, type[HiddenEffect]] = {effect.name: effect for effect in
     hidden_forces.viscous_friction, hidden_forces.coulomb_friction,
     hidden_forces.asymmetric_friction, hidden_forces.stribeck_friction,
     hidden_forces.quadratic_friction, hidden_forces.load_friction,
-    hidden_forces.Hysteresis, hidden_forces.FrictionDrift,
+    hidden_forces.Hysteresis, hidden_forces.FrictionDrift, hidden_forces.FrictionTemperature,
     hidden_forces.effort_offset, sensors.EffortGain, sensors.HomingError,
     hidden_forces.drive_spring, hidden_forces.force_ripple, hidden_bodies.DriveInertia,
     sensors.TimeDelay, sensors.EffortFilter, hidden_forces.RevoluteFriction,

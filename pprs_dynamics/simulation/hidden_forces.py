@@ -21,9 +21,11 @@ from pprs_dynamics.simulation.hidden_effect import (
     SteepDriveForce,
     StructureForce,
 )
+from pprs_dynamics.simulation.temperatures import Climate, read_thermometers, thinner
 
 PHASE = Range('rad', -np.pi, np.pi)
 PULLEY = 3.0  # [m], from the middle of the workspace
+USUAL_SPEED = 0.08  # [m/s], at which drives get as warm as their climate says
 WIDTH = Range('m/s', 0.0005, 0.002, 'log', neutral=1.0)
 
 
@@ -141,6 +143,46 @@ class FrictionDrift(SteepDriveForce):
         """Warm by friction, cool towards the surroundings."""
         cooling = self._heat / self.values['cooling_time']
         self._heat = self._heat + duration * (np.abs(moment.velocity) - cooling)
+
+
+class FrictionTemperature(DriveForce):
+    """Grease that thins as the drive warms by its own work and with the hall."""
+
+    name: ClassVar[str] = 'friction_temperature'
+    form: ClassVar[str] = ('c (eta(T) / eta(T_0) - 1) v_1 asinh(v / v_1), ln eta = B / (T + C), '
+                           'tau dT/dt = T_hall(t) + R |v| / v_u - T')
+    ranges: ClassVar[dict[str, Range]] = {
+        'coefficient': Range('N s/m', 10.0, 30.0, 'log', scales=True),
+        'thinning_velocity': Range('m/s', 0.2, 0.6, 'log', neutral=1.0),
+        'reference': Range('degC', 15.0, 45.0), 'climate': Range('1', 0, 2 ** 31, 'whole')}
+
+    def prepare(self, coulomb: Array, width: Array) -> None:
+        """Start at the temperature of the hall, which is that of all drives."""
+        self._climate = self.climate
+        self.temperature = self._climate.start()
+
+    @property
+    def climate(self) -> Climate:
+        """Hall and drives, whichever of these have the effect."""
+        seed = int(self.values['climate'].max())
+        return Climate.draw(np.random.default_rng(seed), len(DRIVES))
+
+    def measured(self, time: Array, velocity: Array) -> dict[str, Array]:
+        """Return what thermometers say along a motion, by channel, (N, 6)."""
+        return {'temperature': read_thermometers(
+            time, self.climate.along(time, velocity, USUAL_SPEED))}
+
+    def force(self, moment: DriveMoment) -> Array:
+        """Return c (eta(T) / eta(T_0) - 1) v_1 asinh(v / v_1)."""
+        v_1 = self.values['thinning_velocity']
+        viscous = self.values['coefficient'] * thinner(self.temperature, self.values['reference'])
+        return viscous * v_1 * np.arcsinh(moment.velocity / v_1)
+
+    def advance(self, moment: DriveMoment, duration: float) -> None:
+        """Warm by work, cool towards the hall."""
+        slope = self._climate.slope(self.temperature, float(np.max(moment.time)),
+                                    np.abs(moment.velocity) / USUAL_SPEED)
+        self.temperature = self.temperature + duration * slope
 
 
 @DriveForce.by_law('F',

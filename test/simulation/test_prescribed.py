@@ -35,7 +35,7 @@ MODEL = DriveModel.load('config/paper.yaml')
 AGREEMENT = 1e-5  # [N]
 RATE = 500.0
 HOME = MODEL.mechanism(Excitation().motion([0.0])).position[0]
-MEMORY = ('hysteresis', 'friction_drift')
+MEMORY = ('hysteresis', 'friction_drift', 'friction_temperature')
 SENSORS = ('effort_filter', 'effort_gain', 'homing_error', 'time_delay')
 GROUPS = {
     'friction': ('viscous_friction', 'coulomb_friction', 'asymmetric_friction',

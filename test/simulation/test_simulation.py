@@ -290,7 +290,8 @@ def drawn(name: str, seed: int = 5) -> object:
 def test_every_effect_of_the_interface_is_there() -> None:
     assert ' '.join(IN_CATALOGUE) == (
         'viscous_friction coulomb_friction asymmetric_friction stribeck_friction '
-        'quadratic_friction load_friction hysteresis friction_drift effort_offset effort_gain '
+        'quadratic_friction load_friction hysteresis friction_drift friction_temperature '
+        'effort_offset effort_gain '
         'homing_error drive_spring force_ripple drive_inertia time_delay effort_filter '
         'revolute_friction spherical_friction revolute_stiffness payload_mass payload_offset '
         'platform_inertia external_wrench base_tilt platform_drag rod_mass')

@@ -61,6 +61,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'arm [N m, N] half a percent of the largest)')
     parser.add_argument('--feedforward', choices=FEEDFORWARDS, default='friction',
                         help='what the robot is driven with (default friction)')
+    parser.add_argument('--thermometers', action='store_true',
+                        help='of an arm: record the temperatures of the drives, even where no '
+                        'effect follows them')
     add_report(parser, 'the robot moving, as a page')
 
 
@@ -73,7 +76,8 @@ def run(options: argparse.Namespace) -> int:
         result = simulate(
             model, options.effect, seed=options.seed, scale=options.scale, motion=motion,
             duration=options.duration, path_seed=options.path_seed, noise=options.noise,
-            feedforward=options.feedforward, progress=progress)
+            feedforward=options.feedforward, thermometers=options.thermometers,
+            progress=progress)
     result.save(options.output)
     tell(result, options, screen, recording=options.output)
     screen.print(f'recording: {shown(options.output)}')

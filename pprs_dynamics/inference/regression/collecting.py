@@ -81,4 +81,4 @@ class ColumnCollector:
         return FullRate(
             reconstruction.time, reconstruction.position, velocity, acceleration, direction, load,
             transmitted, effort, reconstruction.effort, reconstruction.segments,
-            reconstruction.treat, reconstruction.start)
+            reconstruction.treat, reconstruction.start, reconstruction.channels)

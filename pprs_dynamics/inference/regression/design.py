@@ -287,14 +287,25 @@ class Design:
                           float(np.median(np.diff(longest.time))),
                           float(np.ptp(position)), float(np.abs(velocity).max()),
                           self.given.gear_ratios[drive], _delay(longest, drive),
-                          self.given.units[drive].turns)
+                          self.given.units[drive].turns,
+                          any(np.any(one.guide_load[:, drive]) for one in self.recordings),
+                          self._channels(drive))
+
+    def _channels(self, drive: int) -> dict[str, tuple[float, float]]:
+        """Return the ranges of what was measured of a drive beside motion and effort."""
+        found = {}
+        for name in {name for one in self.recordings for name in one.channels}:
+            values = np.concatenate([one.channels[name][:, drive] for one in self.recordings
+                                     if name in one.channels])
+            if np.isfinite(values).any():
+                found[name] = float(np.nanmin(values)), float(np.nanmax(values))
+        return found
 
     def acts_on(self, effect: type[CatalogueEffect], drive: int) -> bool:
         """Return whether an effect may be looked for on a drive, there already or not."""
         return (issubclass(effect, DriveEffect) and self.given.offers(effect)
                 and (not effect.is_friction or self.moves(drive))
-                and (not effect.needs_load or any(np.any(one.guide_load[:, drive])
-                                                  for one in self.recordings)))
+                and effect.may_show(self.covered[drive]))
 
     def present(self, effect: type[CatalogueEffect], drive: int | None,
                 ) -> Mapping[str, float] | None:

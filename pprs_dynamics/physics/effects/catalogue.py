@@ -21,6 +21,8 @@ from pprs_dynamics.physics.effects.foreign_effects import guard
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
+from pprs_dynamics.physics.effects.laws.counterbalance import Counterbalance
+from pprs_dynamics.physics.effects.laws.coupled_drives import CoupledDrives
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
 from pprs_dynamics.physics.effects.laws.effort_filter import EffortFilter
@@ -29,6 +31,7 @@ from pprs_dynamics.physics.effects.laws.effort_offset import EffortOffset
 from pprs_dynamics.physics.effects.laws.external_wrench import ExternalWrench
 from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
 from pprs_dynamics.physics.effects.laws.friction_drift import FrictionDrift
+from pprs_dynamics.physics.effects.laws.friction_temperature import FrictionTemperature
 from pprs_dynamics.physics.effects.laws.gear_efficiency import GearEfficiency
 from pprs_dynamics.physics.effects.laws.homing_error import HomingError
 from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
@@ -64,6 +67,8 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         AsymmetricFriction,
         BaseTilt,
         CoulombFriction,
+        Counterbalance,
+        CoupledDrives,
         DriveInertia,
         DriveSpring,
         EffortFilter,
@@ -72,6 +77,7 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         ExternalWrench,
         ForceRipple,
         FrictionDrift,
+        FrictionTemperature,
         GearEfficiency,
         HomingError,
         Hysteresis,

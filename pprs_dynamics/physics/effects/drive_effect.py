@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass, field
+from typing import Any, Self
 
 import numpy as np
 
@@ -24,7 +24,8 @@ class DriveSamples:
     """Samples of one drive: all (N,); `time` is None where unknown, `direction` is sgn.
 
     `guide_load` is what its guide carries, without a sign; `transmitted` what its gear or screw
-    passes on to the mechanism, without friction, with the sign of the effort [N, N m].
+    passes on to the mechanism, without friction, with the sign of the effort [N, N m]; `channels`
+    has what was measured of the drive beside, as `temperature` [degC].
     """
 
     time: Array | None
@@ -35,13 +36,15 @@ class DriveSamples:
     guide_load: Array
     transmitted: Array
     memory: Any = None
+    channels: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
     def of(cls, state: DriveStates, drive: int, memory: Any = None) -> DriveSamples:
         """Return the samples of one drive of a state."""
         return cls(state.time, state.position[:, drive], state.velocity[:, drive],
                    state.acceleration[:, drive], state.direction[:, drive],
-                   state.guide_load[:, drive], state.transmitted[:, drive], memory)
+                   state.guide_load[:, drive], state.transmitted[:, drive], memory,
+                   {name: values[:, drive] for name, values in state.channels.items()})
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,10 @@ class DriveRange:
         By which the measured effort is most like the model's [s].
     turns : bool
         Whether the drive is revolute.
+    is_loaded : bool
+        Whether its guide or gear carries anything that is known.
+    channels : mapping of str to (lowest, highest)
+        What was measured beside, as `temperature` [degC].
     """
 
     duration: float
@@ -71,6 +78,8 @@ class DriveRange:
     gear_ratio: float = 1.0
     delay: float = 0.0
     turns: bool = False
+    is_loaded: bool = True
+    channels: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 class DriveEffect(CatalogueEffect):
@@ -81,8 +90,6 @@ class DriveEffect(CatalogueEffect):
     """
 
     acts_in = frozenset({PLATFORM, SINGLE_AXIS, ARM})
-    # Whether it follows the load of the guide, and is not there where that is not known.
-    needs_load: ClassVar[bool] = False
 
     def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
         self.drives = {drive: dict(values) for drive, values in drives.items()}
@@ -103,6 +110,11 @@ class DriveEffect(CatalogueEffect):
         of unit prior, so that they can neither make an effect nor hide another.
         """
         return ()
+
+    @classmethod
+    def may_show(cls, covered: DriveRange) -> bool:
+        """Return whether a recording has what the effect follows; it costs no time where not."""
+        return True
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:

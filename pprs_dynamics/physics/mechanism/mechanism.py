@@ -57,6 +57,8 @@ class Mechanism:
         In the base's frame [m/s^2].
     radii : mapping of str to float
         At which loads of joints rub [m], where known.
+    motors : mapping of str to (D,) sequence
+        Turns of motors per turn of each drive, of motors that move more than one.
     """
 
     structure: Structure
@@ -65,6 +67,7 @@ class Mechanism:
     armature: Array
     gravity: tuple[float, float, float]
     radii: Mapping[str, float] = field(default_factory=dict)
+    motors: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
     def masses(self) -> Array:

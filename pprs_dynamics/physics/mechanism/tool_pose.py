@@ -121,7 +121,8 @@ class ToolPose:
             closed[self._tied] = found.q[-1].copy()
         position, velocity, acceleration = (
             np.ascontiguousarray(each[:, drives]) for each in (found.q, found.v, found.a))
-        return (JointMotion(position, velocity, acceleration, motion.time),
+        return (JointMotion(position, velocity, acceleration, motion.time,
+                            channels=motion.channels),
                 found.q[0, :count] if len(motion) else self.structure.home)
 
     def _coordinates(self, motion: PlatformMotion) -> tuple[Array, Array, Array]:

@@ -43,6 +43,7 @@ from pprs_dynamics.physics.model.recorded_names import CURRENT, gravity_in_effor
 from pprs_dynamics.physics.model.robot_block import (
     described_values,
     joint_radii,
+    motor_map,
     passive_friction,
     read_structure,
 )
@@ -218,8 +219,8 @@ class ArmModel(ForceModel):
         if isinstance(motion, PlatformMotion):
             motion, nearby = self.tool_pose.drives(motion, closed)
         return LinkageState(motion.position, motion.velocity, motion.acceleration, motion.time,
-                            robot=self.robot, reversal=self.reversal, nearby=nearby,
-                            friction=self._joint_friction)
+                            channels=motion.channels, robot=self.robot, reversal=self.reversal,
+                            nearby=nearby, friction=self._joint_friction)
 
     @cached_property
     def _joint_friction(self) -> JointFriction:
@@ -262,7 +263,8 @@ def _mechanism(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
             name = next(name for name, at in structure.rows.items() if at == row)
             raise ModelError('links.mass', float(mass), f'be greater than 0 for what {name} moves')
     robot = Mechanism(structure, bodies, inertial, np.array(values[f'{block}.armature']),
-                      gravity_in_efforts(values, f'{block}.gravity'), joint_radii(values))
+                      gravity_in_efforts(values, f'{block}.gravity'), joint_radii(values),
+                      motor_map(structure, values))
     if block != ARM_BLOCK:
         _require_driven_bodies(robot)
     return robot

@@ -119,7 +119,8 @@ class AxisModel(ForceModel):
     def mechanism(self, motion: AxisMotion) -> AxisState:
         """Return what effects take of a motion; see `drive_forces`."""
         return AxisState(motion.position, motion.velocity, motion.acceleration, motion.time,
-                         mass=self.mass, gravity=self.gravity, reversal=self.reversal)
+                         channels=motion.channels, mass=self.mass, gravity=self.gravity,
+                         reversal=self.reversal)
 
     def variables(self, state: AxisState) -> dict[str, Array]:
         """Return nothing: an axis has its own motion alone."""

@@ -22,7 +22,7 @@ from pprs_dynamics.physics.mechanism.description import (
 )
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
-from pprs_dynamics.physics.model.keys import ARM, POSE, drives_key, mechanism_block
+from pprs_dynamics.physics.model.keys import ARM, MOTORS, POSE, drives_key, mechanism_block
 from pprs_dynamics.system.package_files import located
 
 # Joints whose motors do not move one joint each.
@@ -163,6 +163,29 @@ def joint_radii(values: Mapping[str, Any]) -> dict[str, float]:
     return {key.removeprefix('friction.joints.').removesuffix('.radius'): value
             for key, value in values.items()
             if key.startswith('friction.joints.') and key.endswith('.radius') and value}
+
+
+def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
+    """Return the turns of motors per turn of each drive, of those that the file names.
+
+    Raises
+    ------
+    ModelError
+        For a joint that is no drive, and a motor that moves fewer than two.
+    """
+    rows: dict[str, dict[str, float]] = {}
+    for key, value in values.items():
+        if key.startswith(MOTORS):
+            motor, _, joint = key.removeprefix(MOTORS).partition('.')
+            if joint not in structure.drives:
+                raise UnknownNameError('drive', joint, structure.drives, f'{MOTORS}{motor}')
+            rows.setdefault(motor, {})[joint] = value
+    for motor, ratios in rows.items():
+        if sum(value != 0 for value in ratios.values()) < 2:
+            raise ModelError(f'{MOTORS}{motor}', ratios, 'move two joints or more: one that moves '
+                             'one has its friction in friction.viscous and friction.coulomb')
+    return {motor: tuple(ratios.get(drive, 0.0) for drive in structure.drives)
+            for motor, ratios in rows.items()}
 
 
 def passive_friction(structure: Structure, values: Mapping[str, Any]) -> Iterator[LinkageFriction]:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -34,6 +34,10 @@ class DriveStates(Protocol):
     @property
     def time(self) -> Array | None:
         """[s], (N,), where known."""
+
+    @property
+    def channels(self) -> Mapping[str, Array]:
+        """What was measured beside the motion, by name, (N, D) each."""
 
     @property
     def position(self) -> Array:
@@ -164,6 +168,11 @@ class MechanismState:
     def time(self) -> Array | None:
         """Times of the samples [s], (N,), where known."""
         return self.motion.time
+
+    @property
+    def channels(self) -> Mapping[str, Array]:
+        """What was measured of the drives beside their motion."""
+        return self.motion.channels
 
     @property
     def position(self) -> Array:
