@@ -85,21 +85,18 @@ def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, st
         o = elements(read_loads(sizes, loads[at], reals))
         if stages & MOTION:
             q, v, a = given[0, s], given[1, s], given[2, s]
-            warm = s == 0 and nearby and is_near(t, start, q)
-            if len(t.passive):
-                done = reach(t, m, start if warm or s or not nearby else home, q)
-                if warm and done:
+            done = False
+            if nearby and s == 0:
+                if is_near(t, start, q) and reach(t, m, start, q):
                     follow(t, m, v, a)
                     done = m.state[3] <= WARM_STEPS and is_sound(t, m, at_home)
-                if not done and not reach(t, m, home, q):
+                if not done:
+                    for c in range(coordinates):
+                        start[c] = home[c]
+            if not done:
+                if not reach(t, m, start, q) and not reach(t, m, home, q):
                     return s
-            else:
-                for c in range(coordinates):
-                    m.q[c] = home[c]
-                for d in range(drives):
-                    m.q[t.drives[d]] = q[d]
-                m.state[0] = m.state[3] = 0.0
-            follow(t, m, v, a)
+                follow(t, m, v, a)
             for c in range(coordinates):
                 found[s, c] = start[c] = m.q[c]
             if s + 1 < len(found) and is_near(t, start, given[0, s + 1]):
@@ -140,6 +137,7 @@ class Evaluation:
         self.sizes = self.packed.sizes
         self._lengths = length_of(Motion, self.sizes), length_of(Loads, self.sizes)
         self._no_bodies = np.zeros((len(t.joints), 10))
+        self._friction = NO_FRICTION, np.array(NO_FRICTION[:2]), np.array(NO_FRICTION[2:])
 
     @cached_property
     def at_home(self) -> Array:
@@ -264,11 +262,13 @@ class Evaluation:
             given = np.empty((3, 0, drives))
         if loads is None or inertial is None:
             loads, inertial = np.empty((len(rows), self._lengths[1])), self._no_bodies
+        last = self._friction
+        if friction is not last[0]:
+            last = self._friction = friction, np.array(friction[:2]), np.array(friction[2:])
         at_home = self.at_home if warm or not stages & KEPT else NOWHERE
         arguments = (
             *self.packed, self.home, at_home, np.array(self.home if start is None else start),
-            given, rows, inertial, gravity, loads, np.array(friction[:2]), np.array(friction[2:]),
-            found, stages, warm)
+            given, rows, inertial, gravity, loads, last[1], last[2], found, stages, warm)
         loop = compiled_or_none(_evaluate, len(found))
         if loop is not None:
             return int(loop(*arguments))
@@ -290,10 +290,7 @@ class Evaluation:
         m, o = samples_last(self.motion(rows)), samples_last(self.loads(loads))
         if stages & MOTION:
             q, v, a = np.moveaxis(given, 1, -1)
-            m.q[:] = self.home[:, None]
-            m.q[t.drives] = q
-            m.state[:] = 0.0
-            if len(t.passive) and not reach(t, m, self.home, q):
+            if not reach(t, m, self.home, q):
                 size = m.state[0]
                 return int(np.argmax(~(size < np.inf) | (size == np.max(size))))
             follow(t, m, v, a)

@@ -438,30 +438,33 @@ def reach(t: Tables, m: Motion, start: Any, goal: Any) -> bool:
     bool
         False where the loops do not close on the way.
     """
-    need, count = 0.0 * goal[0], len(t.passive)
+    zero, count = 0.0 * goal[0], len(t.passive)
+    for c in range(len(m.q)):
+        m.q[c] = start[c] + zero
+    m.state[0] = m.state[3] = need = size = zero
     for d in range(len(t.drives)):
+        m.q[t.drives[d]] = goal[d]
         need = larger(need, abs(goal[d] - start[t.drives[d]]) / t.stride[d])
+    if not count:
+        return True
     if not everywhere(need < MOST_STRIDES):
         m.state[0] = need + 1.0
         return False
     strides = largest(need)
-    for c in range(len(m.q)):
-        m.q[c] = start[c] + 0.0 * need
-    size = 0.0 * need
     for k in range(1, strides + 1):
         for d in range(len(t.drives)):
             c = t.drives[d]
             m.q[c] = goal[d] + (1.0 - k / strides) * (start[c] - goal[d])
         for n in range(MOST_STEPS):
-            m.state[3] = 1.0 + n + 0.0 * need
+            m.state[3] = 1.0 + n + zero
             place(t, m)
-            size = 0.0 * need
+            size = zero
             for r in range(count):
                 m.gaps[r, 0] = residual(t, m, r)
                 size = larger(size, abs(m.gaps[r, 0]))
             jacobian(t, m, t.places, m.J, m.by_drives)
             solve(m.J, m.gaps, t)
-            step = 0.0 * size
+            step = zero
             for r in range(count):
                 step = larger(step, abs(m.gaps[r, 0]))
             share = LONGEST_STEP / larger(step, LONGEST_STEP + 0.0 * step)
