@@ -96,11 +96,15 @@ reliability-full: $(VENV)/.test
 
 # Public problems; tables and picture of docs/benchmark.md. What is there is not run again.
 NAMING ?= full
-NAMING_PROBLEMS := $(if $(filter small,$(NAMING)),10,60)
+NAMING_PROBLEMS := $(if $(filter small,$(NAMING)),12,72)
+NAMING_FOLDER := output/naming$(if $(filter small,$(NAMING)),-small)
+NAMING_PAGE := $(if $(filter small,$(NAMING)),$(NAMING_FOLDER)/benchmark.md,docs/benchmark.md)
 naming: $(VENV)/.naming
-	$(BIN)/python -m benchmarks.naming.run make output/naming --seed 2 --problems $(NAMING_PROBLEMS)
-	-$(BIN)/python -m benchmarks.naming.run enter output/naming
-	$(BIN)/python -m benchmarks.naming.run score output/naming --page docs/benchmark.md
+	$(BIN)/python -m benchmarks.naming.run make $(NAMING_FOLDER) --seed 2 --problems $(NAMING_PROBLEMS)
+	$(BIN)/python -m benchmarks.naming.run enter $(NAMING_FOLDER) $(if $(filter small,$(NAMING)),--whole)
+	$(BIN)/python -m benchmarks.naming.real $(NAMING_FOLDER)/real
+	$(BIN)/python -m benchmarks.naming.run enter $(NAMING_FOLDER)/real --whole
+	$(BIN)/python -m benchmarks.naming.run score $(NAMING_FOLDER) --real $(NAMING_FOLDER)/real --page $(NAMING_PAGE)
 
 experiments: $(VENV)/.test
 	$(BIN)/python -m benchmarks.scores.experiments

@@ -38,8 +38,9 @@ from pprs_dynamics.simulation.arm_run import draw_motion
 
 SECONDS, RATE = 20.0, 200.0
 # What an effect's force is drawn over, where it is not the drive's velocity.
-OVER = {'counterbalance': 'position', 'drive_inertia': 'acceleration',
-        'drive_spring': 'position', 'effort_gain': 'effort', 'effort_offset': 'time',
+OVER = {'counterbalance': 'position', 'current_gain': 'effort',
+        'drive_inertia': 'acceleration', 'drive_spring': 'position', 'effort_gain': 'effort',
+        'effort_offset': 'time',
         'force_ripple': 'position', 'friction_drift': 'time',
         'homing_error': 'position', 'link_mass': 'position', 'joint_friction': 'velocity',
         'payload_mass': 'position', 'payload_offset': 'position',
@@ -49,6 +50,7 @@ OVER = {'counterbalance': 'position', 'drive_inertia': 'acceleration',
 TYPICAL = {'asymmetric_friction': {'force_forward': 0.8, 'force_backward': 0.4},
            'force_ripple': {'force': 0.3, 'phase': 0.0, 'pitch': 0.01},
            'counterbalance': {'force': 10.0, 'stiffness': 0.0, 'ratio': 0.6, 'position': 0.0},
+           'current_gain': {'temperature': 0.002},
            'coupled_drives': {'wrist.coulomb': 1.0},
            'friction_temperature': {'coulomb': -0.02, 'viscous': -0.2, 'reference': 40.0},
            'hysteresis': {'force': 0.5, 'distance': 0.002},

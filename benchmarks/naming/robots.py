@@ -13,7 +13,7 @@ from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
 
 ROBOTS = ('3-PPRS', 'hexapod', 'delta', 'arm', 'axis')
 # Recordings of the benchmark have no temperatures, its models no maps of motors.
-UNSEEN = ('friction_temperature', 'coupled_drives')
+UNSEEN = ('friction_temperature', 'coupled_drives', 'current_gain')
 MODELS = Path(__file__).parent / 'models'
 
 

@@ -52,6 +52,8 @@ PARAMETERS = (
                   'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0, stays=True),
     own_parameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
                   upper=3600.0, stays=True),
+    own_parameter('diagnose_since', (), 'recordings of days on which the machine was right: '
+                  'windows are diagnosed for what has changed since then', stays=True),
 )
 
 # Of the samples of a second: from fewer compared ones on the stream is called broken.
@@ -199,7 +201,8 @@ class MonitorNode(ExplainsRefusals):
             self._diagnosis.publish(String(data=json.dumps(for_json(answer))))
         if not self._worker.busy and (samples := self._windows.take()) is not None:
             model = self._settings.model
-            self._worker.submit(model.values, model.source, samples)
+            self._worker.submit(model.values, model.source, samples,
+                                tuple(self._settings.own['diagnose_since']))
 
     def finish(self) -> None:
         """End the process that diagnoses."""

@@ -47,7 +47,7 @@ from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState, couplings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 from pprs_dynamics.simulation.sensors import ButterworthFilter, EffortFilter
-from pprs_dynamics.simulation.temperatures import Climate, read_thermometers
+from pprs_dynamics.simulation.temperatures import REFERENCE, Climate, read_thermometers
 
 RATE = 100.0  # [Hz]
 CLIMATE = 45  # second seed of temperatures
@@ -382,6 +382,8 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         gain = scale * float(random.uniform(0.04, 0.1))
         efforts[:, joint] *= 1 + gain
         hidden.append(truth('effort_gain', [model.drives[joint]], {'gain': gain}, '1 + gain'))
+    if 'current_gain' in chosen:
+        hidden.append(_hide_current_gain(model, motion, temperature, efforts, random, scale))
     if 'time_delay' in chosen:
         assert motion.time is not None
         delay = scale * float(random.uniform(0.008, 0.03))
@@ -408,7 +410,7 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
     return ArmRun(motion, position, efforts + _noise(random, efforts.shape) * sigma,
                   tuple(hidden), {
                       'temperature': read_thermometers(motion.time, temperature)}
-                  if thermometers or 'friction_temperature' in chosen else {})
+                  if thermometers or {*chosen} & {'friction_temperature', 'current_gain'} else {})
 
 
 def _hidden_joint(model: ArmModel, motion: JointMotion, plain: Array, random: np.random.Generator,
@@ -451,6 +453,29 @@ def _hide_motor_friction(model: ArmModel, motion: JointMotion, largest: Array, e
     return truth('coupled_drives', None, {
         f'{name}.coulomb': dry, f'{name}.viscous': viscous / top},
         "A' (F v / sqrt(v^2 + w^2) + c v_1 asinh(v / v_1)), v the speed of the motor")
+
+
+def _hide_current_gain(model: ArmModel, motion: JointMotion, temperature: Array, efforts: Array,
+                       random: np.random.Generator, scale: float) -> dict[str, Any]:
+    """Let a motor's torque per current go with its temperature or its angle, and return how."""
+    j = int(random.integers(len(model.drives)))
+    ratio = model.gear_ratios[j]
+    if ratio > 1 and random.random() < 0.5:
+        height, waves = scale * float(random.uniform(0.03, 0.08)), int(random.integers(1, 7))
+        phase = float(random.uniform(-np.pi, np.pi))
+        turn = waves * ratio * motion.position[:, j] + phase
+        constant = 1 + height * (np.sin(turn) + 0.2 * np.sin(3 * turn))
+        parameters = {'ripple': height, 'phase': phase, 'pitch': 2 * np.pi / (waves * ratio)}
+        form = 'F / (1 + a (sin(x) + sin(3 x) / 5)), x = 2 pi q / p + phi'
+    else:
+        weaker = scale * float(random.uniform(0.0015, 0.003))
+        reference = float(random.uniform(*REFERENCE))
+        warmer = temperature[:, j] - reference
+        constant = 1 - weaker * warmer * (1 + warmer / 300)
+        parameters = {'temperature': weaker, 'reference': reference}
+        form = 'F / (1 - kappa (T - T_0) (1 + (T - T_0) / 300 K))'
+    efforts[:, j] /= constant
+    return truth('current_gain', [model.drives[j]], {model.drives[j]: parameters}, form)
 
 
 def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Array:

@@ -21,7 +21,12 @@ from pprs_dynamics.simulation.hidden_effect import (
     SteepDriveForce,
     StructureForce,
 )
-from pprs_dynamics.simulation.temperatures import Climate, read_thermometers, thinner
+from pprs_dynamics.simulation.temperatures import (
+    REFERENCE,
+    Climate,
+    read_thermometers,
+    thinner,
+)
 
 PHASE = Range('rad', -np.pi, np.pi)
 PULLEY = 3.0  # [m], from the middle of the workspace
@@ -154,7 +159,7 @@ class FrictionTemperature(DriveForce):
     ranges: ClassVar[dict[str, Range]] = {
         'coefficient': Range('N s/m', 10.0, 30.0, 'log', scales=True),
         'thinning_velocity': Range('m/s', 0.2, 0.6, 'log', neutral=1.0),
-        'reference': Range('degC', 15.0, 45.0), 'climate': Range('1', 0, 2 ** 31, 'whole')}
+        'reference': Range('degC', *REFERENCE), 'climate': Range('1', 0, 2 ** 31, 'whole')}
 
     def prepare(self, coulomb: Array, width: Array) -> None:
         """Start at the temperature of the hall, which is that of all drives."""

@@ -165,6 +165,18 @@ def test_what_is_not_covered_is_refused_in_a_sentence(tmp_path: Path, text: str,
     assert str(error.value).startswith(str(path))
 
 
+def test_joints_that_share_a_transmission_need_the_turns_of_its_motors(tmp_path: Path) -> None:
+    path = arm.write_arm(tmp_path, arm.urdf(more=TRANSMISSION))
+    way = 'friction: {motors: {MOTOR: {turn: 1.0, swing: 1.0}}}'
+    with pytest.raises(ModelError, match=re.escape(way)):
+        load_model(path)
+    path = arm.write_arm(tmp_path, arm.urdf(more=TRANSMISSION),
+                         friction__motors='{left: {turn: 1.0, swing: 1.0}}')
+    model = load_model(path)
+    assert isinstance(model, ArmModel)
+    assert model.robot.motors == {'left': (1.0, 1.0, 0.0)}
+
+
 @pytest.mark.parametrize(('old', 'new', 'words'), [
     ('tool: flange', 'tool: flansch', 'flansch.*be a link of the URDF'),
     ('tool: flange', 'tool: stand', 'that arm.joints move'),

@@ -27,6 +27,7 @@ from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
     PresentCoefficient,
     PresentShape,
+    ReferenceDirection,
     ReversalShape,
     present_columns,
     present_values,
@@ -55,6 +56,7 @@ from pprs_dynamics.physics.effects.drive_effect import (
     DriveEffect,
     DriveRange,
     DriveSamples,
+    GainEffect,
     MeasurementEffect,
 )
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -72,6 +74,25 @@ LEANING = 10.0
 # A drive hardly moves whose speed is seldom beyond the width in which the model's friction turns
 # over, times the first: in less than the second of the time.
 TURNED, LEAST_MOVING = 2.0, 0.05
+
+
+@dataclass(frozen=True)
+class CarriedOver:
+    """What a reference run says of recordings; see `pprs_dynamics.inference.fit.reference`.
+
+    Parameters
+    ----------
+    mean : (M, D) array
+        Forces that the model lacks there as well [N].
+    directions : tuple of ReferenceDirection
+        In which they are uncertain.
+    covered : float
+        Share of the samples whose states the reference knows.
+    """
+
+    mean: Array
+    directions: tuple[ReferenceDirection, ...]
+    covered: float
 
 
 @dataclass
@@ -98,6 +119,8 @@ class Design:
         None: the given model.
     joining : str
         See `of`.
+    carried : CarriedOver, optional
+        Its mean is taken from what was measured, its directions are columns of every fit.
     """
 
     given: ForceModel
@@ -112,6 +135,7 @@ class Design:
     forces: Array = field(repr=False)
     point: OperatingPoint | None = None
     joining: str = ''
+    carried: CarriedOver | None = None
     _moved: dict[bytes, tuple[Reconstruction, ...]] = field(
         default_factory=dict, repr=False, compare=False)
     _own_rows: dict[tuple[type[CatalogueEffect], int], Array] = field(
@@ -166,10 +190,10 @@ class Design:
             point.model, self.given, self.reconstructed(point.model), None,
             {one.effect for one in point.effects} if alone else None,
             {(one.drive, one.number) for one in self.base if isinstance(one, ReversalShape)},
-            self.joining)
+            self.joining).beside(self.carried)
         shift = np.zeros_like(design.residuals.model)
         for column, c in zip(design.base, point.base, strict=True):
-            if not isinstance(column, ReversalShape):
+            if column.in_model:
                 for d, row in column.rows.items():
                     shift[:, d] += c * row
         for one in point.effects:
@@ -183,6 +207,29 @@ class Design:
                 shift[:, d] += row
         residuals = replace(design.residuals, model=design.residuals.model - shift)
         return replace(design, residuals=residuals, point=point)
+
+    def beside(self, carried: CarriedOver | None) -> Design:
+        """Return this with what a reference says of the recordings, or as it is for None."""
+        if carried is None:
+            return self
+        residuals = replace(self.residuals, measured=self.residuals.measured - carried.mean)
+        return replace(self, residuals=residuals, base=(*self.base, *carried.directions),
+                       carried=carried)
+
+    def carried_forces(self, coefficients: Array) -> Array:
+        """Return what the directions of a reference add to the forces, (M, D) [N].
+
+        Parameters
+        ----------
+        coefficients : (P,) array
+            Of the base columns first.
+        """
+        forces = np.zeros_like(self.residuals.model)
+        for column, c in zip(self.base, coefficients, strict=False):
+            if isinstance(column, ReferenceDirection):
+                for d, row in column.rows.items():
+                    forces[:, d] += c * row
+        return forces
 
     def reconstructed(self, model: ForceModel) -> tuple[Reconstruction, ...]:
         """Return the motion of the recordings with the zeros that a model's drives have."""
@@ -354,9 +401,12 @@ class Design:
         """Return the treated columns of an effect on one drive, (k, M)."""
         if issubclass(effect, MeasurementEffect):
             def seen(recording: FullRate, part: slice) -> Array:
-                time = recording.time[part]
-                effort = self.sensed(recording.effort[None, part, drive], time, drive, effect)[0]
-                return np.stack(effect.sensor_columns(effort, time, **shape))
+                effort = self.sensed(recording.effort[None, part, drive], recording, part, drive,
+                                     effect)[0]
+                if issubclass(effect, GainEffect):
+                    samples = recording.samples(part, drive)
+                    return np.stack([effort * one for one in effect.shares(samples, **shape)])
+                return np.stack(effect.sensor_columns(effort, recording.time[part], **shape))
 
             return self.treated(lambda recording: np.concatenate(
                 [seen(recording, part) for part in recording.segments], axis=1))
@@ -374,7 +424,7 @@ class Design:
         """Return forces on a drive, (k, N) of a recording, as its sensor shows them, (k, M)."""
         def behind_sensor(recording: FullRate) -> Array:
             whole = rows(recording)
-            return np.concatenate([self.sensed(whole[:, part], recording.time[part], drive)
+            return np.concatenate([self.sensed(whole[:, part], recording, part, drive)
                                    for part in recording.segments], axis=1)
         return self.treated(behind_sensor)
 
@@ -383,14 +433,21 @@ class Design:
         return np.concatenate([recording.treat(rows(recording).T).T
                                for recording in self.recordings], axis=1)
 
-    def sensed(self, rows: Array, time: Array, drive: int,
+    def sensed(self, rows: Array, recording: FullRate, part: slice, drive: int,
                without: type[CatalogueEffect] | None = None) -> Array:
-        """Return forces (k, N) on a drive as the model's sensors show them, but for one kind."""
+        """Return forces (k, N) on a drive in a segment as the model's sensors show them.
+
+        All but those of one kind.
+        """
         name = self.drives[drive]
         for effect in self.model.effects:
             if (isinstance(effect, MeasurementEffect) and name in effect.drives
                     and type(effect) is not without):
+                if isinstance(effect, GainEffect):
+                    rows = rows * effect.factor(recording.samples(part, drive), name)
+                    continue
                 alone = type(effect)({name: effect.drives[name]})
+                time = recording.time[part]
                 rows = np.reshape([alone.sensed(row[:, None], time, (name,))[:, 0]
                                    for row in rows], rows.shape)
         return rows

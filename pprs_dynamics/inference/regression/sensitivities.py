@@ -197,7 +197,7 @@ class Sensitivities(ABC):
         """Return what the model's sensors make of a change of the drives' forces, (N, D)."""
         for effect in self.model.effects:
             if isinstance(effect, MeasurementEffect):
-                column = effect.sensed(column, state.time, self.model.drives)
+                column = effect.seen(column, state)
         return column
 
     def _sensed_each(self, columns: Iterable[Array], state: Any) -> Array:

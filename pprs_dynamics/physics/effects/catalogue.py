@@ -23,6 +23,7 @@ from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.counterbalance import Counterbalance
 from pprs_dynamics.physics.effects.laws.coupled_drives import CoupledDrives
+from pprs_dynamics.physics.effects.laws.current_gain import CurrentGain
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
 from pprs_dynamics.physics.effects.laws.effort_filter import EffortFilter
@@ -69,6 +70,7 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         CoulombFriction,
         Counterbalance,
         CoupledDrives,
+        CurrentGain,
         DriveInertia,
         DriveSpring,
         EffortFilter,

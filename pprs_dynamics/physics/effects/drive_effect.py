@@ -259,3 +259,34 @@ class MeasurementEffect(DriveEffect):
                memory: Any = None) -> Array:
         """Return the measured effort where the drives apply `effort`, (N, D) [N]."""
         return effort
+
+    def seen(self, effort: Array, state: DriveStates, memory: Any = None) -> Array:
+        """Return the measured effort at a state; by default what `sensed` says, whatever it is."""
+        return self.sensed(effort, state.time, state.drives, memory)
+
+
+class GainEffect(MeasurementEffect):
+    """A factor between efforts and what is measured that goes with what the drive does."""
+
+    @classmethod
+    @abstractmethod
+    def shares(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return what is measured too much per coefficient, as shares of the effort, (N,) each."""
+
+    def factor(self, samples: DriveSamples, drive: str) -> Array:
+        """Return by what the efforts of one drive are multiplied, (N,)."""
+        values = self.drives[drive]
+        coefficients = self.to_coefficients(values)
+        shares = self.shares(samples, **{p.name: values[p.name] for p in self.shape})
+        factor = np.ones_like(samples.velocity)
+        for c, share in zip(self.coefficients, shares, strict=True):
+            factor += coefficients[c.name] * share
+        return factor
+
+    def seen(self, effort: Array, state: DriveStates, memory: Any = None) -> Array:
+        """Return the efforts times their factors."""
+        scaled = effort.copy()
+        for name in self.drives:
+            index = state.drives.index(name)
+            scaled[:, index] *= self.factor(DriveSamples.of(state, index), name)
+        return scaled

@@ -118,7 +118,7 @@ def _columns(result: Any, effect: type[DriveEffect], _: Any, drive: DriveSamples
         raise _WrongResultError(
             f'{len(columns)} arrays, must be {len(wanted)} ({names(wanted) or "none"})')
     given = (drive.position, drive.velocity, drive.acceleration, drive.guide_load,
-             drive.transmitted)
+             drive.transmitted, *drive.channels.values())
     return tuple(_finite(_array(column, drive.velocity.shape), given) for column in columns)
 
 
@@ -235,7 +235,8 @@ CHECKS: dict[str, Callable[..., Any]] = {
     '__init__': _any, 'from_file': _built, 'to_file': _block,
     'to_coefficients': _coefficients, 'from_coefficients': _parameters,
     'drive_memory': _any, 'begin': _any, 'initial_memory': _memory, 'continued_memory': _memory,
-    'columns': _columns, 'force': _force, 'sensed': _sensed, 'sensor_columns': _sensor_columns,
+    'columns': _columns, 'shares': _columns, 'force': _force, 'sensed': _sensed,
+    'sensor_columns': _sensor_columns,
     'position_error': _position_error, 'shifts_positions': _any,
     'changed': _robot, 'load': _load, 'apply': _state,
     'trials': _shapes, 'alternatives': _shapes, 'averaged': _averaged}

@@ -463,7 +463,7 @@ class ForceModel(ABC):
         state = self.initial_state() if state is None else state
         for effect in sensors:
             memory = state.memories[effect.name]
-            after = (effect.sensed(total, mechanism.time, mechanism.drives, memory)
+            after = (effect.seen(total, mechanism, memory)
                      if isinstance(effect, MeasurementEffect)
                      else total + effect.force(mechanism, memory))
             parts[effect.name], total = after - total, after

@@ -315,7 +315,7 @@ def named_keys(parameters: Iterable[str]) -> dict[str, Key]:
 
 # Blocks whose keys are not listed one by one.
 ADDED = ('effects.', 'uncertainties.', 'tolerances.', 'history.', 'joint_map.', 'joint_prefix',
-         'columns.', 'effort_kind')
+         'columns.', 'effort_kind', 'reference')
 
 
 def is_axis(names: Iterable[str]) -> bool:

@@ -52,7 +52,7 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
         description = read_mjcf(values[given[0]])
     else:
         description = read_urdf(values[given[0]])
-        _require_one_motor_each(description, values[drives_key(block)], block)
+        _require_motors(description, values, block)
     own = tuple((key, value) for key, value in values.items()
                 if key.startswith((f'{block}.home.', f'{block}.loops.')))
     return _structure(description, block, values[f'{block}.base'], values[f'{block}.tool'],
@@ -94,12 +94,19 @@ def _structure(description: Description, block: str, base: str, tool: str,
                            lock_others=block == ARM)
 
 
-def _require_one_motor_each(description: Description, drives: tuple[str, ...], block: str) -> None:
+def _require_motors(description: Description, values: Mapping[str, Any], block: str) -> None:
+    """Raise ModelError where joints share a transmission, and the file does not say how."""
+    drives = set(values[drives_key(block)])
+    mapped = {key.removeprefix(MOTORS).partition('.')[2] for key in values
+              if key.startswith(MOTORS)}
     for each in coupled(description):
-        if set(each.joints) & set(drives):
+        shared = [name for name in each.joints if name in drives]
+        if set(shared) - mapped:
+            turns = ', '.join(f'{name}: 1.0' for name in shared)
             raise ModelError(
                 drives_key(block), list(each.joints), 'have a motor each, but share a transmission '
-                f'{each.kind.lower()} in the URDF: coupled joints are not covered')
+                f'{each.kind.lower()} in the URDF: write friction: {{motors: {{MOTOR: {{{turns}}}'
+                '}}, turns of each motor per turn of its joints')
 
 
 def coupled(description: Description) -> list[Transmission]:
