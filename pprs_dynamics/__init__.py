@@ -59,12 +59,11 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.mechanism.motion import PlatformMotion
     from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
     from pprs_dynamics.physics.model.arm_model import ArmModel
-    from pprs_dynamics.physics.model.axis_model import AxisModel, AxisMotion
     from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel, ModelState
     from pprs_dynamics.physics.model.model_file import build_model, load_model
 
-__all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'ArmModel', 'Array', 'AxisModel',
-           'AxisMotion', 'Card', 'CatalogueEffect', 'ChangeResult', 'ComparisonResult',
+__all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'ArmModel', 'Array',
+           'Card', 'CatalogueEffect', 'ChangeResult', 'ComparisonResult',
            'ConvergenceError', 'DiagnosisResult', 'DriveEffect', 'DriveForces', 'DriveModel',
            'DriveRange', 'DriveSamples', 'EffectError', 'Excitation', 'ExperimentResult',
            'FitResult', 'GainEffect', 'HelicalPath', 'JointMotion', 'LimitError',
@@ -102,7 +101,6 @@ _HOMES = {
     'physics.mechanism.motion': ('PlatformMotion',),
     'physics.mechanism.paths': ('Excitation', 'HelicalPath'),
     'physics.model.arm_model': ('ArmModel',),
-    'physics.model.axis_model': ('AxisModel', 'AxisMotion'),
     'physics.model.drive_model': ('DriveForces', 'DriveModel', 'ModelState'),
     'physics.model.model_file': ('build_model', 'load_model'),
 }

@@ -19,7 +19,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
-from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction, friction_rows
+from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
 from pprs_dynamics.physics.mechanism.closures import ROWS
 from pprs_dynamics.physics.mechanism.description import (
     Frame,
@@ -27,12 +27,13 @@ from pprs_dynamics.physics.mechanism.description import (
     principal_inertia,
 )
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Motion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.urdf import expanded
 from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
 from pprs_dynamics.simulation.arm_forms import (
     FORMS,
     SIZE,
@@ -480,12 +481,11 @@ def _hide_current_gain(model: ArmModel, motion: JointMotion, temperature: Array,
 
 def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Array:
     """Return friction, offset and armature as the model file has them, under the true loads."""
-    values, v = model.values, motion.velocity
+    v = motion.velocity
     friction: Array = (
-        model.robot.armature * motion.acceleration
-        + np.array(values['friction.viscous']) * v
-        + np.array(values['friction.coulomb']) * np.tanh(v / np.asarray(model.reversal.velocity))
-        + np.array(values['friction.offset']))
+        model.robot.armature * motion.acceleration + np.asarray(model.friction.viscous) * v
+        + np.asarray(model.friction.coulomb) * np.tanh(v / np.asarray(model.reversal.velocity))
+        + np.asarray(model.offset.value))
     for effect in model.effects:
         if isinstance(effect, LinkageFriction):
             state = model.mechanism(motion).loaded(

@@ -269,7 +269,10 @@ class DriveCoupling(DriveForce):
         return self.values['coefficient'] * moment.velocity[..., sources]
 
 
-class _PassiveJointFriction(HiddenJointFriction):
+class JointFriction(HiddenJointFriction):
+    """Dirt or preload in the revolute joints C_i, or in the spherical joints A_i."""
+
+    name: ClassVar[str] = 'joint_friction'
     form: ClassVar[str] = 'c s_1 asinh(s / s_1) + M s / sqrt(s^2 + w^2)'
     ranges: ClassVar[dict[str, Range]] = {
         'viscous': Range('N m s/rad', 0.04, 0.15, 'log', scales=True),
@@ -285,25 +288,11 @@ class _PassiveJointFriction(HiddenJointFriction):
                 + p['dry'] / np.sqrt(speed * speed + p['width'] ** 2))
 
 
-class RevoluteFriction(_PassiveJointFriction):
-    """Dirt or preload in the revolute joints C_i."""
-
-    name: ClassVar[str] = 'revolute_friction'
-    joint: ClassVar[str] = 'revolute'
-
-
-class SphericalFriction(_PassiveJointFriction):
-    """Dirt or preload in the spherical joints A_i."""
-
-    name: ClassVar[str] = 'spherical_friction'
-    joint: ClassVar[str] = 'spherical'
-
-
 @StructureForce.by_law('k x (1 + (x / x_h)^2), x = u_i - u_0',
                        stiffness=Range('N m/rad', 0.4, 1.5, 'log', scales=True),
                        rest=Range('rad', 1.2, 1.6), hardening=Range('rad', 0.8, 1.5))
-def revolute_stiffness(m: PlatformMoment, stiffness: float, rest: float, hardening: float,
-                       ) -> tuple[Array, Array, Array]:
+def joint_spring(m: PlatformMoment, stiffness: float, rest: float, hardening: float,
+                 ) -> tuple[Array, Array, Array]:
     """Cable looms across the revolute joints C_i, stiffening as they bend."""
     x = m.rod_angle - rest
     return -stiffness * x * (1 + (x / hardening) ** 2), np.zeros(3), np.zeros(3)
@@ -332,8 +321,8 @@ def external_wrench(m: PlatformMoment, force: float, azimuth: float, elevation: 
 @StructureForce.by_law('-c v sqrt(1 + (|v| / v_1)^2)',
                        coefficient=Range('N s/m', 5.0, 15.0, 'log', scales=True),
                        turbulent_velocity=Range('m/s', 0.2, 0.6, 'log'))
-def platform_drag(m: PlatformMoment, coefficient: float, turbulent_velocity: float,
-                  ) -> tuple[Array, Array, Array]:
+def tool_drag(m: PlatformMoment, coefficient: float, turbulent_velocity: float,
+              ) -> tuple[Array, Array, Array]:
     """A liquid or a curtain that the platform moves through."""
     grown = np.sqrt(1 + (m.velocity @ m.velocity) / turbulent_velocity ** 2)
     return np.zeros(3), -coefficient * grown * m.velocity, np.zeros(3)

@@ -199,10 +199,16 @@ def test_a_mistake_in_the_file_is_one_sentence(tmp_path: Path, old: str, new: st
 
 def test_effects_say_where_they_act(tmp_path: Path) -> None:
     path = arm.write_arm(tmp_path)
-    path.write_text(path.read_text() + '    effects:\n      rod_mass: {mass: 0.1}\n')
+    text = path.read_text() + '    effects:\n'
+    path.write_text(text + '      payload_offset: {x: 0.1, y: 0.0, z: 0.0}\n')
     with pytest.raises(ModelError, match='acts in a serial arm'):
         load_model(path)
+    path.write_text(text + '      rod_mass: {mass: 0.1}\n')
+    with pytest.raises(ModelError, match=r'unknown effect rod_mass \(use link_mass\)'):
+        load_model(path)
     with pytest.raises(ModelError, match='acts in a 3-PPRS'):
+        build_model({**DriveModel.load().values, 'effects.coupled_drives.wrist.coulomb': 0.1})
+    with pytest.raises(ModelError, match=r'unknown key effects\.link_mass\.beam\.mass'):
         build_model({**DriveModel.load().values, 'effects.link_mass.beam.mass': 0.1})
 
 

@@ -34,7 +34,6 @@ from pprs_dynamics.inference.regression.base_columns import (
 )
 from pprs_dynamics.inference.regression.collecting import (
     ColumnCollector,
-    sensitivities_of,
     stacked_columns,
 )
 from pprs_dynamics.inference.regression.sensitivities import (
@@ -44,6 +43,7 @@ from pprs_dynamics.inference.regression.sensitivities import (
     OF_DRIVES,
     OF_JOINTS,
     PRESENT,
+    Sensitivities,
 )
 from pprs_dynamics.inference.regression.terms import FullRate, OperatingPoint, Term
 from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
@@ -60,11 +60,11 @@ from pprs_dynamics.physics.effects.drive_effect import (
     MeasurementEffect,
 )
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
+from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 
 SHAPE_STEP = 1e-3  # amount of movement, for derivatives by shape parameters
 LONGEST_DELAY = 0.3  # [s], that a recording may show at once
@@ -255,7 +255,7 @@ class Design:
         They are those of the given model around every other one: a sensor that says nothing of
         small efforts, say, would leave some of them without a column.
         """
-        sensitivities = sensitivities_of(model, given)
+        sensitivities = Sensitivities(model, given)
         if effects is not None:
             sensitivities.restrict(effects)
         tables: list[dict[Any, Array]] = []
@@ -357,7 +357,7 @@ class Design:
     def present(self, effect: type[CatalogueEffect], drive: int | None,
                 ) -> Mapping[str, float] | None:
         """Return the parameters that the given model has of an effect; None where it lacks it."""
-        there = next((e for e in self.given.effects if type(e) is effect), None)
+        there = next((e for e in self.given.effects if e.name == effect.name), None)
         name = None if drive is None else self.drives[drive]
         if there is None or (isinstance(there, DriveEffect) and name not in there.drives):
             return None
@@ -442,7 +442,7 @@ class Design:
         name = self.drives[drive]
         for effect in self.model.effects:
             if (isinstance(effect, MeasurementEffect) and name in effect.drives
-                    and type(effect) is not without):
+                    and (without is None or effect.name != without.name)):
                 if isinstance(effect, GainEffect):
                     rows = rows * effect.factor(recording.samples(part, drive), name)
                     continue
@@ -509,7 +509,7 @@ class Design:
 
     def present_rows(self, column: PresentCoefficient | PresentShape) -> dict[int, Array]:
         """Return the rows, (M,) by drive, of what the model's effects may be otherwise."""
-        there = next(e for e in self.model.effects if type(e) is column.effect)
+        there = next(e for e in self.model.effects if e.name == column.effect.name)
         assert isinstance(there, CatalogueEffect)
         values = present_values(there, column.drive)
         drive = None if column.drive is None else self.drives.index(column.drive)
