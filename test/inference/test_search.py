@@ -204,7 +204,7 @@ def test_what_may_be_lack_of_fit_is_told_once_it_stands_out_of_the_noise(
     recording = recording_of({'tool_drag': {'coefficient': 12.0, 'rotational': 0.0},
                               'joint_friction': {'revolute.viscous': viscous}}, 0.02)
     ranking = select(MODEL, [recording], DECISIONS)
-    assert names(ranking.best) == ['tool_drag', 'joint_friction']
+    assert names(ranking.best) == ['joint_friction', 'tool_drag']
     assert ('joint_friction' in names(ranking.kept)) is stands_out
     assert [one.candidate.name for one in ranking.remainders] == [
         'joint_friction'] * (not stands_out)
