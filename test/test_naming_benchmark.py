@@ -24,8 +24,11 @@ from benchmarks.naming.entrants.stepwise import stepwise
 from benchmarks.naming.generate import draws
 from benchmarks.naming.page import best_of_settings, better_than_ours, fails_table
 from benchmarks.naming.problems import Answer, AnswerError, Column, Named, Problem, Truth
+from benchmarks.naming.robots import ROBOTS, hidden_names
 from benchmarks.naming.run import enter_all, score_all
 from benchmarks.naming.scoring import FIGURES, Rate, Scored, figures, judge
+from pprs_dynamics.simulation.arm_forms import NAMES
+from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
 
 DRIVES = ('a', 'b')
 EFFECTS = ('viscous', 'coulomb', 'spring', 'offset')
@@ -279,6 +282,11 @@ def test_a_diagnosis_is_an_answer_with_its_rivals() -> None:
             'indistinguishable': [['rod_mass', 'payload_mass']]}
     assert [[one.name for one in found] for found in answer_of(said).sets] == [
         ['rod_mass'], ['payload_mass']]
+
+
+def test_what_may_be_hidden_can_be_simulated() -> None:
+    for robot in ROBOTS:
+        assert set(hidden_names(robot)) <= set(IN_CATALOGUE if robot == '3-PPRS' else NAMES)
 
 
 def test_seeds_give_the_same_problems_and_names_that_tell_nothing() -> None:
