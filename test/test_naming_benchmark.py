@@ -17,8 +17,9 @@ from benchmarks.naming import fetch
 from benchmarks.naming.entrants import CONTROL, ENTRANTS, PEERS, Entrant
 from benchmarks.naming.entrants.controls import perfect, random, silent
 from benchmarks.naming.entrants.cross_validation import block_cross_validation
+from benchmarks.naming.entrants.equations import Equations
 from benchmarks.naming.entrants.pprs import answer_of
-from benchmarks.naming.entrants.sindy import sindy
+from benchmarks.naming.entrants.sindy import unlike
 from benchmarks.naming.entrants.spike_and_slab import spike_and_slab
 from benchmarks.naming.entrants.stepwise import stepwise
 from benchmarks.naming.generate import draws
@@ -256,14 +257,26 @@ def test_peers_find_what_stands_out_of_white_noise() -> None:
         assert abs(value - 0.2) < 4 * std
 
 
-def test_columns_that_others_make_up_are_no_error_of_frols() -> None:
-    pytest.importorskip('pysindy')
+def test_frols_gets_no_columns_that_others_make_up() -> None:
     made = problem(2, {('spring', 'b'): 1.0})
-    twice = Problem(made.drives, made.time, made.error, made.base,
-                    (*made.columns, Column('twin', 'c', 'b'), Column('nothing', 'c', 'a')),
-                    np.concatenate((made.rows, made.rows[6:7], 0 * made.rows[:1])))
-    found = sindy(twice, 'FROLS').sets[0]
-    assert found[0].name in ('spring', 'twin')
+    equations = Equations(Problem(
+        made.drives, made.time, made.error, made.base,
+        (*made.columns, Column('twin', 'c', 'b'), Column('zero', 'c', 'a')),
+        np.concatenate((made.rows, made.rows[6:7], 0 * made.rows[:1]))))
+    found = unlike(equations.compressed()[0], equations.best_single())
+    assert len(found) == len(made.columns)
+    assert set(range(len(made.columns))) - set(found) <= {6}  # or its twin
+
+
+def test_as_many_rows_as_columns_say_the_same() -> None:
+    equations = Equations(problem(4, {('spring', 'b'): 1.0}))
+    rows, seen = equations.compressed()
+    assert rows.shape == (8, 8)
+    np.testing.assert_allclose(rows.T @ rows, equations.X.T @ equations.X, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(rows.T @ seen, equations.X.T @ equations.y, rtol=1e-9, atol=1e-6)
+    out = equations.blocks == 3
+    rows, seen = equations.compressed(out)
+    np.testing.assert_allclose(rows.T @ rows, equations.X[~out].T @ equations.X[~out], atol=1e-6)
 
 
 def test_whitening_keeps_quiet_where_white_noise_is_assumed_in_vain() -> None:

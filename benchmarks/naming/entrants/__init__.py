@@ -9,7 +9,7 @@ import hashlib
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import pprs_dynamics
@@ -67,8 +67,12 @@ class Entrant:
 
     def key(self) -> str:
         """Return what an answer depends on beside its problem: sources, settings, library."""
+        try:
+            library = version(self.library)
+        except PackageNotFoundError:
+            library = ''
         found = hashlib.sha256(repr((self.method.__qualname__, sorted(self.settings.items()),
-                                     self.library, version(self.library))).encode())
+                                     self.library, library)).encode())
         for file in self._sources():
             found.update(file.read_bytes())
         return found.hexdigest()[:16]
