@@ -214,13 +214,13 @@ def test_every_entrant_has_a_key_of_its_own() -> None:
 
 def test_of_two_settings_the_better_one_is_ranked_and_peers_ahead_are_told() -> None:
     right, wrong = (scored(perfect), scored(Answer.of([Named('offset', ('a',))])))
-    tuned = next(name for name in ENTRANTS if name.startswith('LASSO, '))
-    every = {'pprs diagnose': wrong, 'LASSO': wrong, tuned: right, 'stepwise BIC, AR': wrong}
+    tuned = next(name for name in ENTRANTS if name.startswith('stepwise BIC, white, '))
+    every = {'pprs diagnose': wrong, 'stepwise BIC, white': wrong, tuned: right, 'LASSO': wrong}
     assert best_of_settings(every)[0] == tuned
-    assert 'LASSO' not in best_of_settings(every)
+    assert 'stepwise BIC, white' not in best_of_settings(every)
     said = better_than_ours({name: every[name] for name in best_of_settings(every)})
     assert f'*exact* (0 (0-56) here): {tuned} (100 (44-100))' in said
-    assert 'stepwise' not in said
+    assert 'LASSO' not in said
     assert all(ENTRANTS[name].sort == CONTROL for name in ('silent', 'random'))
 
 
