@@ -55,7 +55,8 @@ def tables(scored: Mapping[str, Scored]) -> str:
     parts = {name: scored[name] for name in ordered(scored) if sort_of(name) in (OURS, PART)}
     lines = [*main_table(best), '', better_than_ours(best), '',
              '![Right against false, weak, middle and strong effects](images/naming.png)', '',
-             'This package without each of its parts:', '', *main_table(parts), '',
+             *(['This package without each of its parts:', '', *main_table(parts), '']
+               if any(sort_of(name) == PART for name in parts) else []),
              *folded('What each fails at', fails_table(best)),
              *folded('Every figure with its counts, defaults and tuned settings both',
                      full_table(scored)),
@@ -95,7 +96,7 @@ def _said(answer: Answer) -> str:
 
 
 def main_table(scored: Mapping[str, Scored]) -> list[str]:
-    """Return the rows of the figures that matter most: per cent, and Wilson's interval."""
+    """Return the rows of the figures that matter most: per cent (Wilson's 95 % interval)."""
     every = {name: all_figures(answers) for name, answers in scored.items()}
     counts = {figure: {found[figure].count for found in every.values()} for figure in MAIN}
     shown = [figure for figure in MAIN if counts[figure] != {0}]
