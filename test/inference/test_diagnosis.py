@@ -64,11 +64,11 @@ def change(design: Design, effect: str, values: dict[str, float], drive: str = '
     if issubclass(effect, StructureEffect) and MODEL.offers(effect)))
 def test_columns_of_the_structure_are_what_the_model_with_the_effect_says(
         name: str, design: Design) -> None:
-    effect = CATALOGUE[name]
+    effect = MODEL.bound(CATALOGUE[name])
     assert issubclass(effect, StructureEffect)
     term = next(t for t in design.structure if t.effect is effect)
     for k, coefficient in enumerate(effect.coefficients):
-        if name == 'revolute_stiffness' and coefficient.name == 'moment':
+        if name == 'joint_spring' and coefficient.name.endswith('moment'):
             continue  # belongs to no angle
         # The step of the derivative itself: loads, which friction follows, are not linear.
         size = coefficient.scale
@@ -278,7 +278,7 @@ def case(row: str, *effects: str, seed: int = 3, snr: float = 1.0, noise: float 
 
 
 @pytest.mark.parametrize('name', ['hysteresis', 'time_delay', 'payload_offset', 'force_ripple',
-                                  'revolute_friction'])
+                                  'joint_friction'])
 def test_a_hidden_effect_is_named(name: str) -> None:
     found, truth = case('effects', name)
     named = [one.name for one in found.effects]

@@ -20,7 +20,7 @@ from made_up_diagnosis import (
     white_noise,
 )
 
-from pprs_dynamics import AxisModel, DriveModel
+from pprs_dynamics import ArmModel, DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption import objections
 from pprs_dynamics.inference.adoption.request import EffectRequest
@@ -135,8 +135,9 @@ def fit(effect: str, drives: tuple[str, ...] | None = ('lift_2',), evidence: flo
         own_share: float = 1.0, parameters: dict[str, Estimate] | None = None,
         model: Any = PLAIN) -> Any:
     """Return what the gates look at of a fit."""
-    return SimpleNamespace(request=EffectRequest(CATALOGUE[effect], drives), drives=drives,
-                           evidence=evidence, own_share=own_share, parameters=parameters or {},
+    return SimpleNamespace(request=EffectRequest(model.bound(CATALOGUE[effect]), drives),
+                           drives=drives, evidence=evidence, own_share=own_share,
+                           parameters=parameters or {},
                            model=model, plain=model, nothing_left=())
 
 
@@ -272,7 +273,7 @@ def test_what_is_no_friction_does_not_push() -> None:
 
 
 def test_friction_in_joints_must_not_give_power_to_the_robot() -> None:
-    one = fit('revolute_friction', None, parameters={'torque': Estimate(-1.0, 0.1, 'N m')})
+    one = fit('joint_friction', None, parameters={'revolute.torque': Estimate(-1.0, 0.1, 'N m')})
     assert objections.of_physics(one, friction_residuals(0.09)) == []
     refused, = objections.of_physics(one, friction_residuals(0.2))
     assert refused.endswith('the joints would give power back in 20% of the moving time')
@@ -396,5 +397,6 @@ def test_an_adopted_effect_leaves_as_much_as_one_that_is_found() -> None:
 
 
 def test_an_axis_has_units_too() -> None:
-    assert 'N' in objections.of_held_out_error(1.0, 2.0, gains(3), AxisModel.load(), 'x')[0]
+    model = ArmModel.load('config/single_axis.yaml')
+    assert 'N' in objections.of_held_out_error(1.0, 2.0, gains(3), model, 'x')[0]
     assert DRIVES[4] == 'lift_2'

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pprs_dynamics import AxisModel, DriveModel
+from pprs_dynamics import ArmModel, DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.regression import design as design_module
 from pprs_dynamics.inference.regression.design import Design
@@ -34,7 +34,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.three_pprs.robot import AXIS
+from pprs_dynamics.physics.model.robot_block import AXIS
 
 AXIS_VALUES = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0,
                'friction.reversal_velocity': 0.001}
@@ -50,15 +50,15 @@ def axis_recording(hidden: dict[str, dict[str, float]], seed: int, noise: float 
     values = {f'effects.{name}.{AXIS}.{key}': value for name, block in hidden.items()
               for key, value in block.items()}
     model = build_model({**AXIS_VALUES, 'effects.active': list(hidden), **values})
-    assert isinstance(model, AxisModel)
+    assert isinstance(model, ArmModel)
     rng = np.random.default_rng(seed)
     time = np.arange(0, 20, 0.002)
     omega = 2 * np.pi * np.array([0.21, 0.37, 0.83])[:, None]
     phase = omega * time + rng.uniform(0, 2 * np.pi, (3, 1))
     size = np.array([0.08, 0.04, 0.015])[:, None]
     q = (size * np.sin(phase)).sum(0)[:, None]
-    from pprs_dynamics import AxisMotion
-    motion = AxisMotion(q, (size * omega * np.cos(phase)).sum(0)[:, None],
+    from pprs_dynamics import JointMotion
+    motion = JointMotion(q, (size * omega * np.cos(phase)).sum(0)[:, None],
                         -(size * omega ** 2 * np.sin(phase)).sum(0)[:, None], time=time)
     force = model.measured(model.drive_forces(motion)).total
     return Recording.from_arrays('axis', time, q, None,
@@ -201,13 +201,13 @@ def test_a_search_that_is_far_is_not_gone_on_from(monkeypatch: pytest.MonkeyPatc
 def test_what_may_be_lack_of_fit_is_told_once_it_stands_out_of_the_noise(
         viscous: float, stands_out: bool) -> None:
     # Both are less than a tenth of what the drag is.
-    recording = recording_of({'platform_drag': {'coefficient': 12.0, 'rotational': 0.0},
-                              'revolute_friction': {'viscous': viscous, 'torque': 0.0}}, 0.02)
+    recording = recording_of({'tool_drag': {'coefficient': 12.0, 'rotational': 0.0},
+                              'joint_friction': {'revolute.viscous': viscous}}, 0.02)
     ranking = select(MODEL, [recording], DECISIONS)
-    assert names(ranking.best) == ['platform_drag', 'revolute_friction']
-    assert ('revolute_friction' in names(ranking.kept)) is stands_out
+    assert names(ranking.best) == ['joint_friction', 'tool_drag']
+    assert ('joint_friction' in names(ranking.kept)) is stands_out
     assert [one.candidate.name for one in ranking.remainders] == [
-        'revolute_friction'] * (not stands_out)
+        'joint_friction'] * (not stands_out)
 
 
 def test_a_wrench_on_preloaded_guides_hides_no_effect_and_makes_none() -> None:
@@ -251,8 +251,8 @@ def test_a_freer_form_of_what_was_found_is_no_rival() -> None:
 
 
 def test_one_cause_wins_over_several_that_imitate_it() -> None:
-    found = select(MODEL, [recording_of({'rod_mass': {'mass': 0.12}})], DECISIONS).best
-    assert names(found) == ['rod_mass']
+    found = select(MODEL, [recording_of({'link_mass': {'rods.mass': 0.12}})], DECISIONS).best
+    assert names(found) == ['link_mass']
 
 
 def test_a_line_on_one_drive_is_unknown_at_its_frequency() -> None:

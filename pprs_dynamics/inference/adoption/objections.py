@@ -20,10 +20,11 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
-from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
-from pprs_dynamics.physics.effects.laws.passive_friction import PassiveFriction
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.force_model import (
+    ACTIVE_FRICTION,
+    PASSIVE_FRICTION,
+    ForceModel,
+)
 
 MOVING = 5.0  # widths in which friction turns over
 BENT = 1.5  # error of a fitted model over that of its linear fit
@@ -186,9 +187,9 @@ def _pushing_drives(model: ForceModel, residuals: Residuals) -> dict[str, float]
         part = residuals.parts.get(effect.name)
         if part is None:
             continue
-        if isinstance(effect, (ActiveFriction, AxisFriction)):
+        if effect.name == ACTIVE_FRICTION:
             own += part
-        elif isinstance(effect, PassiveFriction):
+        elif effect.name == PASSIVE_FRICTION:
             passive += part
         elif (isinstance(effect, CatalogueEffect) and effect.unphysical_below
               and effect.is_friction):

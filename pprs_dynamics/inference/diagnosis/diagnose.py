@@ -29,6 +29,8 @@ from pprs_dynamics.inference.diagnosis.statements import (
     word_statement,
     word_stick_slip,
 )
+from pprs_dynamics.inference.fit.reference import Reference
+from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measured_effort import kinds_of, looks_like
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
@@ -78,6 +80,44 @@ from pprs_dynamics.system.numbers import finite
 
 MOST_SETS, MOST_BARRED = 8, 3  # that are told with their costs, and those that may not be
 MOST_AVERAGED = 5  # sets that estimates are averaged over
+
+
+@dataclass(frozen=True)
+class SinceReference:
+    """What a reference run says of the recordings of a diagnosis.
+
+    Parameters
+    ----------
+    recordings : tuple of str
+        The reference runs.
+    covered : float
+        Share of the samples whose states they know.
+    explained : mapping of str to float
+        Share of each drive's squared error, under the model as given, that they show as well.
+    note : str
+        What must be known of them; '' for nothing.
+    """
+
+    recordings: tuple[str, ...]
+    covered: float
+    explained: Mapping[str, float]
+    note: str
+
+    @classmethod
+    def of(cls, reference: Reference, design: Design) -> SinceReference:
+        """Return it for a design beside a reference."""
+        assert design.carried is not None
+        left = design.residuals.error
+        whole = left + design.carried.mean
+        before, after = (np.nansum(one ** 2, axis=0) for one in (whole, left))
+        explained = {drive: max(0.0, 1 - float(after[d] / before[d]))
+                     for d, drive in enumerate(design.drives) if before[d] > 0}
+        return cls(reference.names, design.carried.covered, explained, reference.note)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return {'recordings': list(self.recordings), 'covered': self.covered,
+                'explained': dict(self.explained)}
 
 
 @dataclass(frozen=True)
@@ -131,6 +171,8 @@ class Diagnosis:
         Drives whose efforts are no measurement: then nothing is claimed.
     stick_slip : mapping of str to StickSlip
         Drives that stick and slip for much of the time: then nothing else is claimed.
+    since : SinceReference, optional
+        The reference run since which it is told what has changed; None: what the model lacks.
     selection : Ranking, optional
         All that was tried, for looking closer.
     decisions : Decisions
@@ -163,6 +205,7 @@ class Diagnosis:
     held_out_on: str = 'blocks'
     effort_looks_like: Mapping[str, NoMeasurement] = field(default_factory=dict)
     stick_slip: Mapping[str, StickSlip] = field(default_factory=dict)
+    since: SinceReference | None = None
     selection: Ranking | None = field(default=None, repr=False, compare=False)
     decisions: Decisions = DECISIONS
 
@@ -191,6 +234,8 @@ class Diagnosis:
             'explained': _for_json(explained_shares(self.residuals)),
             'little_explained': dict(self.little),
             'explained_after': _for_json(explained_shares(self.residuals, self.remaining)),
+            'reference': None if self.since is None else self.since.to_dict(),
+            'changed_since': None if self.since is None else [one.name for one in self.effects],
             'noise_floor': self.noise_floor,
             'noise_floors': dict(self.noise_floors), 'warnings': list(self.warnings)}
 
@@ -198,7 +243,7 @@ class Diagnosis:
 def diagnose(
     model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
     progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
-    as_it_is: bool = False,
+    as_it_is: bool = False, reference: Reference | None = None,
 ) -> Diagnosis:
     """Return which physical effect a model lacks, as far as recordings can tell.
 
@@ -214,6 +259,8 @@ def diagnose(
     decisions : Decisions, optional
     as_it_is : bool
         Whether efforts that look like no measurement are taken for one all the same.
+    reference : Reference, optional
+        Since when it is asked what has changed; without it, what the model lacks.
 
     Raises
     ------
@@ -226,6 +273,11 @@ def diagnose(
                           f'in {", ".join(one.name for one in recordings)}', 'move: a robot that '
                           'stands tells nothing of friction, masses or delays', 'shape')
     other = {} if as_it_is else looks_like(model, recordings)
+    if other and reference is not None:
+        # What the reference looks like as well is no change.
+        before = looks_like(model, reference.recordings)
+        other = {drive: one for drive, one in other.items()
+                 if drive not in before or before[drive].kind != one.kind}
     # No law of the drive's own motion describes what its controller and its elasticity do.
     sticking = {} if as_it_is or other else {
         drive: one for drive, one in sticking_drives(recordings).items()
@@ -237,8 +289,11 @@ def diagnose(
                        stick_slip=sticking, depends_on=tuple(
                            word_stick_slip(drive, one, bare.residuals)
                            for drive, one in sticking.items()))
-    answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share)),
+    answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share),
+                            None if reference is None else reference.carried_over),
                      validate, decisions)
+    since = None if reference is None else SinceReference.of(
+        reference, answer.ranking.first.design)
     unconfirmed: list[FoundEffect] = []
     if any(one.is_impossible for one in answer.effects):
         # Whatever stands for what cannot be, or beside it, would be as wrong.
@@ -246,14 +301,14 @@ def diagnose(
         answer = _Answer(answer.ranking.claiming_nothing(), validate, decisions,
                          claims=False)
         report(1.0)
-        return replace(answer.diagnosis(found), verdict='unknown')
+        return replace(answer.diagnosis(found), verdict='unknown', since=since)
     while weak := [one for one in answer.effects if one.objection or not one.is_confirmed]:
         unconfirmed.append(min(weak, key=lambda one: one.evidence))
         gone = answer.ranking.order[answer.effects.index(unconfirmed[-1])]
         answer = _Answer(answer.ranking.less(gone), validate, decisions)
     diagnosis = answer.diagnosis(tuple(unconfirmed))
     report(1.0)
-    return diagnosis
+    return replace(diagnosis, since=since)
 
 
 def _all_objected(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
@@ -275,7 +330,8 @@ class _Answer:
         self.drives = self.design.drives
         self.final = settled(self.fits, self.kept)
         self.remaining = ranking.first.design.residuals.measured - exact_forces(
-            self.design, self.final.model)
+            self.design, self.final.model) - self.design.carried_forces(
+                self.final.found.fit.coefficients)
         # Before a constant form is believed.
         self.dated_fits, self.dated = with_courses(
             self.fits, self.kept, ranking.alone.values()) if claims else (self.fits, self.kept)

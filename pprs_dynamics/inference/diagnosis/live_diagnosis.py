@@ -29,6 +29,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     with_uncertainty,
     word_little,
 )
+from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import (
@@ -161,6 +162,8 @@ class LiveDiagnosis:
     recent : tuple of (Recording, float)
         The latest windows and when they begin [s], in which the beginning of a change is looked
         for.
+    reference : Reference, optional
+        Since which every window is diagnosed.
     """
 
     model: ForceModel
@@ -169,6 +172,7 @@ class LiveDiagnosis:
     withdrawn: tuple[LiveEffect, ...] = ()
     note: str = ''
     recent: tuple[tuple[Recording, float], ...] = ()
+    reference: Reference | None = None
 
     @property
     def claimed(self) -> tuple[LiveEffect, ...]:
@@ -208,7 +212,7 @@ class LiveDiagnosis:
         live = LIVE_DECISIONS
         if share_in_motion(recording.time, recording.position, live.moving) < live.least_motion:
             return replace(self, withdrawn=(), note='the robot stands: nothing is fitted')
-        answer = diagnose(self.model, [recording])
+        answer = diagnose(self.model, [recording], reference=self.reference)
         noise = answer.noise
         window = Window(recording, start, start + float(recording.time[-1] - recording.time[0]),
                         answer.to_dict(), answer.adopted,

@@ -106,7 +106,7 @@ class FittedSets:
             self.blocks(candidates), start))
         fit = self.regression.fit(self.blocks(candidates, nuisance), start)
         bodies = {one: self.library.block(one) for c in candidates for one in c.components
-                  if issubclass(one.effect, AddedBody)}
+                  if issubclass(one.effect, AddedBody) and one.effect.has_extent}
         possible = with_possible_bodies(self.design.given, self.regression, fit, bodies)
         found = self._set(candidates, fit, nuisance)
         if possible is None:

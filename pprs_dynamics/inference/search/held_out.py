@@ -15,7 +15,6 @@ from itertools import chain
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.regression.base_columns import ReversalShape
 from pprs_dynamics.inference.regression.joint_fit import Integers
 from pprs_dynamics.inference.regression.normal_equations import Prior
 from pprs_dynamics.inference.search.candidates import CandidateSet
@@ -65,8 +64,7 @@ def hold_out(fits: FittedSets, found: CandidateSet) -> HeldOut:
     others = [prior.posterior(H.sum(axis=0) - H[k], b.sum(axis=0) - b[k]) for k in range(BLOCKS)]
     coefficients = np.stack([one.coefficients for one in others])
     plain = coefficients.copy()
-    plain[:, [k for k, column in enumerate(fits.design.base)
-              if isinstance(column, ReversalShape)]] = 0.0
+    plain[:, [k for k, column in enumerate(fits.design.base) if not column.in_model]] = 0.0
     plain[:, fit.index_of(chain(*found.nuisance.values()))] = 0.0
     losses, squares, count = np.zeros(BLOCKS), 0.0, 0
     for d, (index, stacked, rows) in white.items():

@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
-from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.design import CarriedOver, Design
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
@@ -314,8 +314,11 @@ class Ranking:
 
 
 def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
-           progress: Callable[[float], None] | None = None) -> Ranking:
+           progress: Callable[[float], None] | None = None,
+           carry_over: Callable[[Design], CarriedOver] | None = None) -> Ranking:
     """Return all sets of effects that were tried, around the fitted model where that matters.
+
+    `carry_over` says what a reference run knows of the recordings.
 
     Raises
     ------
@@ -324,6 +327,8 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     """
     report = progress or (lambda share: None)
     design = Design.of(model, recordings, lambda share: report(0.25 * share))
+    if carry_over is not None:
+        design = design.beside(carry_over(design))
     return _searched(FittedSets(design, decisions), frozenset(), report)
 
 

@@ -193,7 +193,7 @@ AXIS_KEYS: dict[str, Key] = {key.name: key for key in (
 EFFORT_UNITS = ('N m', 'N', 'A')
 # Blocks of mechanisms: a serial arm, and a robot that may have loops. What the first names joints
 # the second names drives.
-ARM, ROBOT = 'arm', 'robot'
+ARM, ROBOT, AXIS = 'arm', 'robot', 'axis'
 GAIN = '.gain'
 FILES = ('arm.urdf', 'robot.urdf', 'robot.mjcf')  # keys that hold paths
 LOOPS = ('spherical', 'revolute', 'universal', 'cylindrical', 'prismatic', 'fixed')
@@ -315,7 +315,7 @@ def named_keys(parameters: Iterable[str]) -> dict[str, Key]:
 
 # Blocks whose keys are not listed one by one.
 ADDED = ('effects.', 'uncertainties.', 'tolerances.', 'history.', 'joint_map.', 'joint_prefix',
-         'columns.', 'effort_kind')
+         'columns.', 'effort_kind', 'reference')
 
 
 def is_axis(names: Iterable[str]) -> bool:

@@ -22,6 +22,7 @@ from pprs_dynamics.physics.model.keys import (
     keys_of,
     mechanism_block,
 )
+from pprs_dynamics.physics.model.reference_keys import check_reference
 from pprs_dynamics.physics.model.uncertainties import check_uncertainties
 
 
@@ -49,6 +50,7 @@ def checked_values(parameters: Mapping[str, Any]) -> dict[str, Any]:
             values[name] = key.default
     check_tolerances(parameters, keys)
     check_uncertainties(parameters)
+    check_reference(parameters)
     return {**values, **{name: value for name, value in parameters.items()
                          if name.startswith(ADDED)}}
 
