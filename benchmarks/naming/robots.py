@@ -17,9 +17,9 @@ ON_DRIVES = ('viscous_friction', 'coulomb_friction', 'asymmetric_friction', 'str
              'quadratic_friction', 'load_friction', 'hysteresis', 'friction_drift',
              'effort_offset', 'drive_spring', 'force_ripple', 'drive_inertia', 'effort_gain',
              'time_delay')
-OF_PLATFORM = ('homing_error', 'effort_filter', 'revolute_friction', 'spherical_friction',
-               'revolute_stiffness', 'payload_mass', 'payload_offset', 'platform_inertia',
-               'external_wrench', 'base_tilt', 'platform_drag', 'rod_mass')
+OF_PLATFORM = ('homing_error', 'effort_filter', 'joint_friction', 'joint_spring', 'payload_mass',
+               'payload_offset', 'platform_inertia', 'external_wrench', 'base_tilt', 'tool_drag',
+               'link_mass')
 OF_ARM = ('gear_efficiency', 'homing_error', 'effort_filter', 'payload_mass', 'link_mass',
           'base_tilt', 'external_wrench')
 
