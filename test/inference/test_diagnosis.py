@@ -243,10 +243,10 @@ def test_the_page_is_told_the_runner_up_and_evidence_is_the_difference_of_costs(
                if 'payload_mass' not in {c.name for c in one.effects}]
     rival = min(without, key=lambda one: one.cost)
     assert rival.effects
-    assert found.effects[0].evidence == pytest.approx(rival.cost - found.selection.best.cost)
-    assert found.effects[0].evidence < found.selection.nothing.cost - found.selection.best.cost
+    assert found.effects[0].evidence == pytest.approx(rival.cost - found.selection.map_set.cost)
+    assert found.effects[0].evidence < found.selection.nothing.cost - found.selection.map_set.cost
     for told, one in zip(found.sets, found.selection.sets, strict=False):
-        assert told.cost == pytest.approx(one.cost - found.selection.best.cost)
+        assert told.cost == pytest.approx(one.cost - found.selection.map_set.cost)
         assert sum(told.terms.to_dict().values()) == pytest.approx(told.cost)
     assert found.effects[0].without is not None
     assert {name for name, _ in found.effects[0].without.names} == {c.name for c in rival.effects}

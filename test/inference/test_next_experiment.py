@@ -374,7 +374,7 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
 
     adopted = fitted('coulomb_friction', 'force')
     ranking = Ranking.of(fits, Search(fits), adopted)
-    assert ranking.kept is adopted
+    assert ranking.reported is adopted
     assert question_after(ranking, []).kind == 'estimate'
     free = fitted('asymmetric_friction', 'force_forward', 'force_backward')
     other = fitted('load_friction', 'coefficient')

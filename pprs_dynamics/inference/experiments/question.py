@@ -146,7 +146,7 @@ def question_after(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
     rivals : sequence of Rival
         The best first.
     """
-    adopted = ranking.kept
+    adopted = ranking.reported
     if rivals:
         return _separation(ranking, rivals)
     search = ranking.last
@@ -158,7 +158,7 @@ def question_after(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
 def _separation(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
     """Return how to tell sets apart, each pair of effects in the sets of lowest cost."""
     pairs: set[tuple[str, str]] = set()
-    sets = [ranking.kept]
+    sets = [ranking.reported]
     for rival in rivals:
         new = set(product(rival.missing, rival.instead))
         if not new <= pairs:
