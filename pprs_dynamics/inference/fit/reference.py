@@ -69,13 +69,15 @@ SLOW = 0.3  # of the rms speed of a drive: within it direction turns over
 # Tried: in standard deviations of the positions, and in turns of the directions.
 LENGTHS = tuple((position, speed) for position in (0.5, 1.5) for speed in (0.7, 2.0))
 OWN_LENGTHS = (0.3, 1.0)  # of what is of one drive's own state
+FIRST_SIZE = 0.4  # of a process, over the error: from which its size is fitted
+LEAST_SIZE = 1e-9  # [N, N m], of a process that does nothing
 ROUNDS = 3  # of the size of the process
 LEAST_INFORMATION = 0.1  # of a direction of the base, in units of its prior's
 LEAST_LENGTH = 200  # samples after treatment: a few seconds
 LEAST_REPEATS = 0.1  # of the process in two runs, below which nothing of it is carried over
 BLOCKS = 4  # of a single reference, each predicted from the others
 MOST_KEPT = 400  # means of a reference that a model file keeps
-MOST_DIRECTIONS = 48  # that become columns
+MOST_DIRECTIONS = 24  # that become columns
 
 
 class ReferenceRunError(PprsError, ValueError):
@@ -467,9 +469,10 @@ def _base(model: ForceModel, numbers: Array | None, residuals: Residuals, kept: 
         axes = np.linalg.qr(np.linalg.solve(prior, told_before), mode='complete')[0]
         prior = np.concatenate((told_before, prior @ axes[:, told_before.shape[1]:]), axis=1)
     columns = numbers @ prior
-    noise = np.nanmean(residuals.error ** 2, axis=0)
-    values, axes = np.linalg.eigh(np.einsum('mdp,mdq,d->pq', columns, columns, 1 / noise,
-                                            optimize=True))
+    known = np.isfinite(residuals.error).any(axis=0)
+    noise = np.nanmean(residuals.error[:, known] ** 2, axis=0)
+    values, axes = np.linalg.eigh(np.einsum(
+        'mdp,mdq,d->pq', columns[:, known], columns[:, known], 1 / noise, optimize=True))
     axes, told = axes[:, ::-1], int(np.sum(values > LEAST_INFORMATION))
     return columns @ axes[:, :told], prior @ axes, told
 
@@ -504,9 +507,13 @@ class _Fit:
 def _fitted(residuals: Residuals, columns: Array, own: Sequence[tuple[Process, Array]],
             states: States) -> _Fit:
     shared, count = Process.of(residuals, states), columns.shape[2]
-    size = np.sqrt(np.nanmean(residuals.error ** 2, axis=0))[:, None] * np.array([0.4, 0.4])
+    squares = np.nansum(residuals.error ** 2, axis=0) / np.maximum(
+        np.isfinite(residuals.error).sum(axis=0), 1)
+    size = np.repeat(FIRST_SIZE * np.sqrt(squares)[:, None], 2, axis=1)
     amplitudes, deviance = [], 0.0
-    for d in range(len(size)):
+    measured = Regression(residuals).drives
+    size[[d for d in range(len(size)) if d not in measured]] = LEAST_SIZE
+    for d in measured:
         features = (shared[1], own[d][1])
         edges = count + np.cumsum([0, *(one.shape[1] for one in features)])
         regression = Regression(residuals, (*_base_columns(columns, [d]),
@@ -517,7 +524,7 @@ def _fitted(residuals: Residuals, columns: Array, own: Sequence[tuple[Process, A
             start = fit.amplitudes
             # Expectation of the squares given the errors: evidence rises.
             squares = fit.coefficients ** 2 + np.diag(fit.covariance)
-            size[d] = [max(np.sqrt(np.mean(squares[a:b])), 1e-9) if b > a else 1e-9
+            size[d] = [max(np.sqrt(np.mean(squares[a:b])), LEAST_SIZE) if b > a else LEAST_SIZE
                        for a, b in pairwise(edges)]
             precision = _sizes(size[d], features) ** -2.0
             regression.columns = (*regression.columns[:count], *(
