@@ -545,7 +545,8 @@ def _parts(residuals: Residuals) -> Integers:
 def _repeats(regression: Regression, fit: JointFit, told: int, parts: Integers) -> Array:
     """Return the correlation of the process in two runs of each drive, (D,).
 
-    Each part is predicted from the others: by how much of what they predict its errors are.
+    Each part is predicted from the others. What its errors are from that, beyond noise and what
+    the others leave unknown, is by expectation 2 (1 - correlation) of the process's square.
     """
     size, count = len(fit.coefficients), int(parts.max()) + 1
     H, b = np.zeros((count, size, size)), np.zeros((count, size))
@@ -560,19 +561,22 @@ def _repeats(regression: Regression, fit: JointFit, told: int, parts: Integers) 
             part = rows[:, parts[series.index] == k]
             H[k][np.ix_(index, index)] += part[:-1] @ part[:-1].T
             b[k, index] += part[:-1] @ part[-1]
-    prior = np.diag([column.precision for column in regression.columns])
-    found = np.full(len(regression.residuals.drives), DECISIONS.run_repeats)
-    others = [np.linalg.solve(H.sum(axis=0) - H[k] + prior, b.sum(axis=0) - b[k])
-              for k in range(count)]
-    for d, (index, rows) in white.items():
-        at = parts[regression.series[d].index]
-        known = DECISIONS.run_repeats_spread ** -2
-        pull = known * DECISIONS.run_repeats
-        for k, c in enumerate(others):
-            part = rows[:, at == k]
-            process = c[index[told:]] @ part[told:-1]
-            left = part[-1] - c[index[:told]] @ part[:told]
-            known += float(process @ process)
-            pull += float(process @ left)
-        found[d] = np.clip(pull / known, 0.0, 1.0)
-    return found
+    precision = np.array([column.precision for column in regression.columns])
+    known = np.zeros((len(regression.residuals.drives), 2))  # squares of the process, and beyond
+    for k in range(count):
+        covariance = np.linalg.inv(H.sum(axis=0) - H[k] + np.diag(precision))
+        coefficients = covariance @ (b.sum(axis=0) - b[k])
+        for d, (index, rows) in white.items():
+            part = rows[:, parts[regression.series[d].index] == k]
+            left = part[-1] - coefficients[index] @ part[:-1]
+            expected = part.shape[1] + np.sum(
+                (covariance[np.ix_(index, index)] @ part[:-1]) * part[:-1])
+            process = part[told:-1]
+            known[d] += (np.sum(process ** 2 / precision[index[told:], None]),
+                         left @ left - expected)
+    weight = (DECISIONS.run_repeats_spread * 2) ** -2
+    apart = (known[:, 1] + weight * 2 * (1 - DECISIONS.run_repeats)) / (known[:, 0] + weight)
+    found = np.clip(1 - apart / 2, 0.0, 1.0)
+    # Parts of a single run say nothing of another day.
+    return found if regression.residuals.record[-1] else np.minimum(
+        found, DECISIONS.one_run_repeats)
