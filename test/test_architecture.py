@@ -163,6 +163,22 @@ def test_no_page_is_left_with_a_gap_where_a_figure_belongs() -> None:
     assert not {name: found for name, found in gaps.items() if found}
 
 
+DESCRIPTION = ElementTree.parse(PACKAGE.parent / 'package.xml').getroot()
+
+
 def test_the_version_is_that_of_the_package_description() -> None:
-    described = ElementTree.parse(PACKAGE.parent / 'package.xml').getroot()
-    assert described.findtext('version') == pprs_dynamics.__version__
+    assert DESCRIPTION.findtext('version') == pprs_dynamics.__version__
+
+
+def test_the_package_description_names_the_licence_of_all_that_is_handed_on() -> None:
+    named = {PACKAGE.parent / each.get('file', '') for each in DESCRIPTION.findall('license')}
+    assert named == {PACKAGE.parent / 'LICENSE', *PACKAGE.rglob('*.LICENSE')}
+
+
+def test_the_package_description_names_what_the_nodes_import() -> None:
+    used = {name.split('.')[0] for file in (PACKAGE / 'ros').rglob('*.py')
+            for name in imports(file)}
+    others = used - set(sys.stdlib_module_names) - {'pprs_dynamics'}
+    assert {'rclpy', 'sensor_msgs', 'numpy'} <= others
+    named = {each.text for each in DESCRIPTION.findall('exec_depend')}
+    assert {name for name in others if not {name, f'python3-{name}'} & named} == set()

@@ -29,7 +29,11 @@ from benchmarks.scores.diagnosis_table import SAME_FORM
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.measurement.files.recording import (
+    Recording,
+    read_recording,
+    write_recording,
+)
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model
@@ -111,15 +115,27 @@ def _shuffled(rng: np.random.Generator, values: Sequence[str]) -> Iterator[str]:
 
 
 def make(draw: Draw, folder: Path) -> Truth:
-    """Write a problem into a folder of its name, and return what is true."""
+    """Write a problem with its columns into a folder of its name, and return what is true."""
+    target = folder / draw.name
+    truth = write_problem(draw, target)
+    model = load_model(target / 'model.yaml')
+    problem_of(model, read_recording(target / 'recording.csv', model.drives)).write(target)
+    return truth
+
+
+def write_problem(draw: Draw, folder: Path, seconds: float = DURATION) -> Truth:
+    """Write recording and model into a folder, and return what is true."""
     model, recording, truth = (_of_platform if draw.robot == '3-PPRS' else _of_arm)(draw)
     if draw.noise == 'gaps':
         recording = _with_gaps(draw, recording)
-    target = folder / draw.name
-    target.mkdir(parents=True, exist_ok=True)
-    write_recording(target / 'recording.csv', recording)
-    _write_model(draw.robot, model, target)
-    problem_of(model, recording).write(target)
+    if seconds < DURATION:
+        part = recording.time < recording.time[0] + seconds
+        recording = Recording.from_arrays(
+            recording.name, recording.time[part], recording.position[part], None,
+            recording.effort[part], recording.drives)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_recording(folder / 'recording.csv', recording)
+    _write_model(draw.robot, model, folder)
     return truth
 
 

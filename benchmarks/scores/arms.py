@@ -37,7 +37,8 @@ from benchmarks.scores.cases import (
 from pprs_dynamics import ArmModel
 from pprs_dynamics.app.commands.pprs import main as pprs
 from pprs_dynamics.physics.effects.laws.coupled_drives import CoupledDrives
-from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect, friction_rows
+from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
+from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.simulation.arm_forms import NAMES
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
-from pprs_dynamics.simulation.temperatures import thinner
+from pprs_dynamics.simulation.temperatures import REFERENCE, thinner
 
 STEEPNESS = 0.005  # of a joint's top speed, within which hidden dry friction turns over
 
@@ -163,7 +163,7 @@ FORMS: dict[str, JointForm] = {
         'c (eta(T) / eta(T_0) - 1) v_1 asinh(v / v_1), ln eta = 900 K / (T + 95 K) (Vogel), T of '
         'the grease, of which the thermometer is late',
         lambda rng, m: {'coefficient': 3 * SIZE(rng) * m.effort / m.speed,
-                        'reference': float(rng.choice(m.temperature)),
+                        'reference': float(rng.uniform(*REFERENCE)),
                         'thinning_velocity': 2 * m.speed},
         lambda p, m: p['coefficient'] * thinner(m.temperature, p['reference'])
         * p['thinning_velocity'] * np.arcsinh(m.velocity / p['thinning_velocity'])),
@@ -193,7 +193,8 @@ FORMS: dict[str, JointForm] = {
 }
 # Of the arm as a whole: the payload's size as a share of the arm's mass, and so on.
 OF_ARM = ('payload_mass', 'link_mass', 'base_tilt', 'external_wrench', 'effort_gain', 'time_delay',
-          'effort_filter', 'homing_error', 'joint_friction', 'coupled_drives')
+          'effort_filter', 'homing_error', 'joint_friction', 'coupled_drives',
+          'current_gain')
 NAMES = (*FORMS, *OF_ARM)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
-from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction, friction_rows
+from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
 from pprs_dynamics.physics.mechanism.closures import ROWS
 from pprs_dynamics.physics.mechanism.description import (
     Frame,
@@ -27,12 +27,13 @@ from pprs_dynamics.physics.mechanism.description import (
     principal_inertia,
 )
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Motion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.urdf import expanded
 from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
 from pprs_dynamics.simulation.arm_forms import (
     FORMS,
     SIZE,
@@ -47,7 +48,7 @@ from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState, couplings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 from pprs_dynamics.simulation.sensors import ButterworthFilter, EffortFilter
-from pprs_dynamics.simulation.temperatures import Climate, read_thermometers
+from pprs_dynamics.simulation.temperatures import REFERENCE, Climate, read_thermometers
 
 RATE = 100.0  # [Hz]
 CLIMATE = 45  # second seed of temperatures
@@ -382,6 +383,8 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         gain = scale * float(random.uniform(0.04, 0.1))
         efforts[:, joint] *= 1 + gain
         hidden.append(truth('effort_gain', [model.drives[joint]], {'gain': gain}, '1 + gain'))
+    if 'current_gain' in chosen:
+        hidden.append(_hide_current_gain(model, motion, temperature, efforts, random, scale))
     if 'time_delay' in chosen:
         assert motion.time is not None
         delay = scale * float(random.uniform(0.008, 0.03))
@@ -408,7 +411,7 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
     return ArmRun(motion, position, efforts + _noise(random, efforts.shape) * sigma,
                   tuple(hidden), {
                       'temperature': read_thermometers(motion.time, temperature)}
-                  if thermometers or 'friction_temperature' in chosen else {})
+                  if thermometers or {*chosen} & {'friction_temperature', 'current_gain'} else {})
 
 
 def _hidden_joint(model: ArmModel, motion: JointMotion, plain: Array, random: np.random.Generator,
@@ -453,14 +456,36 @@ def _hide_motor_friction(model: ArmModel, motion: JointMotion, largest: Array, e
         "A' (F v / sqrt(v^2 + w^2) + c v_1 asinh(v / v_1)), v the speed of the motor")
 
 
+def _hide_current_gain(model: ArmModel, motion: JointMotion, temperature: Array, efforts: Array,
+                       random: np.random.Generator, scale: float) -> dict[str, Any]:
+    """Let a motor's torque per current go with its temperature or its angle, and return how."""
+    j = int(random.integers(len(model.drives)))
+    ratio = model.gear_ratios[j]
+    if ratio > 1 and random.random() < 0.5:
+        height, waves = scale * float(random.uniform(0.03, 0.08)), int(random.integers(1, 7))
+        phase = float(random.uniform(-np.pi, np.pi))
+        turn = waves * ratio * motion.position[:, j] + phase
+        constant = 1 + height * (np.sin(turn) + 0.2 * np.sin(3 * turn))
+        parameters = {'ripple': height, 'phase': phase, 'pitch': 2 * np.pi / (waves * ratio)}
+        form = 'F / (1 + a (sin(x) + sin(3 x) / 5)), x = 2 pi q / p + phi'
+    else:
+        weaker = scale * float(random.uniform(0.0015, 0.003))
+        reference = float(random.uniform(*REFERENCE))
+        warmer = temperature[:, j] - reference
+        constant = 1 - weaker * warmer * (1 + warmer / 300)
+        parameters = {'temperature': weaker, 'reference': reference}
+        form = 'F / (1 - kappa (T - T_0) (1 + (T - T_0) / 300 K))'
+    efforts[:, j] /= constant
+    return truth('current_gain', [model.drives[j]], {model.drives[j]: parameters}, form)
+
+
 def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Array:
     """Return friction, offset and armature as the model file has them, under the true loads."""
-    values, v = model.values, motion.velocity
+    v = motion.velocity
     friction: Array = (
-        model.robot.armature * motion.acceleration
-        + np.array(values['friction.viscous']) * v
-        + np.array(values['friction.coulomb']) * np.tanh(v / np.asarray(model.reversal.velocity))
-        + np.array(values['friction.offset']))
+        model.robot.armature * motion.acceleration + np.asarray(model.friction.viscous) * v
+        + np.asarray(model.friction.coulomb) * np.tanh(v / np.asarray(model.reversal.velocity))
+        + np.asarray(model.offset.value))
     for effect in model.effects:
         if isinstance(effect, LinkageFriction):
             state = model.mechanism(motion).loaded(

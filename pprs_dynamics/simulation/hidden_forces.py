@@ -21,7 +21,12 @@ from pprs_dynamics.simulation.hidden_effect import (
     SteepDriveForce,
     StructureForce,
 )
-from pprs_dynamics.simulation.temperatures import Climate, read_thermometers, thinner
+from pprs_dynamics.simulation.temperatures import (
+    REFERENCE,
+    Climate,
+    read_thermometers,
+    thinner,
+)
 
 PHASE = Range('rad', -np.pi, np.pi)
 PULLEY = 3.0  # [m], from the middle of the workspace
@@ -154,7 +159,7 @@ class FrictionTemperature(DriveForce):
     ranges: ClassVar[dict[str, Range]] = {
         'coefficient': Range('N s/m', 10.0, 30.0, 'log', scales=True),
         'thinning_velocity': Range('m/s', 0.2, 0.6, 'log', neutral=1.0),
-        'reference': Range('degC', 15.0, 45.0), 'climate': Range('1', 0, 2 ** 31, 'whole')}
+        'reference': Range('degC', *REFERENCE), 'climate': Range('1', 0, 2 ** 31, 'whole')}
 
     def prepare(self, coulomb: Array, width: Array) -> None:
         """Start at the temperature of the hall, which is that of all drives."""
@@ -264,7 +269,10 @@ class DriveCoupling(DriveForce):
         return self.values['coefficient'] * moment.velocity[..., sources]
 
 
-class _PassiveJointFriction(HiddenJointFriction):
+class JointFriction(HiddenJointFriction):
+    """Dirt or preload in the revolute joints C_i, or in the spherical joints A_i."""
+
+    name: ClassVar[str] = 'joint_friction'
     form: ClassVar[str] = 'c s_1 asinh(s / s_1) + M s / sqrt(s^2 + w^2)'
     ranges: ClassVar[dict[str, Range]] = {
         'viscous': Range('N m s/rad', 0.04, 0.15, 'log', scales=True),
@@ -280,25 +288,11 @@ class _PassiveJointFriction(HiddenJointFriction):
                 + p['dry'] / np.sqrt(speed * speed + p['width'] ** 2))
 
 
-class RevoluteFriction(_PassiveJointFriction):
-    """Dirt or preload in the revolute joints C_i."""
-
-    name: ClassVar[str] = 'revolute_friction'
-    joint: ClassVar[str] = 'revolute'
-
-
-class SphericalFriction(_PassiveJointFriction):
-    """Dirt or preload in the spherical joints A_i."""
-
-    name: ClassVar[str] = 'spherical_friction'
-    joint: ClassVar[str] = 'spherical'
-
-
 @StructureForce.by_law('k x (1 + (x / x_h)^2), x = u_i - u_0',
                        stiffness=Range('N m/rad', 0.4, 1.5, 'log', scales=True),
                        rest=Range('rad', 1.2, 1.6), hardening=Range('rad', 0.8, 1.5))
-def revolute_stiffness(m: PlatformMoment, stiffness: float, rest: float, hardening: float,
-                       ) -> tuple[Array, Array, Array]:
+def joint_spring(m: PlatformMoment, stiffness: float, rest: float, hardening: float,
+                 ) -> tuple[Array, Array, Array]:
     """Cable looms across the revolute joints C_i, stiffening as they bend."""
     x = m.rod_angle - rest
     return -stiffness * x * (1 + (x / hardening) ** 2), np.zeros(3), np.zeros(3)
@@ -327,8 +321,8 @@ def external_wrench(m: PlatformMoment, force: float, azimuth: float, elevation: 
 @StructureForce.by_law('-c v sqrt(1 + (|v| / v_1)^2)',
                        coefficient=Range('N s/m', 5.0, 15.0, 'log', scales=True),
                        turbulent_velocity=Range('m/s', 0.2, 0.6, 'log'))
-def platform_drag(m: PlatformMoment, coefficient: float, turbulent_velocity: float,
-                  ) -> tuple[Array, Array, Array]:
+def tool_drag(m: PlatformMoment, coefficient: float, turbulent_velocity: float,
+              ) -> tuple[Array, Array, Array]:
     """A liquid or a curtain that the platform moves through."""
     grown = np.sqrt(1 + (m.velocity @ m.velocity) / turbulent_velocity ** 2)
     return np.zeros(3), -coefficient * grown * m.velocity, np.zeros(3)

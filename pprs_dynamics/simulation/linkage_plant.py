@@ -97,12 +97,12 @@ class LinkagePlant:
         motion = draw_motion(model, NOMINAL, seed)
         efforts = self.engine.torques(motion)
         self.largest = np.abs(efforts).max(axis=0)
-        values, reversal = model.values, model.reversal
+        reversal = model.reversal
         self._viscous, self._coulomb, self._offset = (
-            np.asarray(values[f'friction.{key}'], dtype=float)
-            for key in ('viscous', 'coulomb', 'offset'))
+            np.broadcast_to(np.asarray(one, dtype=float), len(s.drives))
+            for one in (model.friction.viscous, model.friction.coulomb, model.offset.value))
         self._width = reversal.widths(len(s.drives))
-        self._passive = [effect.table(reversal) for effect in model.effects
+        self._passive = [effect.table(model.robot, reversal) for effect in model.effects
                          if isinstance(effect, LinkageFriction)]
         self._pushes: list[tuple[int, str, dict[str, float], JointMoment]] = []
         self.hidden = [self._hide(name, motion, efforts, random, scale)

@@ -18,6 +18,7 @@ from pprs_dynamics.arrays import Array
 HALL = (18.0, 30.0)  # [degC]
 WAVE, PERIOD = (5.0, 10.0), (20.0, 45.0)  # of the hall [K, s]
 RISE, COOLING = (10.0, 30.0), (6.0, 20.0)  # by steady work at the usual speed [K], and back [s]
+REFERENCE = (20.0, 45.0)  # at which numbers of a model were measured [degC]
 STEP, RATE = 0.1, 10.0  # of a thermometer [K, Hz]
 VOGEL_B, VOGEL_C = 900.0, 95.0  # of mineral oils [K]
 LAG = 0.2  # by which it is late [s]

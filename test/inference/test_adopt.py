@@ -122,7 +122,8 @@ def test_the_ledger_says_what_from_which_data_and_how_sure(files: Files) -> None
 
 def test_adopting_twice_changes_nothing(files: Files) -> None:
     output = files.folder / 'again.yaml'
-    done = pprs('adopt', HIDDEN, files.first, '--model', files.new, '--output', output)
+    done = pprs('adopt', HIDDEN, files.first, '--model', files.new, '--output', output,
+                columns=200)
     assert done.returncode == 1
     assert 'in the model already' in done.stdout
     assert not output.exists()

@@ -19,7 +19,7 @@ from pprs_command import pprs
 from short_recordings import short_recordings
 
 from benchmarks.hidden import recordings
-from pprs_dynamics import DriveModel
+from pprs_dynamics import ArmModel, DriveModel, JointMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.residuals.conventions import find_mistakes
@@ -27,15 +27,13 @@ from pprs_dynamics.inference.residuals.mistakes import OtherReading, columns_lin
 from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
 from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
-from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.model.axis_model import AxisModel, AxisMotion
 from pprs_dynamics.physics.model.model_file import build_model, load_model
 from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / 'docs'
 MODEL = DriveModel.load()
-AXIS = AxisModel.load()
+AXIS = ArmModel.load('config/single_axis.yaml')
 RATE, DURATION = 250.0, 10.0
 NOISE = 0.05  # [N]
 Arrays = tuple[Array, Array, Array, Array]
@@ -59,7 +57,7 @@ def axis() -> Arrays:
     rate = 2 * np.pi * 0.4
     position, velocity = 0.1 * np.sin(rate * time), 0.1 * rate * np.cos(rate * time)
     acceleration = -0.1 * rate ** 2 * np.sin(rate * time)
-    effort = AXIS.drive_forces(AxisMotion(position, velocity, acceleration, time[:, 0])).total
+    effort = AXIS.drive_forces(JointMotion(position, velocity, acceleration, time[:, 0])).total
     return time[:, 0], position, velocity, effort + rng.normal(0, 1.0, effort.shape)
 
 

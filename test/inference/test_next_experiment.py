@@ -342,6 +342,11 @@ def test_a_design_that_cannot_separate_says_so(model: DriveModel) -> None:
     told = experiment_of(question, found)
     assert told.separates == ()
     assert told.to_dict()['does_not_separate'] == [['coulomb_friction', 'load_friction']]
+    # Friction by load grows with a mass, a tenth of the platform's with its load: no motion needed.
+    moved = model.values['masses.platform'] + model.values['masses.payload']
+    assert told.load == pytest.approx(0.1 * moved, rel=0.35)
+    assert f'the same motion once more with {told.load:g} kg more' in told.text
+    assert told.to_dict()['told_by_load'] == [['coulomb_friction', 'load_friction']]
     assert 'hardly tell coulomb_friction from load_friction' in told.text
     # Thirty thousand times the effect is told from its rival.
     strong = [replace(one, truth=3e4 * one.truth) for one in both]
@@ -369,7 +374,7 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
 
     adopted = fitted('coulomb_friction', 'force')
     ranking = Ranking.of(fits, Search(fits), adopted)
-    assert ranking.kept is adopted
+    assert ranking.reported is adopted
     assert question_after(ranking, []).kind == 'estimate'
     free = fitted('asymmetric_friction', 'force_forward', 'force_backward')
     other = fitted('load_friction', 'coefficient')

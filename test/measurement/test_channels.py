@@ -14,7 +14,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from pprs_dynamics.drives import RecordedDrives
-from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.errors import MotionError, UnreadableFileError
 from pprs_dynamics.measurement.files.contents import Series
 from pprs_dynamics.measurement.files.guessed_columns import guess_columns
 from pprs_dynamics.measurement.files.recording import (
@@ -88,6 +88,12 @@ def test_dropped_samples_take_their_temperature_with_them():
     recording = Recording.from_arrays('x', TIME, broken, None, EFFORT, JOINTS,
                                       {'temperature': np.column_stack([WARM, WARM])})
     np.testing.assert_array_equal(recording.channels['temperature'][:, 0], np.delete(WARM, 3))
+
+
+def test_channels_of_other_shapes_are_told():
+    with pytest.raises(MotionError, match=r'temperature: its shape is \(200,\)'):
+        Recording.from_arrays('x', TIME, POSITION, None, EFFORT, JOINTS,
+                              {'temperature': WARM.tolist()})
 
 
 def bag(path: Path, topic: str, kind: str, messages: list[tuple[float, dict[str, Any]]]) -> Path:

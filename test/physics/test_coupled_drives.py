@@ -105,7 +105,19 @@ def test_means_of_a_cylinders_columns_are_columns_of_means():
     samples = DriveSamples(None, q, q, q, q, q, q)
     shapes = [{'ratio': 0.4, 'position': 0.2}, {'ratio': 0.8, 'position': -2.0}]
     for shape, columns in zip(shapes, Counterbalance.averaged(samples, 0.01, shapes), strict=True):
-        assert_allclose(columns, Counterbalance.columns(samples, **shape))
+        assert_allclose(columns, Counterbalance.columns(samples, **shape)[:2])
+
+
+def test_a_cylinder_pulls_with_the_pressure_that_was_measured(arm):
+    at = motion(duration=4.0)
+    pressure = 5e6 + 1e6 * np.sin(at.time)
+    measured = at.with_channels({'pressure': np.tile(pressure, (3, 1)).T})
+    shape = {'swing__ratio': 0.2, 'swing__position': 0.5, 'swing__force': 0.0}
+    force = added(arm, 'counterbalance', measured, swing__area=3e-5, **shape)
+    # The same as a constant pull of that size at every moment.
+    unit = added(arm, 'counterbalance', at, **{**shape, 'swing__force': 1.0})
+    assert_allclose(force[:, 1], 3e-5 * pressure * unit[:, 1])
+    assert not added(arm, 'counterbalance', at, swing__area=3e-5, **shape).any()
 
 
 def test_effects_that_a_recording_cannot_show_are_not_tried(arm):

@@ -111,7 +111,8 @@ def test_every_hidden_effect_shows(wrist: ArmModel, name: str) -> None:
     assert np.abs(shown).max() > (0.005 if name == 'homing_error' else 0.05)
     assert hidden.effects[0]['name'] == name
     assert (hidden.effects[0]['drives'] is None) == (
-        name not in {*FORMS, 'effort_gain', 'effort_filter', 'time_delay', 'homing_error'})
+        name not in {*FORMS, 'effort_gain', 'effort_filter', 'time_delay', 'homing_error',
+                     'current_gain'})
 
 
 def test_motors_without_a_map_rub_nowhere(model: ArmModel) -> None:
@@ -131,7 +132,7 @@ def wrist(model: ArmModel) -> ArmModel:
 @pytest.mark.parametrize(('name', 'seed'), [
     ('payload_mass', 1), ('link_mass', 1), ('viscous_friction', 2), ('coulomb_friction', 3),
     ('friction_temperature', 1), ('friction_temperature', 2), ('friction_drift', 1),
-    ('counterbalance', 1), ('counterbalance', 2), ('coupled_drives', 1)])
+    ('counterbalance', 1), ('coupled_drives', 1), ('current_gain', 1), ('effort_gain', 1)])
 def test_what_is_hidden_is_named(wrist: ArmModel, name: str, seed: int) -> None:
     model = wrist
     run = simulate_arm(model, (name,), seed, thermometers=True)

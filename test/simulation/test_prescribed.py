@@ -42,10 +42,9 @@ GROUPS = {
                  'stribeck_friction', 'quadratic_friction', 'load_friction'),
     'forces': ('effort_offset', 'drive_spring', 'force_ripple', 'local_bump', 'vibration',
                'drive_coupling'),
-    'joints and platform': ('revolute_friction', 'spherical_friction', 'revolute_stiffness',
-                            'external_wrench', 'platform_drag'),
+    'joints and platform': ('joint_friction', 'joint_spring', 'external_wrench', 'tool_drag'),
     'bodies': ('drive_inertia', 'payload_mass', 'payload_offset', 'platform_inertia',
-               'base_tilt', 'rod_mass'),
+               'base_tilt', 'link_mass'),
 }
 
 

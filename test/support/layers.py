@@ -29,7 +29,7 @@ ARRANGING = frozenset(f'numpy.{name}' for name in (
 MATHEMATICS = ('numpy', 'math', 'cmath', 'scipy')
 # Inside a layer, a folder uses itself and those before it.
 FOLDERS = {
-    'physics': ['mechanism', 'three_pprs', 'effects', 'model'],
+    'physics': ['mechanism', 'effects', 'three_pprs', 'model'],
     'measurement': ['files', 'motion'],
     'inference': ['residuals', 'regression', 'search', 'fit', 'diagnosis', 'adoption',
                   'experiments'],

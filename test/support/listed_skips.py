@@ -24,13 +24,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """Fail a run that passed but for such skips; workers leave it to who started them."""
-    if session.config.getoption('--listed-skips') and unlisted(_skips(session.config)):
+    if unlisted(_skips(session.config)):
         session.exitstatus = session.exitstatus or pytest.ExitCode.TESTS_FAILED
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """Say which they are."""
-    if config.getoption('--listed-skips') and (left := unlisted(_skips(config))):
+    if left := unlisted(_skips(config)):
         terminalreporter.section(HEADING, red=True)
         for place, reason in left:
             terminalreporter.line(f'{place}: {reason}')
@@ -44,6 +44,9 @@ def unlisted(skips: Iterable[tuple[str, str]], file: Path = LIST) -> list[tuple[
 
 
 def _skips(config: pytest.Config) -> list[tuple[str, str]]:
+    """Return the skips that were asked about."""
+    if not config.getoption('--listed-skips', default=False):
+        return []
     reporter = config.pluginmanager.get_plugin('terminalreporter')
     reports = reporter.stats.get('skipped', []) if reporter else []  # a worker reports elsewhere
     return [(each.nodeid, str(each.longrepr[2] if isinstance(each.longrepr, tuple)

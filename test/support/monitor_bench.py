@@ -34,12 +34,17 @@ class MonitorBench:
         self.error = running.listen(Float64MultiArray, '/monitor/error', 1000)
         running.follow_status('/monitor/status')
         self.publisher = running.probe.create_publisher(JointState, '/joint_states', 1000)
-        assert running.spin_until(self.publisher.get_subscription_count)
-        assert running.connected()
+        if values.get('autostart', True):
+            self.connect()
         motion = Excitation(6.0, seed=3).motion(np.arange(0, 6.0, 1 / RATE))
         forces = DriveModel.load().drive_forces(motion)
         self.position, self.effort = forces.mechanism.position, forces.total
         self.sent = 0
+
+    def connect(self) -> None:
+        """Wait until node and probe see each other on every topic."""
+        assert self.bench.spin_until(self.publisher.get_subscription_count)
+        assert self.bench.connected()
 
     def send(self, count: int, change: Array | float = 0.0) -> None:
         """Publish the next samples, efforts changed by a constant per drive."""

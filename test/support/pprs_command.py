@@ -34,9 +34,10 @@ class Ended:
 
 def pprs(
     *arguments: object, cwd: str | os.PathLike[str] | None = None, columns: int = 80,
+    encoding: str = 'utf-8',
 ) -> Ended:
     """Call `pprs` on a terminal so wide; what would be a traceback on the screen is raised."""
-    out, err = (io.TextIOWrapper(io.BytesIO(), encoding='utf-8', newline='')
+    out, err = (io.TextIOWrapper(io.BytesIO(), encoding=encoding, newline='')
                 for _ in range(2))
     with chdir(cwd) if cwd else nullcontext(), as_a_new_process(columns), \
             redirect_stdout(out), redirect_stderr(err):
@@ -48,7 +49,7 @@ def pprs(
     texts = []
     for stream in (out, err):
         stream.flush()
-        texts.append(stream.buffer.getvalue().decode(errors='surrogateescape'))  # type: ignore[attr-defined]
+        texts.append(stream.buffer.getvalue().decode(encoding, 'surrogateescape'))  # type: ignore[attr-defined]
     assert isinstance(status, int), status
     return Ended(status, *texts)
 

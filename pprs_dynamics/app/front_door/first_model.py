@@ -151,7 +151,7 @@ def first_model(
     if shared and not drives:
         chosen = tuple(name for name in chosen if name not in shared)
         notes.append(f'{" and ".join(shared)} share a transmission: they are left out, and '
-                     'taken to stand')
+                     'taken to stand; to drive them list them, with friction: {motors: …}')
     if contents is not None and contents.joints and not names.joints:
         names = _by_numbers(contents, chosen)
         notes.append('joints are matched by the numbers in their names')

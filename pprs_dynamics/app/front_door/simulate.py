@@ -156,7 +156,7 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     found = model if isinstance(model, ForceModel) else load_model(find_file(model))
     names = [effects] if isinstance(effects, str) else list(effects)
     share_done = stage(progress, 'simulating')
-    if isinstance(found, ArmModel):
+    if isinstance(found, ArmModel) and found.is_described:
         from pprs_dynamics.simulation.arm_run import RATE as ARM_RATE
         from pprs_dynamics.simulation.arm_run import simulate_arm
 

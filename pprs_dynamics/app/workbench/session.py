@@ -479,8 +479,7 @@ class Session:
             For a model of another mechanism, or a duration that no design is made for.
         """
         model = self.model
-        if not isinstance(model, (DriveModel, ArmModel)):
-            raise SessionError(f'no motions are designed for {model.title}')
+        assert isinstance(model, (DriveModel, ArmModel))
         check_duration(duration)
 
         def work(report: Callable[[float], None]) -> DesignedMotion:

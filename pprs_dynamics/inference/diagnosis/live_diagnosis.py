@@ -32,11 +32,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.paired_errors import (
-    block_gains,
-    certainty,
-    sample_gains,
-)
+from pprs_dynamics.inference.residuals.paired_errors import paired_gain, sample_gains
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -249,7 +245,7 @@ class LiveDiagnosis:
             return False
         after, _ = measure_residuals(self.last.adopted, [recording])
         return all(
-            certainty(block_gains(measure_residuals(model, [recording])[0], after, noise)) > least
+            paired_gain(measure_residuals(model, [recording])[0], after, noise).certainty > least
             for model in (self.model, self.last.plain))
 
     def _beginning(self, window: Window) -> float | None:
@@ -258,7 +254,7 @@ class LiveDiagnosis:
         for each, start in (*self.recent, (window.recording, window.start)):
             before, _ = measure_residuals(window.plain, [each])
             after, _ = measure_residuals(window.adopted, [each])
-            gains.append(sample_gains(before, after, window.noise))
+            gains.append(sample_gains(before, after, window.noise)[0])
             times.append(start + before.time - before.time[0])
         return change_point(np.concatenate(times), np.concatenate(gains))
 

@@ -344,12 +344,12 @@ def _doubt(diagnosis: Diagnosis) -> str:
         if one.objection:
             told.append(f' {title} was fitted as well and is no finding: {one.objection}.')
             continue
-        on, before, after = (
-            'the error', one.error_before, one.error_after) if (
-            one.error_after >= one.error_before) else (
-            'the error on held-out data', one.held_out_before, one.held_out_after)
-        told.append(f' {title} was fitted as well and is no finding: with it {on} '
-                    f'{change(before, after, diagnosis.residuals.unit)}.')
+        worse = (f'with it the error on held-out data '
+                 f'{change(one.held_out_before, one.held_out_after, diagnosis.residuals.unit)}'
+                 if one.held_out_after >= one.held_out_before else
+                 f'held-out data are predicted worse with it, by {-one.certainty:.2g} standard '
+                 'errors in units of the noise')
+        told.append(f' {title} was fitted as well and is no finding: {worse}.')
     return ''.join(told)
 
 

@@ -251,7 +251,7 @@ class Reference:
         found = [reconstruct(model, one) for one in recordings]
         residuals = join_tables(model, [treated_table(model, one) for one in found])
         numbers = (np.concatenate([_numbers(model, one) for one in found])
-                   if isinstance(model, ArmModel) else None)
+                   if model.is_described else None)
         return cls._fitted(model, residuals, numbers, kept, tuple(one.name for one in recordings),
                            tuple(recordings))
 
@@ -270,7 +270,8 @@ class Reference:
                               float(np.median(content[1:, 0])), model.units)
         numbers = numbers_at(
             model, motion['position'], motion['velocity'], motion['acceleration'],
-            model.reversal.widths(count)) if isinstance(model, ArmModel) else None
+            model.reversal.widths(count)) if (
+                isinstance(model, ArmModel) and model.is_described) else None
         return cls._fitted(model, residuals, numbers, kept, (displayed(model.source),), ())
 
     @classmethod

@@ -34,7 +34,6 @@ from pprs_dynamics.inference.regression.base_columns import (
 )
 from pprs_dynamics.inference.regression.collecting import (
     ColumnCollector,
-    sensitivities_of,
     stacked_columns,
 )
 from pprs_dynamics.inference.regression.sensitivities import (
@@ -44,6 +43,7 @@ from pprs_dynamics.inference.regression.sensitivities import (
     OF_DRIVES,
     OF_JOINTS,
     PRESENT,
+    Sensitivities,
 )
 from pprs_dynamics.inference.regression.terms import FullRate, OperatingPoint, Term
 from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
@@ -56,14 +56,15 @@ from pprs_dynamics.physics.effects.drive_effect import (
     DriveEffect,
     DriveRange,
     DriveSamples,
+    GainEffect,
     MeasurementEffect,
 )
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
+from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 
 SHAPE_STEP = 1e-3  # amount of movement, for derivatives by shape parameters
 LONGEST_DELAY = 0.3  # [s], that a recording may show at once
@@ -254,7 +255,7 @@ class Design:
         They are those of the given model around every other one: a sensor that says nothing of
         small efforts, say, would leave some of them without a column.
         """
-        sensitivities = sensitivities_of(model, given)
+        sensitivities = Sensitivities(model, given)
         if effects is not None:
             sensitivities.restrict(effects)
         tables: list[dict[Any, Array]] = []
@@ -356,7 +357,7 @@ class Design:
     def present(self, effect: type[CatalogueEffect], drive: int | None,
                 ) -> Mapping[str, float] | None:
         """Return the parameters that the given model has of an effect; None where it lacks it."""
-        there = next((e for e in self.given.effects if type(e) is effect), None)
+        there = next((e for e in self.given.effects if e.name == effect.name), None)
         name = None if drive is None else self.drives[drive]
         if there is None or (isinstance(there, DriveEffect) and name not in there.drives):
             return None
@@ -400,9 +401,12 @@ class Design:
         """Return the treated columns of an effect on one drive, (k, M)."""
         if issubclass(effect, MeasurementEffect):
             def seen(recording: FullRate, part: slice) -> Array:
-                time = recording.time[part]
-                effort = self.sensed(recording.effort[None, part, drive], time, drive, effect)[0]
-                return np.stack(effect.sensor_columns(effort, time, **shape))
+                effort = self.sensed(recording.effort[None, part, drive], recording, part, drive,
+                                     effect)[0]
+                if issubclass(effect, GainEffect):
+                    samples = recording.samples(part, drive)
+                    return np.stack([effort * one for one in effect.shares(samples, **shape)])
+                return np.stack(effect.sensor_columns(effort, recording.time[part], **shape))
 
             return self.treated(lambda recording: np.concatenate(
                 [seen(recording, part) for part in recording.segments], axis=1))
@@ -420,7 +424,7 @@ class Design:
         """Return forces on a drive, (k, N) of a recording, as its sensor shows them, (k, M)."""
         def behind_sensor(recording: FullRate) -> Array:
             whole = rows(recording)
-            return np.concatenate([self.sensed(whole[:, part], recording.time[part], drive)
+            return np.concatenate([self.sensed(whole[:, part], recording, part, drive)
                                    for part in recording.segments], axis=1)
         return self.treated(behind_sensor)
 
@@ -429,14 +433,21 @@ class Design:
         return np.concatenate([recording.treat(rows(recording).T).T
                                for recording in self.recordings], axis=1)
 
-    def sensed(self, rows: Array, time: Array, drive: int,
+    def sensed(self, rows: Array, recording: FullRate, part: slice, drive: int,
                without: type[CatalogueEffect] | None = None) -> Array:
-        """Return forces (k, N) on a drive as the model's sensors show them, but for one kind."""
+        """Return forces (k, N) on a drive in a segment as the model's sensors show them.
+
+        All but those of one kind.
+        """
         name = self.drives[drive]
         for effect in self.model.effects:
             if (isinstance(effect, MeasurementEffect) and name in effect.drives
-                    and type(effect) is not without):
+                    and (without is None or effect.name != without.name)):
+                if isinstance(effect, GainEffect):
+                    rows = rows * effect.factor(recording.samples(part, drive), name)
+                    continue
                 alone = type(effect)({name: effect.drives[name]})
+                time = recording.time[part]
                 rows = np.reshape([alone.sensed(row[:, None], time, (name,))[:, 0]
                                    for row in rows], rows.shape)
         return rows
@@ -498,7 +509,7 @@ class Design:
 
     def present_rows(self, column: PresentCoefficient | PresentShape) -> dict[int, Array]:
         """Return the rows, (M,) by drive, of what the model's effects may be otherwise."""
-        there = next(e for e in self.model.effects if type(e) is column.effect)
+        there = next(e for e in self.model.effects if e.name == column.effect.name)
         assert isinstance(there, CatalogueEffect)
         values = present_values(there, column.drive)
         drive = None if column.drive is None else self.drives.index(column.drive)

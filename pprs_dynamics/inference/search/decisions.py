@@ -104,7 +104,8 @@ class Decisions:
         0.35, 'rad', 'lean of a base beyond which it is no effect of how the machine was put up',
         'a base is levelled to a degree; what leans by 20 stands on a slope or a wall on purpose')
     sure: float = _number(
-        2.0, 'deviations', 'by how much a number must have moved to be told as calibrated',
+        2.0, 'deviations', 'by how much a number must have moved to be told as calibrated, and '
+        'held-out data be predicted worse with an effect for it to be refuted',
         '95 %')
     edge_share: float = _number(
         0.02, '1', 'how near the edge of what was tried a shape is not to be trusted',

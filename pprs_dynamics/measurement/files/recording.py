@@ -71,7 +71,7 @@ class Recording(Samples):
     def from_arrays(
         cls, name: str, time: ArrayLike, position: ArrayLike, velocity: ArrayLike | None = None,
         effort: ArrayLike | None = None, drives: tuple[str, ...] = DRIVES,
-        channels: Mapping[str, Array] = MappingProxyType({}),
+        channels: Mapping[str, ArrayLike] = MappingProxyType({}),
     ) -> Recording:
         """Judge arrays as a file's content would be.
 
@@ -95,13 +95,14 @@ class Recording(Samples):
         given = {'time': time, 'position': position, 'velocity': velocity, 'effort': effort}
         numbers = {quantity: _numbers(quantity, values) for quantity, values in given.items()
                    if values is not None}
+        beside = {name: _numbers(name, values) for name, values in channels.items()}
         time, position = numbers['time'], numbers['position']
         efforts = numbers.get('effort', np.full(position.shape, np.nan))
         velocities = numbers.get('velocity')
         # Checks the shapes before anything computes with them.
-        cls(drives, time, position, velocities, efforts, name=name, channels=channels)
+        cls(drives, time, position, velocities, efforts, name=name, channels=beside)
         recording = _judged(name, Samples(drives, time, position, velocities, efforts,
-                                          channels=channels))
+                                          channels=beside))
         if not len(recording.time):
             raise MotionError('position', 'no sample is finite', 'be finite', 'finite')
         return recording

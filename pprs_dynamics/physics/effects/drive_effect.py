@@ -15,8 +15,9 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, SINGLE_AXIS, CatalogueEffect, names
-from pprs_dynamics.physics.three_pprs.robot import AXIS
-from pprs_dynamics.physics.three_pprs.state import DriveStates
+from pprs_dynamics.physics.mechanism.drive_states import DriveStates
+
+ALONE = 'drive'  # name of one whose name does not matter
 
 
 @dataclass(frozen=True)
@@ -241,15 +242,15 @@ class MeasurementEffect(DriveEffect):
         columns = []
         for unit in cls.coefficients or (None,):
             given = {c.name: float(c is unit) for c in cls.coefficients}
-            effect = cls({AXIS: {**cls.from_coefficients(given), **shape}})
-            columns.append(effect.sensed(effort[:, None], time, (AXIS,))[:, 0] - effort)
+            effect = cls({ALONE: {**cls.from_coefficients(given), **shape}})
+            columns.append(effect.sensed(effort[:, None], time, (ALONE,))[:, 0] - effort)
         return tuple(columns)
 
     @classmethod
     def shifts_positions(cls) -> bool:
         """Return whether measured positions are not the true ones: all drives feel that."""
-        unit = cls({AXIS: {p.name: p.scale for p in cls.parameters}})
-        return bool(np.any(unit.position_error((AXIS,))))
+        unit = cls({ALONE: {p.name: p.scale for p in cls.parameters}})
+        return bool(np.any(unit.position_error((ALONE,))))
 
     def position_error(self, drives: Sequence[str]) -> Array:
         """Return the errors of measured positions [m], to be subtracted, (D,)."""
@@ -259,3 +260,34 @@ class MeasurementEffect(DriveEffect):
                memory: Any = None) -> Array:
         """Return the measured effort where the drives apply `effort`, (N, D) [N]."""
         return effort
+
+    def seen(self, effort: Array, state: DriveStates, memory: Any = None) -> Array:
+        """Return the measured effort at a state; by default what `sensed` says, whatever it is."""
+        return self.sensed(effort, state.time, state.drives, memory)
+
+
+class GainEffect(MeasurementEffect):
+    """A factor between efforts and what is measured that goes with what the drive does."""
+
+    @classmethod
+    @abstractmethod
+    def shares(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return what is measured too much per coefficient, as shares of the effort, (N,) each."""
+
+    def factor(self, samples: DriveSamples, drive: str) -> Array:
+        """Return by what the efforts of one drive are multiplied, (N,)."""
+        values = self.drives[drive]
+        coefficients = self.to_coefficients(values)
+        shares = self.shares(samples, **{p.name: values[p.name] for p in self.shape})
+        factor = np.ones_like(samples.velocity)
+        for c, share in zip(self.coefficients, shares, strict=True):
+            factor += coefficients[c.name] * share
+        return factor
+
+    def seen(self, effort: Array, state: DriveStates, memory: Any = None) -> Array:
+        """Return the efforts times their factors."""
+        scaled = effort.copy()
+        for name in self.drives:
+            index = state.drives.index(name)
+            scaled[:, index] *= self.factor(DriveSamples.of(state, index), name)
+        return scaled

@@ -193,7 +193,7 @@ AXIS_KEYS: dict[str, Key] = {key.name: key for key in (
 EFFORT_UNITS = ('N m', 'N', 'A')
 # Blocks of mechanisms: a serial arm, and a robot that may have loops. What the first names joints
 # the second names drives.
-ARM, ROBOT = 'arm', 'robot'
+ARM, ROBOT, AXIS = 'arm', 'robot', 'axis'
 GAIN = '.gain'
 FILES = ('arm.urdf', 'robot.urdf', 'robot.mjcf')  # keys that hold paths
 LOOPS = ('spherical', 'revolute', 'universal', 'cylindrical', 'prismatic', 'fixed')

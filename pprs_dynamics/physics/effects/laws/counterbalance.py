@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A spring or cylinder between two links, over a joint: (F_b + K l) dl/dq.
+"""A spring or cylinder between two links, over a joint: (F_b + K l + A_b p) dl/dq.
 
 It spans from a point on one link, at the distance b from the axis, to one on the other, at rho b;
 l = sqrt(1 + rho^2 - 2 rho cos(q - q_0)) is its length over b.
@@ -18,6 +18,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter
 
+PRESSURE = 'pressure'
 # Over less of a turn [rad] it is a spring like any other.
 LEAST_STROKE = 0.8
 # Distances of the points from the axis, one over the other, and directions that are tried.
@@ -35,14 +36,19 @@ class Counterbalance(DriveEffect):
     linear = (Parameter('force', 'F_b', 'N m', 'pull at no length, times b; negative where it '
                         'pushes', -1e7, 1e7, scale=5.0),
               Parameter('stiffness', 'K', 'N m', 'stiffness times b^2', -1e7, 1e7, 0.0,
-                        scale=5.0))
+                        scale=5.0),
+              Parameter('area', 'A_b', 'm^3', 'area of a piston times b, where its pressure is '
+                        'measured', -10.0, 10.0, 0.0, scale=1e-5))
     shape = (Parameter('ratio', 'rho', '1', 'distance of the nearer point from the axis over that '
                        'of the farther', SHORTEST, LONGEST, scale=0.1),
              Parameter('position', 'q_0', 'rad', 'position at which both points are on one side, '
                        'in line with the axis', -100.0, 100.0, scale=0.3))
+    variants = (('force', 'stiffness'), ('area',))
+    scanned = ('force', 'stiffness')
     card = Card(
-        '(F_b + K l) dl/dq, l = sqrt(1 + rho^2 - 2 rho cos(q - q_0)); F_b and K are force and '
-        'stiffness times b and b^2, b and rho b the distances of its ends from the axis',
+        '(F_b + K l + A_b p) dl/dq, l = sqrt(1 + rho^2 - 2 rho cos(q - q_0)), p its measured '
+        'pressure; F_b and K are force and stiffness times b and b^2, b and rho b the distances '
+        'of its ends from the axis',
         'a curve over the position of one joint, the same both ways, at any speed and with any '
         'load: zero where its ends are in line with the axis, steepest near the nearer one; like '
         'a mass on the link, but not with the sine of an angle from the vertical, nor in other '
@@ -56,21 +62,24 @@ class Counterbalance(DriveEffect):
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
-        """Return (dl/dq, l dl/dq)."""
+        """Return (dl/dq, l dl/dq, p dl/dq); the last is 0 where no pressure was measured."""
         length, lever = _length(drive.position, shape['ratio'], shape['position'])
-        return (lever / length, lever)
+        pressure = np.nan_to_num(drive.channels.get(PRESSURE, np.zeros_like(length)))
+        return (lever / length, lever, pressure * lever / length)
 
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
         """Return what the bend of a gas's law adds: its pressure rises ever faster."""
         length, _ = _length(drive.position, shape['ratio'], shape['position'])
         share = (length - 1) / shape['ratio']  # -1 at the shortest, near 1 at the longest
-        return (tuple(BEND * share ** 2 * one for one in cls.columns(drive, **shape)),)
+        force, stiffness, measured = cls.columns(drive, **shape)
+        bend = BEND * share ** 2
+        return ((bend * force, bend * stiffness, np.zeros_like(measured)),)
 
     @classmethod
     def averaged(cls, drive: DriveSamples, period: float,
                  shapes: Sequence[Mapping[str, float]]) -> Array:
-        """Return columns of many shapes at mean positions, which it changes little about."""
+        """Return columns of `scanned` at mean positions, which they change little about."""
         ratio, place = (np.array([shape[name] for shape in shapes])[:, None]
                         for name in ('ratio', 'position'))
         length, lever = _length(drive.position, ratio, place)

@@ -19,7 +19,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.added_body import flattened, nested
 from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
-from pprs_dynamics.physics.mechanism.mechanism import LinkageState, Mechanism
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 
 
@@ -47,10 +46,9 @@ class CoupledDrives(StructureEffect):
     @classmethod
     def bound(cls, robot: Any) -> Any:
         """Return the effect in the motors of a mechanism that move more than one joint."""
-        if not isinstance(robot, Mechanism):
-            return cls
-        return _in_motors(tuple((name, ratios) for name, ratios in robot.motors.items()
-                                if np.count_nonzero(ratios) > 1))
+        return cls if robot is None else _in_motors(tuple(
+            (name, ratios) for name, ratios in robot.motors.items()
+            if np.count_nonzero(ratios) > 1))
 
     @classmethod
     def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
@@ -63,8 +61,7 @@ class CoupledDrives(StructureEffect):
 
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
-        assert isinstance(state, LinkageState)
-        force = np.zeros_like(state.velocity)
+        force: Array = np.zeros_like(state.velocity)
         widths = state.reversal.widths(state.velocity.shape[1])
         for motor, ratios in self.maps.items():
             row = np.array(ratios)

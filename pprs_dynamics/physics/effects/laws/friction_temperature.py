@@ -58,7 +58,7 @@ class FrictionTemperature(DriveEffect):
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
         """Return ((T - T_0) sgn q_dot, w q_dot); nothing where T was not measured."""
-        warmer = cls._warmer(drive, shape['reference'])
+        warmer = warmer_than(drive, shape['reference'])
         thinned = -shape['thinning'] * np.expm1(-warmer / shape['thinning'])
         return (warmer * drive.direction, thinned * drive.velocity)
 
@@ -66,30 +66,34 @@ class FrictionTemperature(DriveEffect):
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
         """Return what a bend of dry friction adds, and another exponent of the speed."""
         dry, viscous = cls.columns(drive, **shape)
-        bend = cls._warmer(drive, shape['reference']) / (2 * THINNING[-1])
+        bend = warmer_than(drive, shape['reference']) / (2 * THINNING[-1])
         return ((bend * dry, np.zeros_like(dry)),
                 (np.zeros_like(dry), other_exponent(drive.velocity, viscous)))
 
     @classmethod
-    def _warmer(cls, drive: DriveSamples, reference: float) -> Array:
-        """Return T - T_0 [K], 0 where T was not measured."""
-        temperature = drive.channels.get(TEMPERATURE)
-        if temperature is None:
-            return np.zeros_like(drive.velocity)
-        warmer: Array = np.where(np.isfinite(temperature), temperature - reference, 0.0)
-        return warmer
-
-    @classmethod
     def may_show(cls, covered: DriveRange) -> bool:
         """Return whether a temperature was measured and changed."""
-        lowest, highest = covered.channels.get(TEMPERATURE, (0.0, 0.0))
-        return highest > lowest
+        return middle_temperature(covered)[1] > 0
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[dict[str, float]]:
         """Return references within the temperatures and beyond."""
-        lowest, highest = covered.channels.get(TEMPERATURE, (0.0, 0.0))
-        middle, span = (lowest + highest) / 2, highest - lowest
+        middle, span = middle_temperature(covered)
         references = {middle + share * span: None for share in REFERENCES}
         return [{'reference': reference, 'thinning': thinning}
                 for reference in references for thinning in THINNING]
+
+
+def warmer_than(drive: DriveSamples, reference: float) -> Array:
+    """Return T - T_0 [K], (N,), 0 where T was not measured."""
+    temperature = drive.channels.get(TEMPERATURE)
+    if temperature is None:
+        return np.zeros_like(drive.velocity)
+    warmer: Array = np.where(np.isfinite(temperature), temperature - reference, 0.0)
+    return warmer
+
+
+def middle_temperature(covered: DriveRange) -> tuple[float, float]:
+    """Return the middle of the temperatures that were measured [degC], and their range [K]."""
+    lowest, highest = covered.channels.get(TEMPERATURE, (0.0, 0.0))
+    return (lowest + highest) / 2, highest - lowest
