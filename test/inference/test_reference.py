@@ -93,6 +93,21 @@ def test_what_is_carried_over_is_as_uncertain_as_it_is_wrong(
         assert 0.4 < np.nanmean(left[:, d] ** 2 / (noise + variance(carried, d))) < 1.5
 
 
+def test_two_runs_tell_how_far_the_machine_repeats(machine: tuple[ArmModel, Reference]) -> None:
+    model, _ = machine
+    first, same = run(model, 0, 1), run(model, 0, 2)
+    moved = arm.motion(20.0, seed=0)
+    other = Recording.from_arrays(
+        'other', same.time, same.position, same.velocity,
+        same.effort - [1.0, 0.0, 0.0] * healthy(moved), same.drives)
+    steady, loose = (Reference.of(model, [first, one]).repeats for one in (same, other))
+    assert np.all(steady > 0.98)
+    assert loose[0] < 0.8
+    assert np.all(loose[1:] > 0.98)
+    # A single one says nothing of another day.
+    assert np.all(Reference.of(model, [first]).repeats <= 0.99)
+
+
 def test_a_drive_that_stood_in_the_reference_is_told_of_by_nothing(
         machine: tuple[ArmModel, Reference]) -> None:
     model, _ = machine
