@@ -84,10 +84,17 @@ class ModelState:
         By effect.
     start : float, optional
         When the motion began [s]; None before its first sample.
+
+    Attributes
+    ----------
+    closed : dict of Structure to (C,) array
+        Coordinates of a mechanism at the last sample, from which its loops close in fewer steps
+        where the next one is near. No result depends on them.
     """
 
     def __init__(self, memories: dict[str, Any], start: float | None = None) -> None:
         self.memories, self.start = memories, start
+        self.closed: dict[Any, Array] = {}
 
     def begin(self, time: Array | None) -> None:
         """Take the first sample of times (N,) as the start, where that is not known yet."""
@@ -114,7 +121,9 @@ class ModelState:
             except Exception as error:  # another package's effect may keep anything
                 raise EffectError(name, 'its memory cannot be copied '
                                   f'({type(error).__name__}: {error})') from error
-        return ModelState(copied, self.start)
+        state = ModelState(copied, self.start)
+        state.closed = dict(self.closed)
+        return state
 
 
 @dataclass(frozen=True, kw_only=True)
