@@ -275,9 +275,7 @@ class Session:
         StaleError
             Where the session is at another revision.
         """
-        request = EffectRequest.named(effect, drives, self.drives)
-        request.require_place(self.model)
-        request = replace(request, effect=self.model.bound(request.effect))
+        request = EffectRequest.named(effect, drives, self.drives).placed(self.model)
         with self._changing(revision):
             view = self.view_state
             offer = next((one.candidate for one in view.offers
@@ -433,8 +431,7 @@ class Session:
         with self._changing(revision):
             tick = self.view_state.ticks.get(effect)
             on = drives or (views.names_of(tick.best, self.drives) if tick else None)
-            request = EffectRequest.named(effect, on or None, self.drives)
-            request.require_place(self.model)
+            request = EffectRequest.named(effect, on or None, self.drives).placed(self.model)
             if 'adopt' in self.jobs and self.jobs['adopt'].is_running:
                 raise SessionError(f'{self.jobs["adopt"].what} is being adopted, must end first')
             fits, inputs = self.fits, self.inputs

@@ -24,6 +24,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits, RecordedDrives
 from pprs_dynamics.errors import EffectError, MotionError
+from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
@@ -328,7 +329,8 @@ class ForceModel(ABC):
 
     def bound(self, effect: type[CatalogueEffect]) -> type[CatalogueEffect]:
         """Return an effect of the catalogue with the parameters that it has in this model."""
-        return effect.bound(self.mechanism_of_effects)
+        # Of one with the parameters that it has elsewhere, its own again.
+        return (find_effect(effect.name) or effect).bound(self.mechanism_of_effects)
 
     @abstractmethod
     def mechanism(self, motion: Any) -> Any:
