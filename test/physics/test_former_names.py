@@ -18,7 +18,8 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.adoption.request import EffectRequest, requested
-from pprs_dynamics.physics.effects.catalogue import CATALOGUE, FORMER
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.effects.former_names import FORMER
 from pprs_dynamics.physics.model.ledger import read_steps, without_last_step
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.simulation.hidden_effects import draw_effect

@@ -15,10 +15,10 @@ from pprs_dynamics.physics.effects.catalogue import (
     REPLACED,
     catalogue,
     find_effect,
-    told_general_name,
 )
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.former_names import told_general_name
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.model.force_model import ForceModel
 
