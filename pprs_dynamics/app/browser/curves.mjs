@@ -105,9 +105,9 @@ export class Curves {
       const factor = (event.deltaY || event.deltaX) > 0 ? 1.25 : 0.8;
       const around = (at, [a, b]) => [at - (at - a) * factor, at + (b - at) * factor];
       if (event.altKey) {
-        const {min, max} = plot.scales.y;
-        this.heights.set(drive, around(plot.posToVal(event.offsetY, 'y'), [min, max]));
-        plot.redraw(true, true);
+        const seen = [plot.scales.y.min, plot.scales.y.max];
+        const [min, max] = around(plot.posToVal(event.offsetY, 'y'), seen);
+        this.heights.set(drive, [min, max]);
         plot.setScale('y', {min, max});
       } else this.zoom(around(plot.posToVal(event.offsetX, 'x'), this.range()));
     }, {passive: false});
