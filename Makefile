@@ -10,13 +10,14 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 # Side by side, processes with several threads each for linear algebra only wait for each other.
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo demo-feedforward test fuzz reproduce feedforward localisation score adoption benchmark \
+.PHONY: help demo demo-feedforward test test-nodes test-others fuzz reproduce feedforward localisation score adoption benchmark \
 	naming reliability reliability-full experiments decisions mutants fleet workbench docs lint clean
 
 help:
 	@echo 'make demo       install into $(VENV); a hidden effect is found, added, and the error falls'
 	@echo 'make demo-feedforward   the nodes over topics: forces and a picture'
 	@echo 'make test       install into $(VENV), run every test, ruff and mypy'
+	@echo 'make test-nodes, test-others   the two halves of it, which run side by side'
 	@echo 'make fuzz       the tests of properties with new examples (10 minutes)'
 	@echo 'make docs       the documentation as a site, into build/docs/html'
 	@echo 'make reproduce  the figures and claims of the paper, into output/'
@@ -41,10 +42,18 @@ demo: $(VENV)/.demo
 demo-feedforward: $(VENV)/.demo
 	@$(BIN)/python demo/feedforward_demo.py output
 
-# Nodes run in real time: alone, after everything else has used both cores.
+# Nodes run in real time and mostly wait: they have the processor when they want it, and all else
+# calculates meanwhile, in files by name, the dear ones of `app` and `inference` first.
+# PYTEST has more options for both.
 test: $(VENV)/.test lint
-	$(BIN)/python -m pytest test -n 2 --dist loadfile -m 'not nodes'
-	$(BIN)/python -m pytest test -m nodes
+	$(MAKE) --jobs 2 --output-sync=target test-nodes test-others
+
+test-nodes: $(VENV)/.test
+	$(BIN)/python -m pytest test -n 2 --dist loadfile -m nodes $(PYTEST)
+
+test-others: $(VENV)/.test
+	nice -n 10 $(BIN)/python -m pytest test -n 2 --dist loadfile --no-loadscope-reorder \
+	    -m 'not nodes' $(PYTEST)
 
 # Property tests with examples that no run has seen.
 fuzz: $(VENV)/.test
@@ -87,11 +96,15 @@ reliability-full: $(VENV)/.test
 
 # Public problems; tables and picture of docs/benchmark.md. What is there is not run again.
 NAMING ?= full
-NAMING_PROBLEMS := $(if $(filter small,$(NAMING)),10,60)
+NAMING_PROBLEMS := $(if $(filter small,$(NAMING)),12,72)
+NAMING_FOLDER := output/naming$(if $(filter small,$(NAMING)),-small)
+NAMING_PAGE := $(if $(filter small,$(NAMING)),$(NAMING_FOLDER)/benchmark.md,docs/benchmark.md)
 naming: $(VENV)/.naming
-	$(BIN)/python -m benchmarks.naming.run make output/naming --seed 2 --problems $(NAMING_PROBLEMS)
-	-$(BIN)/python -m benchmarks.naming.run enter output/naming
-	$(BIN)/python -m benchmarks.naming.run score output/naming --page docs/benchmark.md
+	$(BIN)/python -m benchmarks.naming.run make $(NAMING_FOLDER) --seed 2 --problems $(NAMING_PROBLEMS)
+	$(BIN)/python -m benchmarks.naming.run enter $(NAMING_FOLDER) $(if $(filter small,$(NAMING)),--whole)
+	$(BIN)/python -m benchmarks.naming.real $(NAMING_FOLDER)/real
+	$(BIN)/python -m benchmarks.naming.run enter $(NAMING_FOLDER)/real --whole
+	$(BIN)/python -m benchmarks.naming.run score $(NAMING_FOLDER) --real $(NAMING_FOLDER)/real --page $(NAMING_PAGE)
 
 experiments: $(VENV)/.test
 	$(BIN)/python -m benchmarks.scores.experiments

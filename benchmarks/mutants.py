@@ -45,7 +45,7 @@ TESTS = {
     'physics/three_pprs/inverse_kinematics.py': ('physics/test_kinematics.py',),
     'physics/three_pprs/jacobians.py': ('physics/test_kinematics.py', 'physics/test_dynamics.py'),
     'physics/three_pprs/rigid_body.py': ('physics/test_dynamics.py',),
-    'physics/effects/laws/passive_friction.py': ('physics/test_dynamics.py',),
+    'physics/three_pprs/passive_friction.py': ('physics/test_dynamics.py',),
     'physics/effects/foreign_effects.py': ('physics/test_foreign_effects.py',),
     'physics/model/limits.py': ('physics/test_limits.py',),
     'physics/model/ledger.py': ('physics/test_ledger.py',),

@@ -13,6 +13,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping
 from functools import cache
+from inspect import getdoc
 from pathlib import Path
 from typing import Any
 
@@ -28,29 +29,34 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import PLATFORM, CatalogueEffect
-from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.three_pprs.forward_kinematics import (
     solve_forward_kinematics,
 )
-from pprs_dynamics.simulation.arm_run import draw_motion
 
 SECONDS, RATE = 20.0, 200.0
 # What an effect's force is drawn over, where it is not the drive's velocity.
-OVER = {'drive_inertia': 'acceleration', 'drive_spring': 'position', 'effort_gain': 'effort',
-        'effort_offset': 'time', 'force_ripple': 'position', 'friction_drift': 'time',
+OVER = {'counterbalance': 'position', 'current_gain': 'effort',
+        'drive_inertia': 'acceleration', 'drive_spring': 'position', 'effort_gain': 'effort',
+        'effort_offset': 'time',
+        'force_ripple': 'position', 'friction_drift': 'time',
         'homing_error': 'position', 'link_mass': 'position', 'joint_friction': 'velocity',
         'payload_mass': 'position', 'payload_offset': 'position',
-        'platform_inertia': 'acceleration', 'revolute_stiffness': 'position',
-        'rod_mass': 'position', 'base_tilt': 'position', 'external_wrench': 'position'}
+        'platform_inertia': 'acceleration', 'joint_spring': 'position',
+        'base_tilt': 'position', 'external_wrench': 'position'}
 # Values of one drive or of the structure where the parameters' scales do not show the law.
 TYPICAL = {'asymmetric_friction': {'force_forward': 0.8, 'force_backward': 0.4},
            'force_ripple': {'force': 0.3, 'phase': 0.0, 'pitch': 0.01},
+           'counterbalance': {'force': 10.0, 'stiffness': 0.0, 'ratio': 0.6, 'position': 0.0},
+           'current_gain': {'temperature': 0.002},
+           'coupled_drives': {'wrist.coulomb': 1.0},
+           'friction_temperature': {'coulomb': -0.02, 'viscous': -0.2, 'reference': 40.0},
            'hysteresis': {'force': 0.5, 'distance': 0.002},
            'homing_error': {'zero': 0.002},
-           'joint_friction': {'fork_4.torque': 0.3},
-           'link_mass': {'beam.mass': 0.5},
+           'joint_friction': {'spherical.torque': 0.03},
+           'joint_spring': {'revolute.stiffness': 0.5, 'revolute.position': 1.3},
+           'link_mass': {'rods.mass': 0.1},
            'gear_efficiency': {'driving': 0.25, 'driven_back': 0.1},
            'load_friction': {'coefficient': 0.05},
            'stribeck_friction': {'force': 0.5, 'velocity': 0.01},
@@ -76,7 +82,10 @@ def block(effect: type[CatalogueEffect], drive: str) -> dict[str, Any]:
 @cache
 def platform() -> tuple[DriveModel, PlatformMotion]:
     """Return the paper's robot and a motion of it."""
-    return DriveModel.load(), Excitation(SECONDS, seed=3).motion(np.arange(0, SECONDS, 1 / RATE))
+    time = np.arange(0, SECONDS, 1 / RATE)
+    warming = {'temperature': np.tile(20 + time, (6, 1)).T}  # a kelvin a second
+    return (DriveModel.load(),
+            Excitation(SECONDS, seed=3).motion(time).with_channels(warming))
 
 
 def platform_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, str]:
@@ -102,14 +111,11 @@ def platform_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Ar
 
 
 def arm_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, str]:
-    """Return the same of a joint of a small arm; of friction in loops, of a hexapod's leg."""
+    """Return the same of a joint of a small arm."""
     with tempfile.TemporaryDirectory() as folder:
-        if effect is JointFrictionEffect:
-            model = ArmModel.load('config/hexapod.yaml')
-            motion = draw_motion(model, SECONDS, 3)
-        else:
-            model = made_up_arm.real_arm(Path(folder))
-            motion = made_up_arm.motion(SECONDS, RATE, seed=3)
+        model = made_up_arm.real_arm(Path(folder), **{
+            'friction.motors.wrist.turn': 1.0, 'friction.motors.wrist.swing': 1.0})
+        motion = made_up_arm.motion(SECONDS, RATE, seed=3)
         changed = build_model({**model.values, **block(effect, 'swing')}, model.source)
     assert isinstance(changed, ArmModel)
     plain = model.drive_forces(motion)
@@ -141,14 +147,14 @@ def draw(effect: type[CatalogueEffect], file: Path) -> None:
 
 def page(effect: type[CatalogueEffect]) -> str:
     """Return an effect's page."""
-    card = effect.card
+    card, effect = effect.card, platform()[0].bound(effect)
     given = ', '.join(f'`{name}` = {value:g}' for name, value in values(effect).items())
     rows = [f'| `{each.name}` | {each.symbol} | {each.unit} | {each.description} | '
             f'{"" if each.default is None else f"{each.default:g}"} |'
             for each in effect.parameters]
     kinds = {'platform': '3-PPRS', 'axis': 'single axis', 'arm': 'arm or robot with loops'}
     return '\n'.join([
-        f'# {effect.name}', '', (effect.__doc__ or '').strip().splitlines()[0], '',
+        f'# {effect.name}', '', (getdoc(effect) or '').splitlines()[0], '',
         '```text', card.equation, '```', '',
         f'![What {effect.name} adds to a drive]({effect.name}.svg)', '',
         f'With {given}.', '',

@@ -17,7 +17,7 @@ from recorded_data import need_data
 from scipy.io import loadmat
 
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.physics.three_pprs.robot import AXIS
+from pprs_dynamics.physics.model.robot_block import AXIS
 
 IDENTIFICATION, PULSES = 'DATA_EMPS.mat', 'DATA_EMPS_PULSES.mat'
 

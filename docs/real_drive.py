@@ -19,7 +19,7 @@ from emps import IDENTIFICATION, PULSES, read_emps
 from recorded_data import need_data
 from scipy.signal import butter, decimate, filtfilt
 
-from pprs_dynamics import AxisModel, AxisMotion, PprsError
+from pprs_dynamics import ArmModel, JointMotion, PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun, adopt_all
@@ -42,12 +42,12 @@ PUBLISHED_ASYMMETRIC, PUBLISHED_WITH_BOTH = {'F_v+': 166.7, 'F_v-': 240.4}, 3.11
 UNITS = {'M': 'kg', 'F_v': 'N s/m', 'F_c': 'N', 'offset': 'N'}
 
 
-def published_motion(recording: Recording) -> AxisMotion:
+def published_motion(recording: Recording) -> JointMotion:
     """Return the motion as the authors derive it from the measured positions."""
     step = float(np.median(np.diff(recording.time)))
     q = filtfilt(*butter(ORDER, CUT_OFF * 2 * step), recording.position[:, 0])
     q_dot = np.gradient(q, step)
-    return AxisMotion(q[:, None], q_dot[:, None], np.gradient(q_dot, step)[:, None],
+    return JointMotion(q[:, None], q_dot[:, None], np.gradient(q_dot, step)[:, None],
                       recording.time)
 
 
@@ -103,7 +103,7 @@ class Story:
 
     run: Recording
     pulses: Recording
-    model: AxisModel
+    model: ArmModel
     diagnosis: Diagnosis
     asymmetric: Adoption
     ripple: Adoption | None
@@ -113,7 +113,7 @@ class Story:
 
 def tell(run: Recording, pulses: Recording, report: Callable[[str], None]) -> Story:
     """Run everything; the pulses run gates the second loop and the ripple, and nothing else."""
-    model = AxisModel.load()
+    model = ArmModel.load('config/single_axis.yaml')
     report('diagnosing')
     diagnosis = diagnose(model, [run])
     report('adopting asymmetric_friction')

@@ -50,6 +50,7 @@ if TYPE_CHECKING:
         DriveEffect,
         DriveRange,
         DriveSamples,
+        GainEffect,
         MeasurementEffect,
     )
     from pprs_dynamics.physics.effects.effect import Card, CatalogueEffect, Parameter
@@ -58,20 +59,20 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.mechanism.motion import PlatformMotion
     from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
     from pprs_dynamics.physics.model.arm_model import ArmModel
-    from pprs_dynamics.physics.model.axis_model import AxisModel, AxisMotion
     from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel, ModelState
     from pprs_dynamics.physics.model.model_file import build_model, load_model
 
-__all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'ArmModel', 'Array', 'AxisModel',
-           'AxisMotion', 'Card', 'CatalogueEffect', 'ChangeResult', 'ComparisonResult',
+__all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'ArmModel', 'Array',
+           'Card', 'CatalogueEffect', 'ChangeResult', 'ComparisonResult',
            'ConvergenceError', 'DiagnosisResult', 'DriveEffect', 'DriveForces', 'DriveModel',
            'DriveRange', 'DriveSamples', 'EffectError', 'Excitation', 'ExperimentResult',
-           'FitResult', 'HelicalPath', 'JointMotion', 'LimitError', 'MeasurementEffect',
-           'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError', 'MotionLimits',
-           'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session', 'SimulationResult',
-           'SingularityError', 'StructureEffect', 'UnknownNameError', 'UnreadableFileError',
-           'WorkspaceError', 'adopt', 'adopt_all', 'build_model', 'changed', 'compare', 'diagnose',
-           'fit', 'load_model', 'next_experiment', 'read_recording', 'simulate', 'write_recording']
+           'FitResult', 'GainEffect', 'HelicalPath', 'JointMotion', 'LimitError',
+           'MeasurementEffect', 'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError',
+           'MotionLimits', 'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session',
+           'SimulationResult', 'SingularityError', 'StructureEffect', 'UnknownNameError',
+           'UnreadableFileError', 'WorkspaceError', 'adopt', 'adopt_all', 'build_model', 'changed',
+           'compare', 'diagnose', 'fit', 'load_model', 'next_experiment', 'read_recording',
+           'simulate', 'write_recording']
 __version__ = '0.1.0'
 
 # Loaded at first use: `pprs --help` and a node's refusal need neither numpy nor a model.
@@ -93,14 +94,13 @@ _HOMES = {
     'inference.experiments.motion_limits': ('MotionLimits',),
     'measurement.files.recording': ('Recording', 'read_recording', 'write_recording'),
     'physics.effects.drive_effect': (
-        'DriveEffect', 'DriveRange', 'DriveSamples', 'MeasurementEffect'),
+        'DriveEffect', 'DriveRange', 'DriveSamples', 'GainEffect', 'MeasurementEffect'),
     'physics.effects.effect': ('Card', 'CatalogueEffect', 'Parameter'),
     'physics.effects.structure_effect': ('StructureEffect',),
     'physics.mechanism.joint_motion': ('JointMotion',),
     'physics.mechanism.motion': ('PlatformMotion',),
     'physics.mechanism.paths': ('Excitation', 'HelicalPath'),
     'physics.model.arm_model': ('ArmModel',),
-    'physics.model.axis_model': ('AxisModel', 'AxisMotion'),
     'physics.model.drive_model': ('DriveForces', 'DriveModel', 'ModelState'),
     'physics.model.model_file': ('build_model', 'load_model'),
 }

@@ -16,7 +16,8 @@ COUNT = len(DRIVES)
 
 # Units of a drive that pushes, and of the same quantity of one that turns.
 TURNED = {'m': 'rad', 'm/s': 'rad/s', 'm/s^2': 'rad/s^2', 'N': 'N m', 'kg': 'kg m^2',
-          'N s/m': 'N m s/rad', 'N s^2/m^2': 'N m s^2/rad^2', 'N/m': 'N m/rad'}
+          'N s/m': 'N m s/rad', 'N s^2/m^2': 'N m s^2/rad^2', 'N/m': 'N m/rad',
+          'N/K': 'N m/K', 'N s/m/K': 'N m s/rad/K'}
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,9 @@ def common_unit(units: Sequence[DriveUnits], unit: str) -> str:
     return ' or '.join(sorted({one.of(unit) for one in units})) or unit
 
 
+# What may be measured of drives beside their motion and effort, and its unit.
+CHANNELS = {'temperature': 'degC', 'pressure': 'Pa'}
+
 # A column of a table by its name, or by its number from 1. `name[k]` is element k, from 0, of a
 # column that holds lists; a dot is between a structure and its field.
 Column = str | int
@@ -86,6 +90,8 @@ class RecordedColumns(NamedTuple):
     files : mapping of str to str
         By quantity, or `time`: files that make one recording, from its folder; * stands for what
         recordings differ in.
+    channels : mapping of str to str or int
+        By quantity: a column of the whole machine, for drives that have none of their own.
     """
 
     time: Column | None = None
@@ -94,6 +100,7 @@ class RecordedColumns(NamedTuple):
     rate: float | None = None
     decimal: str = '.'
     files: Mapping[str, str] = MappingProxyType({})
+    channels: Mapping[str, Column] = MappingProxyType({})
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,13 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from discovery import in_a_hurry
 from hypothesis import settings
+from listed_skips import (  # noqa: F401
+    pytest_addoption,
+    pytest_sessionfinish,
+    pytest_terminal_summary,
+)
 from ros_processes import environment, reserve_domain
 
 from pprs_dynamics.system.threads import use_one_thread
@@ -35,6 +41,7 @@ os.environ.update({name: value for name, value in environment(_DOMAIN).items()
 # What tests keep is theirs.
 _CACHE = tempfile.TemporaryDirectory()
 os.environ['XDG_CACHE_HOME'] = _CACHE.name
+os.environ.update(in_a_hurry(_CACHE.name))
 
 
 @pytest.fixture(scope='session')

@@ -5,19 +5,26 @@
 
 from __future__ import annotations
 
+import gzip
 import json
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.naming import fetch
+from benchmarks.naming.entrants import CONTROL, ENTRANTS, PEERS, Entrant
 from benchmarks.naming.entrants.controls import perfect, random, silent
 from benchmarks.naming.entrants.cross_validation import block_cross_validation
 from benchmarks.naming.entrants.pprs import answer_of
+from benchmarks.naming.entrants.sindy import sindy
+from benchmarks.naming.entrants.spike_and_slab import spike_and_slab
 from benchmarks.naming.entrants.stepwise import stepwise
 from benchmarks.naming.generate import draws
+from benchmarks.naming.page import best_of_settings, better_than_ours, fails_table
 from benchmarks.naming.problems import Answer, AnswerError, Column, Named, Problem, Truth
-from benchmarks.naming.run import score_all
+from benchmarks.naming.run import enter_all, score_all
 from benchmarks.naming.scoring import FIGURES, Rate, Scored, figures, judge
 
 DRIVES = ('a', 'b')
@@ -146,6 +153,86 @@ def test_files_of_an_entrant_of_ones_own_are_scored(tmp_path: Path) -> None:
     assert found['intervals hold'] == Rate(1, 1)
 
 
+def folder_of(tmp_path: Path, *problems: str) -> Path:
+    """Return a folder with problems in which a spring is hidden."""
+    (tmp_path / 'truth').mkdir()
+    for name in problems:
+        (tmp_path / 'problems' / name).mkdir(parents=True)
+        problem(len(name), {('spring', 'b'): 1.0}).write(tmp_path / 'problems' / name)
+        (tmp_path / 'problems' / name / 'recording.csv').write_text(name)
+        (tmp_path / 'truth' / f'{name}.json').write_text(json.dumps(
+            {**DRIFT.to_dict(), 'problem': name}))
+    return tmp_path
+
+
+def named(asked: Problem, value: float = 1.0) -> Answer:
+    """Return the spring; how often it was asked stands in a file."""
+    assert asked.folder is not None
+    with (asked.folder / 'asked').open('a') as file:
+        file.write(f'{value:g} ')
+    if value < 0:
+        raise ValueError('columns are alike')
+    return Answer.of([Named('spring', ('b',))])
+
+
+def asked(folder: Path, name: str) -> str:
+    return (folder / 'problems' / name / 'asked').read_text()
+
+
+def test_only_what_changed_is_answered_again(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path, 'one', 'other')
+    method = Entrant(named, {'value': 1.0}, ('value', (1.0, 2.0)))
+    assert enter_all(folder, {'mine': method}, 1) == 0
+    assert enter_all(folder, {'mine': method}, 1) == 0
+    assert asked(folder, 'one') == asked(folder, 'other') == '1 '
+    (folder / 'problems' / 'one' / 'recording.csv').write_text('another recording')
+    assert enter_all(folder, {'mine': method}, 1) == 0
+    assert (asked(folder, 'one'), asked(folder, 'other')) == ('1 1 ', '1 ')
+    assert enter_all(folder, {'mine': method.set_to(2.0)}, 1) == 0
+    assert (asked(folder, 'one'), asked(folder, 'other')) == ('1 1 2 ', '1 2 ')
+    assert enter_all(folder, {'mine': method}, 1, minutes=0.0) == 2  # the time is up
+
+
+def test_who_ends_in_an_error_is_silent_and_is_told_so(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path, 'one')
+    assert enter_all(folder, {'mine': Entrant(named, {'value': -1.0})}, 1) == 0
+    (_, answer, judged), = score_all(folder)['mine']
+    assert (answer.verdict, answer.error) == ('none', 'ValueError: columns are alike')
+    assert judged.exact is False
+    assert fails_table(score_all(folder))[-1].split('|')[-2].strip() == '1'
+
+
+def test_every_entrant_has_a_key_of_its_own() -> None:
+    keys = {name: one.key() for name, one in ENTRANTS.items()}
+    assert len(set(keys.values())) == len(keys)
+    assert all(one.tuning for one in PEERS.values())
+
+
+def test_of_two_settings_the_better_one_is_ranked_and_peers_ahead_are_told() -> None:
+    right, wrong = (scored(perfect), scored(Answer.of([Named('offset', ('a',))])))
+    tuned = next(name for name in ENTRANTS if name.startswith('LASSO, '))
+    every = {'pprs diagnose': wrong, 'LASSO': wrong, tuned: right, 'stepwise BIC, AR': wrong}
+    assert best_of_settings(every)[0] == tuned
+    assert 'LASSO' not in best_of_settings(every)
+    said = better_than_ours({name: every[name] for name in best_of_settings(every)})
+    assert f'*exact* (0 (0-56) here): {tuned} (100 (44-100))' in said
+    assert 'stepwise' not in said
+    assert all(ENTRANTS[name].sort == CONTROL for name in ('silent', 'random'))
+
+
+def test_what_is_fetched_becomes_a_recording() -> None:
+    rows = np.arange(2 * 31.0).reshape(2, 31)
+    raw = '\n'.join(','.join(map(str, row)) for row in rows).encode()
+    head, first, *_ = gzip.decompress(fetch.ur10e(raw)).decode().splitlines()
+    assert head.startswith('time,shoulder_pan_joint/position,shoulder_pan_joint/velocity,'
+                           'shoulder_pan_joint/current,shoulder_lift_joint/position')
+    assert first.startswith('0.0000,1,7,13,2,8,14')
+    head, first, second = gzip.decompress(fetch.psm(200.0)(raw)).decode().splitlines()
+    assert head.startswith('time,yaw/position,yaw/velocity,yaw/effort,pitch/position')
+    assert first == '0.000,0,7,14,1,8,15,2,9,16'
+    assert second.startswith('0.005,31,38,45')
+
+
 def test_problems_come_back_from_their_files(tmp_path: Path) -> None:
     made = problem(3, {('spring', 'b'): 1.0})
     made.write(tmp_path)
@@ -157,13 +244,23 @@ def test_problems_come_back_from_their_files(tmp_path: Path) -> None:
 def test_peers_find_what_stands_out_of_white_noise() -> None:
     asked = problem(1, {('spring', 'b'): 0.2, ('coulomb', 'a'): 0.15})
     for answer in (stepwise(asked, whiten=False), stepwise(asked, whiten=True),
-                   block_cross_validation(asked)):
+                   block_cross_validation(asked), spike_and_slab(asked)):
         assert {(one.name, one.drives) for one in answer.sets[0]} >= {
             ('spring', ('b',)), ('coulomb', ('a',))}
         value, std = answer.sets[0][[one.name for one in answer.sets[0]].index('spring')
                                     ].parameters['b.c']
         assert std is not None
         assert abs(value - 0.2) < 4 * std
+
+
+def test_columns_that_others_make_up_are_no_error_of_frols() -> None:
+    pytest.importorskip('pysindy')
+    made = problem(2, {('spring', 'b'): 1.0})
+    twice = Problem(made.drives, made.time, made.error, made.base,
+                    (*made.columns, Column('twin', 'c', 'b'), Column('nothing', 'c', 'a')),
+                    np.concatenate((made.rows, made.rows[6:7], 0 * made.rows[:1])))
+    found = sindy(twice, 'FROLS').sets[0]
+    assert found[0].name in ('spring', 'twin')
 
 
 def test_whitening_keeps_quiet_where_white_noise_is_assumed_in_vain() -> None:
@@ -185,8 +282,13 @@ def test_a_diagnosis_is_an_answer_with_its_rivals() -> None:
 
 
 def test_seeds_give_the_same_problems_and_names_that_tell_nothing() -> None:
-    first, again = list(draws(5, 24)), list(draws(5, 24))
+    first, again = list(draws(5, 72)), list(draws(5, 72))
     assert first == again
-    assert len({draw.name for draw in first}) == 24
-    assert {draw.kind for draw in first} == {'single', 'nothing', 'two', 'three', 'unknown', 'form'}
+    assert len({draw.name for draw in first}) == 72
+    assert first[:12] == list(draws(5, 12))
+    count = Counter(draw.kind for draw in first)
+    assert count == {'single': 36, 'nothing': 12, 'two': 6, 'three': 6, 'unknown': 6, 'form': 6}
+    for what in ('robot', 'noise'):
+        assert min(Counter(getattr(draw, what) for draw in first).values()) >= 10
+    assert {draw.snr for draw in first if draw.kind == 'single'} == {0.5, 1.0, 2.0, 5.0, 20.0}
     assert not any(name in draw.name for draw in first for name in draw.names)

@@ -40,6 +40,7 @@ from pprs_dynamics.simulation.hidden_effect import (
     HiddenEffect,
     StructureForce,
 )
+from pprs_dynamics.simulation.hidden_forces import FrictionTemperature
 from pprs_dynamics.simulation.plant import LOAD_ROUNDS, LOAD_TOLERANCE, PlantSettings
 from pprs_dynamics.simulation.resistance import JOINT_OF_RATE, Resistance
 from pprs_dynamics.simulation.sensors import ButterworthFilter, SensorFaults
@@ -88,12 +89,15 @@ class Readings:
         As measured; the latter two are what differentiation would find [m, m/s, m/s^2].
     effort : (N, 6) array
         [N]
+    channels : dict of str to (N, 6) array
+        What thermometers say, where an effect follows the temperature.
     """
 
     position: Array
     velocity: Array
     acceleration: Array
     effort: Array
+    channels: dict[str, Array]
 
 
 class PrescribedPlant:
@@ -161,7 +165,9 @@ class PrescribedPlant:
             position, velocity, acceleration = (
                 _at(motion, values, time, CubicSpline)
                 for values in (position, velocity, acceleration))
-        return Readings(position + faults.zero, velocity, acceleration, effort)
+        warm = next((one for one in effects if isinstance(one, FrictionTemperature)), None)
+        return Readings(position + faults.zero, velocity, acceleration, effort,
+                        {} if warm is None else warm.measured(motion.time, motion.velocity))
 
     def _bodies_with(self, changes: Sequence[BodyChange]) -> BodyForces:
         if changes:

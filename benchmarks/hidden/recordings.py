@@ -27,6 +27,7 @@ from benchmarks.hidden.off_forms import off_form
 from benchmarks.hidden.prescribed import PrescribedPlant, Readings
 from benchmarks.hidden.strength import Refit, Whitening, sensitivities, tolerated_numbers
 from pprs_dynamics import DriveModel
+from pprs_dynamics.drives import CHANNELS
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
 from pprs_dynamics.physics.model.model_file import build_model
@@ -201,7 +202,9 @@ def make_case(case: Case) -> tuple[DriveModel, Recording, dict[str, Any]]:
     time = place.motion.time[LEAD:]
     noise = EffortNoise(settings, case.rng(f'noise {case.name}')).samples(len(time))
     recording = Recording.from_arrays(case.name, time, settings.quantised(read.position[LEAD:]),
-                                      None, read.effort[LEAD:] + noise)
+                                      None, read.effort[LEAD:] + noise, channels={
+                                          name: values[LEAD:]
+                                          for name, values in read.channels.items()})
     truth = {
         'case': asdict(case), 'name': case.name,
         'effects': [{**one.effect.truth(), 'scale': one.scale,
@@ -227,7 +230,7 @@ def save_case(folder: Path, case: Case) -> Path:
         with partial.open('wb') as file:
             np.savez_compressed(file, time=recording.time, position=recording.position,
                                 effort=recording.effort.astype(np.float32),
-                                truth=json.dumps(truth))
+                                **recording.channels, truth=json.dumps(truth))
         partial.rename(path)
     return path
 
@@ -237,7 +240,9 @@ def load_case(path: Path | str) -> tuple[DriveModel, Recording, dict[str, Any]]:
     with np.load(path) as content:
         truth = json.loads(str(content['truth']))
         recording = Recording.from_arrays(Path(path).stem, content['time'], content['position'],
-                                          None, content['effort'].astype(float))
+                                          None, content['effort'].astype(float), channels={
+                                              name: content[name] for name in CHANNELS
+                                              if name in content})
     return tolerant_model(truth['tolerance']), recording, truth
 
 

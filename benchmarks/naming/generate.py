@@ -28,7 +28,12 @@ from benchmarks.naming.robots import ROBOTS, hidden_names, model_of
 from benchmarks.scores.diagnosis_table import SAME_FORM
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.measurement.files.recording import (
+    Recording,
+    read_recording,
+    write_recording,
+)
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model
@@ -48,6 +53,9 @@ FELT = 0.1  # of what the most concerned drive feels, from which on a drive coun
 STRONG = 5.0  # least SNR at which forms are off and the unknown is asked for
 BUMP = (0.02, 0.05)  # widths of an unknown force over position, over the stroke
 FORM_OFF = (0.05, 0.15)  # see `benchmarks.hidden.off_forms`
+# In turn: six of twelve hide one effect, two nothing, two a set.
+KINDS = ('single', 'nothing', 'two', 'single', 'unknown', 'single', 'nothing', 'single', 'form',
+         'three', 'single', 'single')
 
 
 @dataclass(frozen=True)
@@ -72,40 +80,62 @@ class Draw:
 
 
 def draws(seed: int, count: int) -> Iterator[Draw]:
-    """Yield problems of a seed, kinds and robots in turn so that any first part is balanced."""
+    """Yield problems of a seed, so that any first part is balanced.
+
+    Kinds and robots go in turn; strengths and noises of each kind, and effects of each robot, in
+    rounds that are shuffled: each comes once before any comes again.
+    """
     rng = np.random.default_rng((seed, zlib.crc32(b'naming')))
-    kinds = ('single', 'nothing', 'single', 'two', 'single', 'unknown', 'single', 'form', 'single',
-             'nothing', 'single', 'three')
+    rounds: dict[tuple[str, str], Iterator[str]] = {}
+
+    def following(what: str, of: str, values: Sequence[object]) -> str:
+        return next(rounds.setdefault((what, of), _shuffled(rng, [str(one) for one in values])))
+
     for k in range(count):
-        robot = ROBOTS[k % len(ROBOTS)]
-        kind = kinds[k % len(kinds)]
-        names = hidden_names(robot)
-        if kind == 'form':
-            names = tuple(name for name in names if name in CAN_BE_OFF)
-        size = {'nothing': 0, 'unknown': 0, 'two': 2, 'three': 3}.get(kind, 1)
-        if robot == 'axis' and size > 1:
-            size, kind = 1, 'single'
-        chosen = tuple(str(one) for one in rng.choice(sorted(names), size, replace=False))
-        snr = float(rng.choice(SNRS))
-        if kind in ('form', 'unknown'):
-            snr = max(snr, STRONG)
-        elif kind in ('two', 'three'):
-            snr = max(snr, 1.0)
-        noise = str(rng.choice(NOISES))
+        kind = KINDS[k % len(KINDS)]
+        robots = [one for one in ROBOTS if kind not in ('two', 'three') or one != 'axis']
+        robot = following('robot', 'sets' if kind in ('two', 'three') else kind, robots)
+        names = [name for name in hidden_names(robot) if kind != 'form' or name in CAN_BE_OFF]
+        if kind in ('two', 'three'):
+            size = ('two', 'three').index(kind) + 2
+            chosen = tuple(str(one) for one in rng.choice(sorted(names), size, replace=False))
+        else:
+            chosen = () if kind in ('nothing', 'unknown') else (
+                following('names', f'{robot} {kind == "form"}', sorted(names)),)
+        least = {'form': STRONG, 'unknown': STRONG, 'two': 1.0, 'three': 1.0}.get(kind, 0.0)
+        snr = float(following('snr', kind, [one for one in SNRS if one >= least]))
+        noise = following('noise', kind, NOISES)
         yield Draw(robot, kind, chosen, 0.0 if kind == 'nothing' else snr, noise,
                    int(rng.integers(2 ** 31)))
 
 
+def _shuffled(rng: np.random.Generator, values: Sequence[str]) -> Iterator[str]:
+    while True:
+        yield from (str(one) for one in rng.permutation(values))
+
+
 def make(draw: Draw, folder: Path) -> Truth:
-    """Write a problem into a folder of its name, and return what is true."""
+    """Write a problem with its columns into a folder of its name, and return what is true."""
+    target = folder / draw.name
+    truth = write_problem(draw, target)
+    model = load_model(target / 'model.yaml')
+    problem_of(model, read_recording(target / 'recording.csv', model.drives)).write(target)
+    return truth
+
+
+def write_problem(draw: Draw, folder: Path, seconds: float = DURATION) -> Truth:
+    """Write recording and model into a folder, and return what is true."""
     model, recording, truth = (_of_platform if draw.robot == '3-PPRS' else _of_arm)(draw)
     if draw.noise == 'gaps':
         recording = _with_gaps(draw, recording)
-    target = folder / draw.name
-    target.mkdir(parents=True, exist_ok=True)
-    write_recording(target / 'recording.csv', recording)
-    _write_model(draw.robot, model, target)
-    problem_of(model, recording).write(target)
+    if seconds < DURATION:
+        part = recording.time < recording.time[0] + seconds
+        recording = Recording.from_arrays(
+            recording.name, recording.time[part], recording.position[part], None,
+            recording.effort[part], recording.drives)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_recording(folder / 'recording.csv', recording)
+    _write_model(draw.robot, model, folder)
     return truth
 
 
@@ -165,8 +195,8 @@ def _of_arm(draw: Draw) -> tuple[ForceModel, Recording, Truth]:
         effects.append({'name': 'local_bump', 'drives': [drive], 'parameters': {}})
     sigma = LEVEL * largest
     if draw.snr:
-        signal = (_error(model, time, run.position, effort)
-                  - _error(model, time, plain.position, plain.effort)) / sigma
+        signal = _added(*(_residuals(model, time, *one) for one in (
+            (run.position, effort), (plain.position, plain.effort)))) / sigma
         strength = np.sqrt(np.nanmean(np.square(signal), axis=0))
         feels = strength > FELT * strength.max()
         total = float(np.sqrt(np.mean(np.square(strength[feels]))))
@@ -179,9 +209,16 @@ def _of_arm(draw: Draw) -> tuple[ForceModel, Recording, Truth]:
     return model, recording, _truth(draw, effects)
 
 
-def _error(model: ForceModel, time: Array, position: Array, effort: Array) -> Array:
+def _residuals(model: ForceModel, time: Array, position: Array, effort: Array) -> Residuals:
     recording = Recording.from_arrays('noise-free', time, position, None, effort, model.drives)
-    return measure_residuals(model, [recording])[0].error
+    return measure_residuals(model, [recording])[0]
+
+
+def _added(with_effects: Residuals, plain: Residuals) -> Array:
+    """Return what effects add to the error, (M, D), where both are known: rests may differ."""
+    both = [np.isin(one.time, other.time) for one, other in (
+        (with_effects, plain), (plain, with_effects))]
+    return np.asarray(with_effects.error[both[0]] - plain.error[both[1]])
 
 
 def _wave(draw: Draw, position: Array) -> Array:

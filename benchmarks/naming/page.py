@@ -6,10 +6,13 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from benchmarks.naming.entrants import CONTROL, ENTRANTS, OURS, PART, PEER, PEERS
+from benchmarks.naming.problems import Answer, Named, Truth
 from benchmarks.naming.scoring import (
     FIGURES,
     SINGLE,
@@ -23,10 +26,18 @@ from benchmarks.naming.scoring import (
 
 LIBRARIES = ('pprs_dynamics', 'numpy', 'scipy', 'scikit-learn', 'skglm', 'pysindy', 'mujoco')
 BEGIN, END = '<!-- figures: made by make naming -->', '<!-- end of figures -->'
-CONTROLS = ('silent', 'random')
+MAIN = ('right', 'first', 'named', 'exact', 'wrong alone', 'false alarms', 'unknown',
+        'right drives', 'intervals hold')
+TOLD = 4  # entrants whose answers on real machines are printed
+LESS_IS_BETTER = ('wrong alone', 'false alarms')
+STRENGTHS = ((0.5, 1.0), (2.0,), (5.0, 20.0))  # of the three pictures
+SHORT = {'pprs diagnose': 'pprs', 'adaptive group LASSO': 'group LASSO', 'Bayesian averaging, AR':
+         'averaging', 'block cross-validation': 'block c.v.', 'held-out F-test (LISDD)': 'LISDD',
+         'least squares (FIGAROH)': 'FIGAROH', 'stepwise BIC, AR': 'BIC, AR',
+         'stepwise BIC, white': 'BIC, white', 'spike and slab, AR': 'spike and slab'}
 
 
-def write_page(scored: Mapping[str, Scored], page: Path) -> None:
+def write_page(scored: Mapping[str, Scored], real: Mapping[str, Scored], page: Path) -> None:
     """Put the figures into a page, between its marks, and the picture beside it."""
     picture = page.parent / 'images' / 'naming.png'
     picture.parent.mkdir(parents=True, exist_ok=True)
@@ -34,12 +45,132 @@ def write_page(scored: Mapping[str, Scored], page: Path) -> None:
     text = page.read_text() if page.exists() else f'# The naming benchmark\n\n{BEGIN}\n{END}\n'
     before, _, rest = text.partition(BEGIN)
     after = rest.partition(END)[2]
-    page.write_text(f'{before}{BEGIN}\n{tables(scored)}\n![Right and wrong answers of every '
-                    f'entrant](images/naming.png)\n\n{versions()}\n{END}{after}')
+    page.write_text(f'{before}{BEGIN}\n{tables(scored)}\n{of_real_machines(real)}\n{versions()}\n{END}{after}')
 
 
 def tables(scored: Mapping[str, Scored]) -> str:
-    """Return the tables in Markdown: every figure, and by robot, strength and noise."""
+    """Return all tables in Markdown: the main one, and what it is made of, folded."""
+    best = {name: scored[name] for name in best_of_settings(scored)}
+    parts = {name: scored[name] for name in ordered(scored) if sort_of(name) in (OURS, PART)}
+    lines = [*main_table(best), '', better_than_ours(best), '',
+             '![Right against false, weak, middle and strong effects](images/naming.png)', '',
+             'This package without each of its parts:', '', *main_table(parts), '',
+             *folded('What each fails at', fails_table(best)),
+             *folded('Every figure with its counts, defaults and tuned settings both',
+                     full_table(scored)),
+             *folded('Exact sets of one effect, by its strength', split_table(
+                 best, lambda t: f'SNR {t.snr:g}', lambda t, j: j.exact, of=SINGLE))]
+    for what in ('kind', 'robot', 'noise'):
+        lines += folded(f'Right answers, by {what}', split_table(
+            best, lambda t, what=what: str(getattr(t, what)), lambda t, j: is_right(j)))
+    return '\n'.join(lines) + '\n'
+
+
+def of_real_machines(scored: Mapping[str, Scored]) -> str:
+    """Return their table in Markdown, and what the first few entrants said of each recording."""
+    if not scored:
+        return ''
+    best = {name: scored[name] for name in best_of_settings(scored)}
+    shown = [name for name in best if sort_of(name) != CONTROL][:TOLD]
+    lines = ['| machine | lacks | ' + ' | '.join(shown) + ' |', '|---' * (len(shown) + 2) + '|']
+    for answers in zip(*(best[name] for name in shown), strict=True):
+        truth = answers[0][0]
+        lines.append(f'| {truth.robot} | {_named(truth.effects)} | '
+                     + ' | '.join(_said(answer) for _, answer, _ in answers) + ' |')
+    return '\n'.join(('## Real machines', '', *main_table(best), '', better_than_ours(best), '',
+                      *folded('What was said of each recording', lines)))
+
+
+def _named(effects: Sequence[Named]) -> str:
+    return ', '.join(one.name + (f' on {" ".join(one.drives)}' if one.drives else '')
+                     for one in effects)
+
+
+def _said(answer: Answer) -> str:
+    return ' or '.join(filter(None, (
+        'unknown' if answer.verdict == 'unknown' else '',
+        *(_named(one) for one in answer.sets[:2]),
+        f'{len(answer.sets) - 2} more' if len(answer.sets) > 2 else ''))) or 'nothing'
+
+
+def main_table(scored: Mapping[str, Scored]) -> list[str]:
+    """Return the rows of the figures that matter most: per cent, and Wilson's interval."""
+    every = {name: all_figures(answers) for name, answers in scored.items()}
+    counts = {figure: {found[figure].count for found in every.values()} for figure in MAIN}
+    shown = [figure for figure in MAIN if counts[figure] != {0}]
+    heads = [figure if len(counts[figure]) > 1 else f'{figure}, of {max(counts[figure])}'
+             for figure in shown]
+    lines = ['| entrant | ' + ' | '.join((*heads, 's')) + ' |', '|---' * (len(shown) + 2) + '|']
+    for name, found in every.items():
+        lines.append(f'| {name} | ' + ' | '.join(
+            (*(_cell(found[figure]) for figure in shown), f'{seconds(scored[name]):.1f}')) + ' |')
+    return lines
+
+
+def _cell(rate: Rate) -> str:
+    if not rate.count:
+        return '-'
+    low, high = rate.interval
+    return f'{100 * rate.share:.0f} ({100 * low:.0f}-{100 * high:.0f})'
+
+
+def all_figures(answers: Scored) -> dict[str, Rate]:
+    """Return every figure of an entrant, those that sum others up among them."""
+    return {'right': Rate.of(is_right(j) for _, _, j in answers),
+            'exact': Rate.of(j.exact for _, _, j in answers), **figures(answers)}
+
+
+def better_than_ours(scored: Mapping[str, Scored]) -> str:
+    """Return a sentence on each figure in which a peer is ahead of this package."""
+    ours = next((name for name in scored if sort_of(name) == OURS), None)
+    if ours is None:
+        return ''
+    mine, said = all_figures(scored[ours]), []
+    for figure in MAIN:
+        sign = -1 if figure in LESS_IS_BETTER else 1
+        ahead = [f'{name} ({_cell(rate)})' for name, answers in scored.items()
+                 if sort_of(name) == PEER and (rate := all_figures(answers)[figure]).count
+                 and sign * (rate.share - mine[figure].share) > 0]
+        if ahead:
+            said.append(f'*{figure}* ({_cell(mine[figure])} here): {", ".join(ahead)}')
+    faster = [name for name in scored if sort_of(name) == PEER
+              and seconds(scored[name]) < seconds(scored[ours])]
+    if faster:
+        said.append(f'*time*: {len(faster)} of '
+                    f'{sum(sort_of(name) == PEER for name in scored)}')
+    return 'Peers that are better at something: ' + ('; '.join(said) or 'none') + '.'
+
+
+def fails_table(scored: Mapping[str, Scored]) -> list[str]:
+    """Return how often an answer is wrong in which way."""
+    kinds = ('right', 'the effects and more', 'some of them', 'others', 'silent', 'unknown for '
+             'what has a name', 'a name for the unknown', 'claims of nothing', 'ended in an error')
+    lines = ['| entrant | ' + ' | '.join(kinds) + ' |', '|---' * (len(kinds) + 1) + '|']
+    for name, answers in scored.items():
+        found = Counter(_fails(truth, answer, judged) for truth, answer, judged in answers)
+        lines.append(f'| {name} | ' + ' | '.join(str(found[kind]) for kind in kinds) + ' |')
+    return lines
+
+
+def _fails(truth: Truth, answer: Answer, judged: Judged) -> str:
+    if answer.error:
+        return 'ended in an error'
+    if is_right(judged):
+        return 'right'
+    if truth.kind == 'nothing':
+        return 'claims of nothing'
+    if answer.verdict == 'none':
+        return 'silent'
+    if truth.kind == 'unknown':
+        return 'a name for the unknown'
+    if answer.verdict == 'unknown':
+        return 'unknown for what has a name'
+    told, true = {one.name for one in answer.sets[0]}, set(truth.names)
+    return ('the effects and more' if told > true else 'some of them' if told & true else 'others')
+
+
+def full_table(scored: Mapping[str, Scored]) -> list[str]:
+    """Return every figure of every entrant with counts."""
     names = [name for name, *_ in FIGURES]
     lines = ['| entrant | ' + ' | '.join((*names, 'intervals hold', 'sets', 's')) + ' |',
              '|---' * (len(names) + 4) + '|']
@@ -48,23 +179,27 @@ def tables(scored: Mapping[str, Scored]) -> str:
         lines.append(f'| {entrant} | ' + ' | '.join(
             (*(str(found[name]) for name in names), str(found['intervals hold']),
              f'{size:g}' if size else '-', f'{seconds(scored[entrant]):.1f}')) + ' |')
-    lines += ['', 'Exact sets of one effect, by its strength:', '']
-    strengths = sorted({t.snr for answers in scored.values() for t, _, _ in answers if t.snr})
-    lines += ['| entrant | ' + ' | '.join(f'SNR {snr:g}' for snr in strengths) + ' |',
-              '|---' * (len(strengths) + 1) + '|']
-    for entrant in ordered(scored):
-        lines.append(f'| {entrant} | ' + ' | '.join(str(Rate.of(
-            j.exact for t, _, j in scored[entrant] if t.kind in SINGLE and t.snr == snr))
-            for snr in strengths) + ' |')
-    for what in ('robot', 'noise'):
-        kinds = sorted({getattr(t, what) for answers in scored.values() for t, _, _ in answers})
-        lines += ['', f'Right answers of all kinds, by {what}:', '',
-                  '| entrant | ' + ' | '.join(kinds) + ' |', '|---' * (len(kinds) + 1) + '|']
-        for entrant in ordered(scored):
-            lines.append(f'| {entrant} | ' + ' | '.join(str(Rate.of(
-                is_right(j) for t, _, j in scored[entrant] if getattr(t, what) == kind))
-                for kind in kinds) + ' |')
-    return '\n'.join(lines) + '\n'
+    return lines
+
+
+def split_table(scored: Mapping[str, Scored], by: Callable[[Truth], str],
+                asked: Callable[[Truth, Judged], bool | None], of: Sequence[str] = (),
+                ) -> list[str]:
+    """Return a rate for each sort of problem."""
+    truths = [t for t, _, _ in next(iter(scored.values())) if not of or t.kind in of]
+    sorts = sorted({by(t) for t in truths}, key=lambda one: (
+        float(one.split()[-1]) if one.startswith('SNR') else 0.0, one))
+    lines = ['| entrant | ' + ' | '.join(sorts) + ' |', '|---' * (len(sorts) + 1) + '|']
+    for name, answers in scored.items():
+        lines.append(f'| {name} | ' + ' | '.join(_cell(Rate.of(
+            asked(t, j) for t, _, j in answers if by(t) == sort and (not of or t.kind in of)))
+            for sort in sorts) + ' |')
+    return lines
+
+
+def folded(title: str, lines: Iterable[str]) -> list[str]:
+    """Return lines that a reader opens."""
+    return [f'<details><summary>{title}</summary>', '', *lines, '', '</details>', '']
 
 
 def is_right(judged: Judged) -> bool:
@@ -74,10 +209,24 @@ def is_right(judged: Judged) -> bool:
     return bool(judged.unknown if judged.unknown is not None else judged.exact)
 
 
+def sort_of(name: str) -> str:
+    """Return what an entrant is; answers that came as files are of a peer."""
+    return ENTRANTS[name].sort if name in ENTRANTS else PEER
+
+
 def ordered(scored: Mapping[str, Scored]) -> list[str]:
     """Return the entrants, the one with most right answers first, controls last."""
     return sorted(scored, key=lambda name: (
-        name in CONTROLS, -Rate.of(is_right(j) for _, _, j in scored[name]).share))
+        sort_of(name) == CONTROL, -Rate.of(is_right(j) for _, _, j in scored[name]).share))
+
+
+def best_of_settings(scored: Mapping[str, Scored]) -> list[str]:
+    """Return the entrants in order, of each peer the setting with more right answers."""
+    found: dict[str, str] = {}
+    for name in ordered(scored):
+        if sort_of(name) != PART:
+            found.setdefault(_peer(name), name)
+    return list(found.values())
 
 
 def versions() -> str:
@@ -92,29 +241,39 @@ def versions() -> str:
 
 
 def draw(scored: Mapping[str, Scored], picture: Path) -> None:
-    """Draw named effects against false claims, an arrow from weak to strong effects."""
+    """Draw exact answers against wrong claims, for weak, middle and strong effects."""
     import matplotlib as mpl
 
     mpl.use('Agg')
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(figsize=(8.5, 5.2), layout='constrained')
+    figure, panels = plt.subplots(1, len(STRENGTHS), figsize=(12, 4.8), layout='constrained',
+                                  sharex=True, sharey=True)
+    names = [name for name in best_of_settings(scored) if sort_of(name) != CONTROL]
     colours = plt.get_cmap('tab20')
-    for k, entrant in enumerate(ordered(scored)):
-        answers = scored[entrant]
-        wrong = Rate.of(one for _, _, j in answers for one in (j.false_alarm, j.wrong_alone))
-        weak, strong = (Rate.of(j.named for t, _, j in answers
-                                if t.kind == 'single' and (t.snr > 1) is strong)
-                        for strong in (False, True))
-        colour = 'black' if k == 0 else colours(k % 20)
-        x = 100 * wrong.share
-        axes.plot([x, x], [100 * weak.share, 100 * strong.share], '-', color=colour, lw=1.5)
-        axes.plot([x], [100 * weak.share], 'o', mfc='white', color=colour)
-        axes.plot([x], [100 * strong.share], 'o', color=colour, label=entrant)
-    axes.set(xlabel='claims that are wrong: false alarms and wrong effects told for sure [%]',
-             ylabel='the hidden effect is named [%]', xlim=(-3, 103), ylim=(-3, 103),
-             title='Naming one hidden effect: weak (open, SNR ≤ 1) and strong (filled)')
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, loc='center left', bbox_to_anchor=(1.0, 0.5))
-    figure.savefig(picture, dpi=110)
+    for axes, strengths in zip(panels, STRENGTHS, strict=True):
+        for k, name in enumerate(names):
+            answers = scored[name]
+            here = [(t, j) for t, _, j in answers if t.kind == 'single' and t.snr in strengths]
+            wrong = Rate.of([*(j.false_alarm for _, _, j in answers),
+                             *(j.wrong_alone for _, j in here)])
+            right = Rate.of(j.exact for _, j in here)
+            ours = sort_of(name) == OURS
+            colour = 'black' if ours else colours(k % 20)
+            (left, up), (low, high) = ((100 * x for x in one.interval) for one in (wrong, right))
+            x, y = 100 * wrong.share, 100 * right.share
+            axes.plot([left, up], [y, y], '-', color=colour, lw=0.6, alpha=0.35)
+            axes.plot([x, x], [low, high], '-', color=colour, lw=0.6, alpha=0.35)
+            axes.plot([x], [y], '*' if ours else 'o', color=colour, ms=13 if ours else 7,
+                      label=SHORT.get(_peer(name), _peer(name)))
+        axes.set(title='SNR ' + ', '.join(f'{one:g}' for one in strengths), xlim=(-3, 103),
+                 ylim=(-3, 103), xlabel='claims that are wrong [%]')
+        axes.grid(alpha=0.25)
+    panels[0].set_ylabel('one hidden effect, told exactly [%]')
+    panels[-1].legend(fontsize=8, loc='center left', bbox_to_anchor=(1.0, 0.5), frameon=False)
+    figure.savefig(picture, dpi=100)
     plt.close(figure)
+
+
+def _peer(name: str) -> str:
+    return next((peer for peer in PEERS if name.startswith(f'{peer}, ')), name)

@@ -131,11 +131,14 @@ class Answer:
         `none` has no set, `effect` one; in `unknown` what was named beside the unknown.
     seconds : float
         Processor time.
+    error : str
+        With which the entrant ended instead of answering, if it did: `none` then stands for it.
     """
 
     verdict: str
     sets: tuple[tuple[Named, ...], ...] = ()
     seconds: float = 0.0
+    error: str = ''
 
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:
@@ -152,7 +155,7 @@ class Answer:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as data for JSON."""
-        return {'verdict': self.verdict, 'seconds': self.seconds, 'sets': [
+        return {'verdict': self.verdict, 'seconds': self.seconds, 'error': self.error, 'sets': [
             [{'name': one.name, 'drives': one.drives,
               'parameters': {key: {'value': value, 'std': std}
                              for key, (value, std) in one.parameters.items()}}
@@ -168,7 +171,8 @@ class Answer:
                        None if value.get('std') is None else float(value['std']))
                  for key, value in one.get('parameters', {}).items()})
                 for one in found) for found in data.get('sets', ()))
-            return cls(str(data['verdict']), sets, float(data.get('seconds', 0.0)))
+            return cls(str(data['verdict']), sets, float(data.get('seconds', 0.0)),
+                       str(data.get('error', '')))
         except (KeyError, TypeError, AttributeError, ValueError) as error:
             raise AnswerError(f'the answer is not of the protocol\'s form: {error!r}') from error
 

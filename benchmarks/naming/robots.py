@@ -12,6 +12,8 @@ from pprs_dynamics.simulation.arm_forms import FORMS, NAMES
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
 
 ROBOTS = ('3-PPRS', 'hexapod', 'delta', 'arm', 'axis')
+# Recordings of the benchmark have no temperatures, its models no maps of motors.
+UNSEEN = ('friction_temperature', 'coupled_drives', 'current_gain')
 MODELS = Path(__file__).parent / 'models'
 
 
@@ -24,9 +26,11 @@ def model_of(robot: str) -> Path:
 
 
 def hidden_names(robot: str) -> tuple[str, ...]:
-    """Return the effects that may be hidden in a robot."""
+    """Return the effects that may be hidden in a robot, of those that any peer could see."""
     if robot == '3-PPRS':
-        return tuple(IN_CATALOGUE)
+        return tuple(name for name in IN_CATALOGUE if name not in UNSEEN)
     if robot == 'axis':
-        return (*FORMS, 'effort_gain', 'time_delay')
-    return tuple(name for name in NAMES if robot != 'arm' or name != 'joint_friction')
+        return (*(name for name, form in FORMS.items()
+                  if name not in UNSEEN and not form.needs_turn), 'effort_gain', 'time_delay')
+    return tuple(name for name in NAMES if name not in UNSEEN
+                 and (robot != 'arm' or name != 'joint_friction'))

@@ -3,26 +3,32 @@
 
 """Make problems, enter them, score answers, reveal the truth.
 
-    python -m benchmarks.naming.run make FOLDER --seed 1 --problems 60
-    python -m benchmarks.naming.run enter FOLDER [--entrant NAME …]
+    python -m benchmarks.naming.run make FOLDER --seed 1 --problems 72
+    python -m benchmarks.naming.run enter FOLDER [--entrant NAME …] [--minutes 4]
     python -m benchmarks.naming.run score FOLDER [--page docs/benchmark.md]
     python -m benchmarks.naming.run reveal FOLDER PROBLEM
 
-`enter` runs what is missing and can be stopped. An entrant of one's own puts its answers into
-FOLDER/answers/NAME/PROBLEM.json and is scored with the others.
+`enter` runs what is missing, or was answered by other code or settings, and can be stopped. An
+entrant of one's own puts its answers into FOLDER/answers/NAME/PROBLEM.json and is scored with the
+others.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import sys
 import time
 import traceback
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.naming.entrants import ENTRANTS
+import numpy as np
+
+from benchmarks.naming.entrants import ENTRANTS, PART, Entrant
 from benchmarks.naming.generate import Draw, draws, make
 from benchmarks.naming.page import write_page
 from benchmarks.naming.problems import Answer, Problem, Truth
@@ -56,44 +62,84 @@ def _make(draw: Draw, folder: Path) -> str:
     return ''
 
 
-def enter_all(folder: Path, names: list[str], workers: int) -> int:
-    """Let entrants answer what they have not answered yet; return how often one failed."""
-    todo = [(name, truth.stem) for truth in sorted((folder / TRUTH).glob('*.json'))
-            for name in names if not _answer_file(folder, name, truth.stem).exists()]
-    failed = 0
+def enter_all(folder: Path, entrants: Mapping[str, Entrant], workers: int,
+              minutes: float = np.inf) -> int:
+    """Let entrants answer what they have not answered yet as they are now.
+
+    Returns
+    -------
+    int
+        How many answers are still missing: where the time is up no more are begun.
+    """
+    until = time.monotonic() + 60 * minutes
+    keys = {name: one.key() for name, one in entrants.items()}
+    todo = []
+    # In an order that mixes robots: what is there when it is stopped is a sample of all.
+    for file in sorted((folder / TRUTH).glob('*.json'), key=lambda one: one.stem[::-1]):
+        keys_here = {name: f'{key} {_key_of_problem(folder, file.stem)}'
+                     for name, key in keys.items()}
+        missing = {name: key for name, key in keys_here.items()
+                   if _key_of_answer(_answer_file(folder, name, file.stem)) != key}
+        if missing:
+            todo.append((file.stem, missing))
+    left = sum(len(missing) for _, missing in todo)
     with ProcessPoolExecutor(workers) as pool:
-        jobs = {pool.submit(_enter, folder, name, problem): (name, problem)
-                for name, problem in todo}
-        for k, job in enumerate(as_completed(jobs), 1):
-            failed += bool(job.result())
-            print(f'{k}/{len(todo)} {" ".join(jobs[job])} {job.result()}'.rstrip(), flush=True)
-    return failed
+        for job in as_completed([pool.submit(_enter, folder, entrants, problem, missing, until)
+                                 for problem, missing in todo]):
+            for line in job.result():
+                left -= 1
+                print(f'{left} left: {line}', flush=True)
+    return left
 
 
-def _enter(folder: Path, name: str, problem: str) -> str:
-    try:
-        asked = Problem.read(folder / PROBLEMS / problem)
+def _enter(folder: Path, entrants: Mapping[str, Entrant], problem: str, missing: Mapping[str, str],
+           until: float) -> list[str]:
+    asked, said = None, []
+    for name, key in missing.items():
+        if time.monotonic() > until:
+            break
+        asked = asked or Problem.read(folder / PROBLEMS / problem)
         start = time.process_time()
-        answer = ENTRANTS[name](asked)
-        answer = Answer(answer.verdict, answer.sets, time.process_time() - start)
-    except Exception:  # an entrant that fails has answered nothing, and that counts against it
-        return traceback.format_exc().strip().splitlines()[-1]
-    file = _answer_file(folder, name, problem)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(json.dumps(answer.to_dict(), indent=1))
-    return ''
+        try:
+            answer = entrants[name](asked)
+        except Exception:  # an entrant that fails has answered nothing, and that counts against it
+            answer = Answer('none', error=traceback.format_exc().strip().splitlines()[-1])
+        answer = replace(answer, seconds=time.process_time() - start)
+        file = _answer_file(folder, name, problem)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        whole = {**answer.to_dict(), 'key': key}
+        partial = file.with_suffix('.part')
+        partial.write_text(json.dumps(whole, indent=1))
+        partial.rename(file)
+        said.append(f'{problem} {name}: {answer.verdict} {answer.error}'.rstrip())
+    return said
+
+
+def _key_of_problem(folder: Path, problem: str) -> str:
+    data = (folder / PROBLEMS / problem / 'recording.csv').read_bytes()
+    return hashlib.sha256(data).hexdigest()[:16]
+
+
+def _key_of_answer(file: Path) -> str:
+    return str(json.loads(file.read_text()).get('key', '')) if file.exists() else ''
 
 
 def _answer_file(folder: Path, name: str, problem: str) -> Path:
     return folder / ANSWERS / name / f'{problem}.json'
 
 
-def score_all(folder: Path) -> dict[str, list[tuple[Truth, Answer, Judged]]]:
-    """Return every entrant's answers with what is right about them; none counts as silence."""
+def score_all(folder: Path, by_all: bool = False) -> dict[str, list[tuple[Truth, Answer, Judged]]]:
+    """Return every entrant's answers with what is right about them; none counts as silence.
+
+    `by_all`: of a run that was stopped, the problems that every entrant has answered.
+    """
+    entrants = sorted(path.name for path in (folder / ANSWERS).glob('*'))
     truths = [Truth.from_dict(json.loads(file.read_text()))
-              for file in sorted((folder / TRUTH).glob('*.json'))]
+              for file in sorted((folder / TRUTH).glob('*.json'))
+              if not by_all or all(_answer_file(folder, entrant, file.stem).exists()
+                                   for entrant in entrants)]
     found = {}
-    for entrant in sorted(path.name for path in (folder / ANSWERS).iterdir()):
+    for entrant in entrants:
         scored = []
         for truth in truths:
             file = _answer_file(folder, entrant, truth.problem)
@@ -128,20 +174,31 @@ def main() -> int:
     parser.add_argument('folder', type=Path)
     parser.add_argument('problem', nargs='?', help='to reveal')
     parser.add_argument('--seed', type=int, default=1, help='of the problems (default 1, public)')
-    parser.add_argument('--problems', type=int, default=24, metavar='N')
+    parser.add_argument('--problems', type=int, default=72, metavar='N')
     parser.add_argument('--entrant', action='append', choices=sorted(ENTRANTS))
     parser.add_argument('--workers', type=int, default=2)
+    parser.add_argument('--minutes', type=float, default=np.inf,
+                        help='after which no more answers are begun')
+    parser.add_argument('--whole', action='store_true',
+                        help='leave out this package without its parts')
     parser.add_argument('--page', type=Path, help='write the table and its picture')
+    parser.add_argument('--by-all', action='store_true',
+                        help='score what every entrant has answered, of a run that was stopped')
+    parser.add_argument('--real', type=Path, metavar='FOLDER', help='of real machines, see real.py')
     options = parser.parse_args()
     if options.step == 'make':
         return min(make_all(options.folder, options.seed, options.problems, options.workers), 1)
     if options.step == 'enter':
-        return min(enter_all(options.folder, options.entrant or list(ENTRANTS), options.workers), 1)
+        chosen = {name: ENTRANTS[name] for name in options.entrant or ENTRANTS
+                  if not options.whole or ENTRANTS[name].sort != PART}
+        return min(enter_all(options.folder, chosen, options.workers, options.minutes), 1)
     if options.step == 'reveal':
         return reveal(options.folder, options.problem or '')
-    scored = score_all(options.folder)
+    scored = score_all(options.folder, options.by_all)
     if options.page:
-        write_page(scored, options.page)
+        there = options.real is not None and options.real.exists()
+        real = score_all(options.real, options.by_all) if there else {}
+        write_page(scored, real, options.page)
     for entrant, answers in scored.items():
         print(entrant, *(f'{name} {rate}' for name, rate in figures(answers).items()),
               f'{seconds(answers):.1f} s', sep='; ')

@@ -3,59 +3,41 @@
 
 """The setting of each peer that is right most often on public problems.
 
+    python -m benchmarks.naming.run make FOLDER --seed 1 --problems 24
     python -m benchmarks.naming.tune FOLDER
 
-Entrants get one sensible tuning each, on the seed that is public; `entrants.TUNED` holds what came.
+Peers get one sensible tuning each, on the seed that is public; `Entrant.tuned` holds what came.
+Like `enter` of `run` it goes on where it was stopped.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
 
-from benchmarks.naming.entrants.averaging import model_averaging
-from benchmarks.naming.entrants.cross_validation import block_cross_validation
-from benchmarks.naming.entrants.least_squares import relative_deviations
-from benchmarks.naming.entrants.penalised import adaptive_group_lasso, lasso
-from benchmarks.naming.entrants.sindy import sindy
-from benchmarks.naming.entrants.split_test import split_test
-from benchmarks.naming.entrants.stepwise import stepwise
-from benchmarks.naming.page import is_right
-from benchmarks.naming.problems import Answer, Problem, Truth
-from benchmarks.naming.scoring import Rate, judge
+import numpy as np
 
-SETTINGS: Mapping[str, tuple[Callable[..., Answer], str, tuple[float, ...]]] = {
-    'stepwise BIC, white': (partial(stepwise, whiten=False), 'weight', (1, 3, 10, 30, 100)),
-    'stepwise BIC, AR': (partial(stepwise, whiten=True), 'weight', (1, 2, 4, 8, 16)),
-    'block cross-validation': (block_cross_validation, 'errors', (0, 1, 2, 4)),
-    'LASSO': (lasso, 'errors', (0, 1, 2, 4)),
-    'adaptive group LASSO': (adaptive_group_lasso, 'power', (0.5, 1, 2)),
-    'PySINDy STLSQ': (partial(sindy, optimiser='STLSQ'), 'threshold', (0.05, 0.1, 0.2, 0.4, 0.8)),
-    'PySINDy SR3': (partial(sindy, optimiser='SR3'), 'threshold', (0.05, 0.1, 0.2, 0.4, 0.8)),
-    'Bayesian averaging, AR': (model_averaging, 'window', (1.001, 20, 150)),
-    'held-out F-test (LISDD)': (partial(split_test, whiten=True), 'discoveries',
-                                (5e-2, 1e-3, 1e-6, 1e-12)),
-    'least squares (FIGAROH)': (relative_deviations, 'limit', (0.3, 0.1, 0.03, 0.01)),
-}
+from benchmarks.naming.entrants import PEERS
+from benchmarks.naming.page import is_right
+from benchmarks.naming.run import enter_all, score_all
+from benchmarks.naming.scoring import Rate
 
 
 def main() -> None:
-    """Print, for each entrant, how often each setting is right."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Print, for each peer, how often each value of its setting is right."""
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('folder', type=Path)
-    folder = parser.parse_args().folder
-    truths = [Truth.from_dict(json.loads(file.read_text()))
-              for file in sorted((folder / 'truth').glob('*.json'))]
-    problems = {truth.problem: Problem.read(folder / 'problems' / truth.problem)
-                for truth in truths}
-    for entrant, (method, name, values) in SETTINGS.items():
-        for value in values:
-            right = Rate.of(is_right(judge(truth, method(problems[truth.problem], **{name: value})))
-                            for truth in truths)
-            print(f'{entrant}: {name} {value:g}: {right}', flush=True)
+    parser.add_argument('--workers', type=int, default=2)
+    parser.add_argument('--minutes', type=float, default=np.inf)
+    options = parser.parse_args()
+    tried = {f'{name}, {one.tuning[0]} {value:g}': one.set_to(value)
+             for name, one in PEERS.items() if one.tuning for value in one.tuning[1]}
+    if enter_all(options.folder, tried, options.workers, options.minutes):
+        return
+    scored = score_all(options.folder)
+    for name in tried:
+        print(f'{name}: {Rate.of(is_right(judged) for _, _, judged in scored[name])}')
 
 
 if __name__ == '__main__':

@@ -81,7 +81,9 @@ class Robot:
         rng = self.case.rng(f'noise {name} {self.case.name}')
         noise = EffortNoise(settings, rng).samples(len(time))
         return Recording.from_arrays(name, time, settings.quantised(read.position[LEAD:]), None,
-                                     read.effort[LEAD:] + noise)
+                                     read.effort[LEAD:] + noise, channels={
+                                         name: values[LEAD:]
+                                         for name, values in read.channels.items()})
 
     def best_error(self, first: Recording, second: Recording) -> float:
         """Return the error on the second motion of the effect's own form, fitted on the first.

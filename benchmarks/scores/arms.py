@@ -36,11 +36,13 @@ from benchmarks.scores.cases import (
 )
 from pprs_dynamics import ArmModel
 from pprs_dynamics.app.commands.pprs import main as pprs
-from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect, friction_rows
+from pprs_dynamics.physics.effects.laws.coupled_drives import CoupledDrives
+from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
+from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.simulation.arm_forms import NAMES
 
 
-def run_case(case: tuple[str, int], model: Path, duration: float) -> Outcome:
+def run_case(case: tuple[str, int], model: Path, duration: float, thermometers: bool) -> Outcome:
     """Simulate and diagnose the recording of effects, joined by +, and a seed."""
     effect, seed = case
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
@@ -49,7 +51,7 @@ def run_case(case: tuple[str, int], model: Path, duration: float) -> Outcome:
         hidden = [word for name in effect.split('+') if name for word in ('--effect', name)]
         status = pprs(['simulate', '--model', str(model), '--output', run, '--seed', str(seed),
                        '--path-seed', str(seed), '--duration', str(duration), '--json', truth,
-                       *hidden])
+                       *(['--thermometers'] if thermometers else []), *hidden])
         begin = time.process_time()
         status = status or pprs(['diagnose', run, '--model', str(model), '--json', said])
         seconds = time.process_time() - begin
@@ -104,6 +106,22 @@ def _said(outcome: Outcome) -> str:
                      for one in outcome['effects'])
 
 
+def by_effect(told: Sequence[tuple[Outcome, dict[str, bool]]]) -> list[str]:
+    """Return a table with a row for each hidden effect, and where its name stood wrongly."""
+    singles = [(one, judged) for one, judged in told if '+' not in one['effect']]
+    lines = ['', '| hidden | first or in the named set | right joints | claimed where another is '
+             'hidden, or nothing |', '|---|---|---|---|']
+    for name in sorted({one['effect'] for one, _ in singles} - {''}):
+        own = [judged for one, judged in singles if one['effect'] == name]
+        others = [one for one, _ in singles if one['effect'] != name]
+        drives = [judged['drives'] for judged in own if 'drives' in judged]
+        wrong = sum(name in [each['name'] for each in one['effects']] for one in others)
+        lines.append(f'| `{name}` | {sum(judged["first_or_set"] for judged in own)} of {len(own)} '
+                     f'| {f"{sum(drives)} of {len(drives)}" if drives else "-"} | '
+                     f'{wrong} of {len(others)} |')
+    return lines
+
+
 def table(found: Sequence[Outcome]) -> str:
     """Return the table in Markdown, then each effect that was not found, or not alone."""
     told = [(one, judge(one)) for one in found if 'failed' not in one]
@@ -121,6 +139,7 @@ def table(found: Sequence[Outcome]) -> str:
         known = [judged[what] for _, judged in told if what in judged]
         if known:
             lines.append(f'| {text} | {goal} | {sum(known)} of {len(known)} |')
+    lines += by_effect(told)
     failed = len(found) - len(told)
     if failed:
         lines.append(f'| refused or failed | 0 | {failed} |')
@@ -133,12 +152,16 @@ def table(found: Sequence[Outcome]) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def todo(model: Path, seeds: int, nothing: int, sets: int) -> Iterator[tuple[str, int]]:
+def todo(model: Path, seeds: int, nothing: int, sets: int, only: Sequence[str] = (),
+         ) -> Iterator[tuple[str, int]]:
     """Yield effects that a robot can have and seeds, every effect once before any twice."""
-    structure = ArmModel.load(model).robot.structure
+    robot = ArmModel.load(model).robot
+    structure = robot.structure
     has_passive = any(row >= 0 and name not in structure.drives
                       for name, (row, _) in friction_rows(structure).items())
-    names = [name for name in NAMES if has_passive or name != JointFrictionEffect.name]
+    names = [name for name in NAMES if (has_passive or name != JointFrictionEffect.name)
+             and (robot.motors or name != CoupledDrives.name)
+             and (not only or name in only)]
     for seed in range(max(seeds, nothing)):
         if seed < seeds:
             yield from ((name, seed) for name in names)
@@ -151,10 +174,11 @@ def todo(model: Path, seeds: int, nothing: int, sets: int) -> Iterator[tuple[str
 
 
 def run(model: Path, seeds: int, nothing: int, sets: int, duration: float, file: Path,
-        each: Each) -> None:
+        each: Each, only: Sequence[str] = (), thermometers: bool = False) -> None:
     """Run the cases that are not in a file of outcomes yet; append and print theirs."""
-    run_missing(each, partial(run_case, model=model.resolve(), duration=duration),
-                {case: case for case in todo(model, seeds, nothing, sets)}, file,
+    run_missing(each, partial(run_case, model=model.resolve(), duration=duration,
+                              thermometers=thermometers),
+                {case: case for case in todo(model, seeds, nothing, sets, only)}, file,
                 lambda outcome: (outcome['effect'], outcome['seed']), described)
 
 
@@ -166,12 +190,17 @@ def main() -> int:
     parser.add_argument('--nothing', type=int, default=10, help='recordings without (default 10)')
     parser.add_argument('--sets', type=int, default=0, metavar='N',
                         help='pairs, and triples, of effects drawn at random (default 0)')
+    parser.add_argument('--only', metavar='NAME', nargs='+', default=(), choices=NAMES,
+                        help='effects that are hidden (default: all): a new one beside what it '
+                        'might be taken for')
+    parser.add_argument('--thermometers', action='store_true',
+                        help='record temperatures whatever is hidden')
     parser.add_argument('--duration', type=float, default=40.0, help='[s] (default 40)')
     parser.add_argument('--table', type=Path, help='write the table of all outcomes in FILE')
     options = parser.parse_args()
     with engine(options) as each:
         run(options.model, options.seeds, options.nothing, options.sets,
-            options.duration, options.file, each)
+            options.duration, options.file, each, options.only, options.thermometers)
     text = table(read_outcomes(options.file))
     if options.table:
         options.table.write_text(text)

@@ -49,10 +49,10 @@ from pprs_dynamics.simulation.plant import PlantSettings
 from pprs_dynamics.simulation.sensors import EffortNoise
 from pprs_dynamics.simulation.virtual_robot import DriveReference, simulate
 
-EFFECTS = ('external_wrench', 'base_tilt', 'payload_mass', 'payload_offset', 'rod_mass',
+EFFECTS = ('external_wrench', 'base_tilt', 'payload_mass', 'payload_offset', 'link_mass',
            'effort_offset', 'drive_spring', 'effort_gain', 'homing_error', 'coulomb_friction',
-           'load_friction', 'viscous_friction', 'quadratic_friction', 'platform_drag',
-           'revolute_friction', 'revolute_stiffness', 'drive_inertia', 'platform_inertia')
+           'load_friction', 'viscous_friction', 'quadratic_friction', 'tool_drag',
+           'joint_friction', 'joint_spring', 'drive_inertia', 'platform_inertia')
 RATE, TOLERANCE, NOISE, CORRELATION = 250.0, 0.04, 0.08, 0.81
 OLD, NEW = 10.0, 20.0  # [s]
 SCALES = (1.0, 0.35)  # of the effect as drawn, until it is ambiguous

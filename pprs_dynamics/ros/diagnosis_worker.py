@@ -104,8 +104,12 @@ class DiagnosisWorker:
         self._sending: Thread | None = None
         self.busy = False
 
-    def submit(self, values: Mapping[str, Any], source: str, samples: StreamWindow) -> None:
-        """Begin with a window; with another model than before all is forgotten."""
+    def submit(self, values: Mapping[str, Any], source: str, samples: StreamWindow,
+               reference: tuple[str, ...] = ()) -> None:
+        """Begin with a window; with another model than before all is forgotten.
+
+        `reference` names the runs since which it is told what has changed.
+        """
         if self._process is None or not self._process.is_alive():
             self.close()
             _start_tracker()
@@ -115,7 +119,8 @@ class DiagnosisWorker:
             self._process.start()
             theirs.close()
         # A pipe holds less than a window, and a process that begins reads it after seconds.
-        self._sending = Thread(target=_send, args=(self._pipe, (dict(values), source, samples)),
+        self._sending = Thread(target=_send, args=(
+            self._pipe, (dict(values), source, reference, samples)),
                                daemon=True)
         self._sending.start()
         self.busy = True
@@ -172,22 +177,27 @@ def _work(pipe: Any) -> None:
         os.nice(LOW_PRIORITY)
     from pprs_dynamics.errors import PprsError
     from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
+    from pprs_dynamics.inference.fit.reference_runs import read_reference
     from pprs_dynamics.physics.model.model_file import build_model
 
-    known: tuple[dict[str, Any], str] | None = None
+    known: tuple[dict[str, Any], str, tuple[str, ...]] | None = None
     while True:
         try:
-            values, source, samples = pipe.recv()
+            values, source, reference, samples = pipe.recv()
         except (EOFError, OSError):
             return
         try:
-            if known != (values, source):
-                live, known = LiveDiagnosis(build_model(values, source)), (values, source)
+            if known != (values, source, reference):
+                model = build_model(values, source)
+                live = LiveDiagnosis(model, reference=(
+                    read_reference(model, reference) if reference else None))
+                known = values, source, reference
             live = live.with_window(samples.recording('the last window', live.model.drives),
                                     int(samples.stamp[0]) / 1e9)
             answer = live.to_dict()
         except PprsError as error:
             # What is known of this model stands, though this window says nothing.
-            kept = {**live.to_dict(), 'withdrawn': []} if known == (values, source) else {}
+            kept = {**live.to_dict(), 'withdrawn': []} if known == (
+                values, source, reference) else {}
             answer = {**kept, 'error': str(error)}
         pipe.send(answer)

@@ -29,7 +29,7 @@ from pprs_dynamics.ros.force_command import (
 )
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS, RobotNames
 from pprs_dynamics.ros.messages.serialisation import command_writer
-from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Code, Rejection
+from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
 from pprs_dynamics.ros.messages.trajectory_request import (
     TRAJECTORY,
     RequestReader,
@@ -38,7 +38,7 @@ from pprs_dynamics.ros.messages.trajectory_request import (
 )
 from pprs_dynamics.ros.node.clocks import CommandWatchdog
 from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
-from pprs_dynamics.ros.node.managed_node import ManagedNode
+from pprs_dynamics.ros.node.managed_node import AUTOSTART, ManagedNode
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import drive_count
 from pprs_dynamics.ros.node.preparation import prepare_beside
@@ -73,7 +73,6 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._current: Any = None
         self._inputs: list[Any] = []
         self._watchdog: CommandWatchdog | None = None
-        self._failure: Exception | None = None
         parameters = parameters_for(drive_count(self))
         self._settings = ModelParameters(self, parameters, self._use_settings)
         own = self._settings.own
@@ -99,67 +98,20 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             self, {'taken_from_paper': self._settings.taken_from_paper}, self._counters,
             hardware_of(self._settings.model), self._refresh)
         self._refresh()
-        self._status.report('OK', 'UNCONFIGURED', 'waiting to be configured')
-        if own['autostart']:
-            self._start()
+        self.begin(own[AUTOSTART.name])
 
     # --- life -----------------------------------------------------------------------------------
 
-    def _start(self) -> None:
-        for trigger in (self.trigger_configure, self.trigger_activate):
-            if trigger() != TransitionCallbackReturn.SUCCESS:
-                raise self._failure or RuntimeError(f'{trigger.__name__} failed')
-
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Create topics; messages that arrive from now on are dropped until activation."""
-        try:
-            self._create_topics()
-        except Exception as error:
-            # rclpy would swallow it; a supervisor gets the transition's failure and this line.
-            self._failure = error
-            self.get_logger().error(f'cannot be configured: {error}')
-            self._destroy_topics()
-            return TransitionCallbackReturn.FAILURE
-        self._feedforward = Feedforward(self._settings.model, self._settings.own)
-        self._enter('inactive', 'INACTIVE', 'waiting to be activated')
-        return super().on_configure(state)
-
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Answer messages from now on."""
-        self._enter('active', 'WAITING', 'waiting for the first message')
         model = self._settings.model
         self.get_logger().info(
             f'{model.title}, effects {", ".join(effect.name for effect in model.effects)}; ready')
         return super().on_activate(state)
 
-    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Answer nothing any more, with the timeout's action as the last word."""
-        self._last_word()
-        self._enter('inactive', 'INACTIVE', 'waiting to be activated')
-        return super().on_deactivate(state)
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Take the topics away."""
-        self._destroy_topics()
-        self._enter('unconfigured', 'UNCONFIGURED', 'waiting to be configured')
-        return super().on_cleanup(state)
-
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """End for good; the process goes on telling so until it is stopped."""
-        self._last_word()
-        self._destroy_topics()
-        self._enter('finalized', 'FINALIZED', 'shut down')
-        return super().on_shutdown(state)
-
-    def _enter(self, state: str, code: Code, message: str) -> None:
-        self.state = state
-        self._status.report('OK', code, message)
-
-    def finish(self) -> None:
-        """Do what must be done before the process ends."""
-        self._last_word()
-
     def _create_topics(self) -> None:
+        # Its memory begins anew.
+        self._feedforward = Feedforward(self._settings.model, self._settings.own)
         self._commands = self._publisher(Float64MultiArray, '~/commands')
         self._joint_command = self._publisher(JointState, '~/joint_command')
         self._joint_trajectory = self._publisher(JointTrajectory, '~/joint_trajectory')

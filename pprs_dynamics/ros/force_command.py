@@ -24,6 +24,7 @@ from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import REJECT, SPLINE, Motion, TrajectoryRequest
+from pprs_dynamics.ros.node.managed_node import AUTOSTART
 from pprs_dynamics.ros.node.model_parameters import NodeModel
 from pprs_dynamics.ros.node.parameters import NodeParameter, own_parameter
 
@@ -35,8 +36,7 @@ FRAME = own_parameter('frame_id', '', 'frame of poses and forces; empty: base, f
                       stays=True)
 
 _PARAMETERS = (
-    own_parameter('autostart', True, 'true: active at once; false: a supervisor configures and '
-                  'activates the node', stays=True),
+    AUTOSTART,
     FRAME,
     own_parameter('max_age', 0.1, 'oldest header stamp that is accepted, and longest time since a '
                   'message without one was sent [s]; 0: any', lower=0),

@@ -21,10 +21,13 @@ from typing import Any
 
 import rclpy
 from rclpy.context import Context
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter_client import AsyncParameterClient
+from rclpy.qos import QoSPolicyKind, QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
@@ -46,7 +49,7 @@ from pprs_dynamics.ros.model_transaction import (
     running,
     set_on_all,
 )
-from pprs_dynamics.ros.node.qos import LATCHED, MEASURED
+from pprs_dynamics.ros.node.qos import LATCHED, MEASURED, OFFERED
 from pprs_dynamics.system.numbers import finite
 
 NAME = 'workbench'
@@ -99,7 +102,8 @@ class LiveJointStates(Node):
         self._monitor: list[float] | None = None
         self._diagnosis: dict[str, Any] | None = None
         self._heard = 0.0
-        self.create_subscription(JointState, topic, self._on_state, MEASURED, raw=True)
+        self._topic, self._offers_less = topic, False
+        self._states_heard = self._hear(MEASURED)
         # Raw, as what is no message of the kind would end the executor.
         self.create_subscription(Float64MultiArray, f'{monitor}/error', self._on_error, MEASURED,
                                  raw=True)
@@ -112,6 +116,23 @@ class LiveJointStates(Node):
         self.create_timer(JUDGED, self._judge)
         self.clients_of = {name: AsyncParameterClient(self, name)
                            for name in (monitor, feedforward)}
+
+    def _hear(self, profile: QoSProfile) -> Subscription:
+        """Subscribe to the joint states, and notice a publisher that offers less than is asked."""
+        return self.create_subscription(
+            JointState, self._topic, self._on_state, profile, raw=True,
+            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._on_less))
+
+    def _on_less(self, event: Any) -> None:
+        # Not here: the subscription whose event this is would be destroyed within its callback.
+        self._offers_less = event.last_policy_kind == QoSPolicyKind.RELIABILITY
+
+    def _take_what_is_offered(self) -> None:
+        """Hear a driver whose joint states are best effort, as drivers over a network publish."""
+        if self._offers_less:
+            self._offers_less = False
+            self.destroy_subscription(self._states_heard)
+            self._states_heard = self._hear(OFFERED)
 
     def full_name(self, name: str) -> str:
         """Return a node's name with its namespace."""
@@ -184,6 +205,7 @@ class LiveJointStates(Node):
                 self._diagnosis = found
 
     def _judge(self) -> None:
+        self._take_what_is_offered()
         with self._lock:
             try:
                 compared = self._comparison.evaluate()
@@ -272,10 +294,11 @@ class LiveNodes:
             return
 
     def close(self) -> None:
-        """End it."""
+        """End it, and leave the graph."""
         self._executor.shutdown()
-        self._context.try_shutdown()
         self._thread.join(PATIENCE)
+        self._node.destroy_node()
+        self._context.try_shutdown()
 
     def to_dict(self) -> dict[str, Any]:
         """Return state and running errors."""

@@ -10,6 +10,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from rclpy.qos import QoSProfile
+from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
@@ -32,15 +35,23 @@ from pprs_dynamics.ros.messages.measured_states import MeasuredStates
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
 from pprs_dynamics.ros.node.all_joints import AllJoints
 from pprs_dynamics.ros.node.clocks import steady_timer
+from pprs_dynamics.ros.node.managed_node import AUTOSTART, ManagedNode
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import NodeParameter, overrides, own_parameter
 from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import hardware_of
-from pprs_dynamics.ros.node.qos import LATCHED, MEASURED, publisher, subscription
+from pprs_dynamics.ros.node.qos import (
+    EVERY_MESSAGE,
+    LATCHED,
+    MEASURED,
+    publisher,
+    subscription,
+)
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.system.plain_text import for_json
 
 PARAMETERS = (
+    AUTOSTART,
     FRAME,
     own_parameter('window', WINDOW, 'of the smoothing that gives velocity and acceleration; '
                   'answers lag by half of it [s]', lower=0.01, upper=2.0, stays=True),
@@ -52,6 +63,8 @@ PARAMETERS = (
                   'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0, stays=True),
     own_parameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
                   upper=3600.0, stays=True),
+    own_parameter('diagnose_since', (), 'recordings of days on which the machine was right: '
+                  'windows are diagnosed for what has changed since then', stays=True),
 )
 
 # Of the samples of a second: from fewer compared ones on the stream is called broken.
@@ -60,12 +73,18 @@ ENOUGH = 20  # samples in a second, whose share says anything
 LOOK = 0.2  # [s] between looks for an answer of the diagnosis
 
 
-class MonitorNode(ExplainsRefusals):
-    """Publishes what the model says at every measured stamp, and how wrong it is."""
+class MonitorNode(ExplainsRefusals, ManagedNode):
+    """Publishes what the model says at every measured stamp, and how wrong it is.
+
+    Configured, it listens; it compares while it is active, and begins with a stream anew each time.
+    """
 
     def __init__(self, **options: Any) -> None:
-        super().__init__('monitor', allow_undeclared_parameters=True, **options)
-        self._worker, self._changed = DiagnosisWorker(), ''
+        ManagedNode.__init__(self, 'monitor', allow_undeclared_parameters=True, **options)
+        self._worker = DiagnosisWorker()
+        self._input: Any = None
+        self._publishers_made: list[Any] = []
+        self._clocks: list[Timer] = []
         parameters: tuple[NodeParameter, ...] = PARAMETERS
         if is_mechanism(overrides(self)):
             parameters = tuple(replace(one, default=ARM_WINDOW) if one.name == 'window' else one
@@ -73,36 +92,73 @@ class MonitorNode(ExplainsRefusals):
         self._settings = ModelParameters(self, parameters, self._use)
         own = self._settings.own
         prepare_beside(self, self._settings.model)
-        self._comparison = LiveComparison(
-            self._settings.model, own['window'], own['error_span'])
         self._names = RobotNames.of(self._settings.model, own['frame_id'])
-        self._states = MeasuredStates(self._names.joints)
-        self._begins_anew = self._cannot_begin = False
         self._counters = {'received': 0, 'samples': 0, 'compared': 0, 'gaps': 0, 'bridged': 0,
                           **dict.fromkeys(REJECTIONS, 0)}
         self._share, self._counted = 1.0, (0, 0)
-        self._origin: int | None = None
+        self._joints = AllJoints()
+        self._begin_stream()
         self._status = StatusReporter(
             self, {}, self._counters, hardware_of(self._settings.model), self._refresh)
-        self._model_effort = publisher(self, JointState, '~/model_effort')
-        self._residual = publisher(self, JointState, '~/residual')
-        self._error = publisher(self, Float64MultiArray, '~/error')
-        self._all_joints = publisher(self, JointState, '~/joint_states_full')
-        self._joints = AllJoints()
-        self._latest: tuple[int, Array] | None = None
-        subscription(self, JointState, 'joint_states', self._on_state, raw=True,
-                     profile=MEASURED)
-        steady_timer(self, 1.0 / own['update_rate'], self._judge)
+        self.begin(own[AUTOSTART.name])
+
+    # --- life -----------------------------------------------------------------------------------
+
+    def _begin_stream(self) -> None:
+        own = self._settings.own
+        self._comparison = LiveComparison(
+            self._settings.model, own['window'], own['error_span'])
+        self._states = MeasuredStates(self._names.joints)
         self._windows = StreamWindows(own['diagnose_every'], own['diagnose_span'])
+        self._begins_anew, self._cannot_begin, self._changed = False, False, ''
+        self._origin: int | None = None
+        self._latest: tuple[int, Array] | None = None
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Compare what comes from now on."""
+        self._begin_stream()
+        self.get_logger().info(
+            f'answers lag by half the window of {self._settings.own["window"]:g} s; ready')
+        return super().on_activate(state)
+
+    def _last_word(self) -> None:
+        """End the process that diagnoses."""
+        self._worker.close()
+
+    def _create_topics(self) -> None:
+        own = self._settings.own
+        self._model_effort = self._publisher(JointState, '~/model_effort')
+        self._residual = self._publisher(JointState, '~/residual')
+        self._error = self._publisher(Float64MultiArray, '~/error')
+        self._all_joints = self._publisher(JointState, '~/joint_states_full')
+        self._input = subscription(self, JointState, 'joint_states', self._on_state, raw=True,
+                                   profile=MEASURED)
+        self._clocks = [steady_timer(self, 1.0 / own['update_rate'], self._judge)]
         if own['diagnose_every']:
-            self._diagnosis = publisher(self, String, '~/diagnosis', LATCHED)
-            steady_timer(self, LOOK, self._diagnose)
-        self.get_logger().info(f'answers lag by half the window of {own["window"]:g} s; ready')
+            self._diagnosis = self._publisher(String, '~/diagnosis', LATCHED)
+            self._clocks.append(steady_timer(self, LOOK, self._diagnose))
+
+    def _publisher(self, kind: type, topic: str, profile: QoSProfile = EVERY_MESSAGE) -> Any:
+        self._publishers_made.append(publisher(self, kind, topic, profile))
+        return self._publishers_made[-1]
+
+    def _destroy_topics(self) -> None:
+        for clock in self._clocks:
+            self.destroy_timer(clock)
+        if self._input is not None:
+            self.destroy_subscription(self._input)
+        for each in self._publishers_made:
+            self.destroy_publisher(each)
+        self._clocks, self._input, self._publishers_made = [], None, []
 
     def _use(self) -> None:
         self._begins_anew = True
 
+    # --- measurements -----------------------------------------------------------------------------
+
     def _on_state(self, data: bytes) -> None:
+        if self.state != 'active':
+            return
         self._counters['received'] += 1
         try:
             samples = self._states.read(data)
@@ -135,6 +191,8 @@ class MonitorNode(ExplainsRefusals):
             self._all_joints.publish(conversions.joint_positions(stamp, *found))
 
     def _judge(self) -> None:
+        if self.state != 'active':
+            return
         self._draw()
         try:
             if self._begins_anew:
@@ -187,6 +245,8 @@ class MonitorNode(ExplainsRefusals):
 
     def _diagnose(self) -> None:
         """Pass on what the worker has found, and give it the next window."""
+        if self.state != 'active':
+            return
         if (answer := self._worker.poll()) is not None:
             if error := answer.pop('error', ''):
                 self.get_logger().warning(f'a window was not diagnosed: {error}')
@@ -199,11 +259,8 @@ class MonitorNode(ExplainsRefusals):
             self._diagnosis.publish(String(data=json.dumps(for_json(answer))))
         if not self._worker.busy and (samples := self._windows.take()) is not None:
             model = self._settings.model
-            self._worker.submit(model.values, model.source, samples)
-
-    def finish(self) -> None:
-        """End the process that diagnoses."""
-        self._worker.close()
+            self._worker.submit(model.values, model.source, samples,
+                                tuple(self._settings.own['diagnose_since']))
 
     def destroy_node(self) -> None:
         """Take the process that diagnoses along."""

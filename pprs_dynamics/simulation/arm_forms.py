@@ -17,6 +17,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
+from pprs_dynamics.simulation.temperatures import REFERENCE, thinner
 
 STEEPNESS = 0.005  # of a joint's top speed, within which hidden dry friction turns over
 
@@ -32,6 +33,8 @@ class JointMoment:
     effort, speed : float
         Largest effort and speed of the motion.
     gear_ratio : float
+    temperature : (N,) array
+        [degC]
     """
 
     time: Array
@@ -42,16 +45,17 @@ class JointMoment:
     effort: float
     speed: float
     gear_ratio: float
+    temperature: Array
 
     @classmethod
     def along(cls, motion: JointMotion, joint: int, load: Array, effort: float, gear_ratio: float,
-              ) -> JointMoment:
+              temperature: Array) -> JointMoment:
         """Return a joint along a motion, under loads (N,) and with a largest effort."""
         assert motion.time is not None
         velocity = motion.velocity[:, joint]
         return cls(motion.time, motion.position[:, joint], velocity,
                    motion.acceleration[:, joint], load, float(effort),
-                   float(np.abs(velocity).max()), float(gear_ratio))
+                   float(np.abs(velocity).max()), float(gear_ratio), temperature[:, joint])
 
     @property
     def sign(self) -> Array:
@@ -78,11 +82,14 @@ class JointForm:
         From a random generator and a moment: parameters, the size first.
     force : callable
         From parameters and a moment: the force, (N,).
+    needs_turn : float
+        Range of a turning joint that it needs [rad]; 0 where it acts in any.
     """
 
     form: str
     draw: Callable[[np.random.Generator, JointMoment], dict[str, float]]
     force: Callable[[Mapping[str, float], JointMoment], Array]
+    needs_turn: float = 0.0
 
 
 def _share(low: float, high: float) -> Callable[[np.random.Generator], float]:
@@ -99,6 +106,16 @@ def _slipping(position: Array, force: float, stroke: float) -> Array:
 
 
 SIZE = _share(0.03, 0.1)  # of the largest effort
+
+
+def _accumulator(p: Mapping[str, float], m: JointMoment) -> Array:
+    """Return the torque of a cylinder whose oil a bladder of nitrogen drives, by its two ends."""
+    angle = m.position - p['position']
+    ends = np.stack([1 - p['arm'] * np.cos(angle), p['arm'] * np.sin(angle)])
+    length = np.hypot(*ends)
+    # Drawn out, the piston drives oil into the bladder: its volume falls, adiabatically.
+    volume = 1 - 0.35 * (length - 1 + p['arm']) / (2 * p['arm'])
+    return p['force'] * volume ** -1.3 * p['arm'] * np.sin(angle) / length
 
 
 FORMS: dict[str, JointForm] = {
@@ -142,6 +159,14 @@ FORMS: dict[str, JointForm] = {
         'F exp(-t / T) v / sqrt(v^2 + w^2)',
         lambda rng, m: {'force': 2 * SIZE(rng) * m.effort, 'time': 0.3 * float(m.time[-1])},
         lambda p, m: p['force'] * np.exp(-m.time / p['time']) * m.sign),
+    'friction_temperature': JointForm(
+        'c (eta(T) / eta(T_0) - 1) v_1 asinh(v / v_1), ln eta = 900 K / (T + 95 K) (Vogel), T of '
+        'the grease, of which the thermometer is late',
+        lambda rng, m: {'coefficient': 3 * SIZE(rng) * m.effort / m.speed,
+                        'reference': float(rng.uniform(*REFERENCE)),
+                        'thinning_velocity': 2 * m.speed},
+        lambda p, m: p['coefficient'] * thinner(m.temperature, p['reference'])
+        * p['thinning_velocity'] * np.arcsinh(m.velocity / p['thinning_velocity'])),
     'effort_offset': JointForm(
         'constant', lambda rng, m: {'force': SIZE(rng) * m.effort},
         lambda p, m: np.full_like(m.time, p['force'])),
@@ -156,6 +181,11 @@ FORMS: dict[str, JointForm] = {
                             np.ptp(m.position)) / 12},
         lambda p, m: p['force'] * (np.sin(2 * np.pi * m.position / p['pitch'] + p['phase'])
                                    + 0.25 * np.sin(4 * np.pi * m.position / p['pitch']))),
+    'counterbalance': JointForm(
+        'p A dl/dq, p = p_0 (V_0 / V)^1.3, V falls by a third as the cylinder is drawn out',
+        lambda rng, m: {'force': 5 * SIZE(rng) * m.effort, 'arm': float(rng.uniform(0.35, 0.75)),
+                        'position': float(np.mean(m.position) + rng.uniform(-0.6, 0.6))},
+        _accumulator, needs_turn=1.0),
     'drive_inertia': JointForm(
         'm a', lambda rng, m: {'mass': 2 * SIZE(rng) * m.effort / float(
             np.abs(m.acceleration).max())},
@@ -163,7 +193,8 @@ FORMS: dict[str, JointForm] = {
 }
 # Of the arm as a whole: the payload's size as a share of the arm's mass, and so on.
 OF_ARM = ('payload_mass', 'link_mass', 'base_tilt', 'external_wrench', 'effort_gain', 'time_delay',
-          'effort_filter', 'homing_error', 'joint_friction')
+          'effort_filter', 'homing_error', 'joint_friction', 'coupled_drives',
+          'current_gain')
 NAMES = (*FORMS, *OF_ARM)
 
 

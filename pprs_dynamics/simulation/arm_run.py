@@ -19,7 +19,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
-from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction, friction_rows
+from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
 from pprs_dynamics.physics.mechanism.closures import ROWS
 from pprs_dynamics.physics.mechanism.description import (
     Frame,
@@ -27,12 +27,13 @@ from pprs_dynamics.physics.mechanism.description import (
     principal_inertia,
 )
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Motion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.urdf import expanded
 from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
 from pprs_dynamics.simulation.arm_forms import (
     FORMS,
     SIZE,
@@ -47,8 +48,10 @@ from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState, couplings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 from pprs_dynamics.simulation.sensors import ButterworthFilter, EffortFilter
+from pprs_dynamics.simulation.temperatures import REFERENCE, Climate, read_thermometers
 
 RATE = 100.0  # [Hz]
+CLIMATE = 45  # second seed of temperatures
 HARMONICS = 8
 FASTEST, WIDEST = 0.35, 1.5  # of the top speed; from the middle of the range [rad, m]
 QUICKEST = 3.0  # [rad/s^2, m/s^2]
@@ -71,12 +74,15 @@ class ArmRun:
         As measured.
     effects : tuple of dict
         What was hidden.
+    channels : mapping of str to (N, n) array
+        What thermometers say, where temperature matters.
     """
 
     motion: JointMotion
     position: Array
     effort: Array
     effects: tuple[dict[str, Any], ...]
+    channels: Mapping[str, Array]
 
 
 class ArmEngine:
@@ -294,7 +300,8 @@ def draw_motion(model: ArmModel, duration: float, seed: int, rate: float = RATE)
 
 def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float = 1.0,
                  noise: float | None = None, duration: float = 40.0, path_seed: int = 0,
-                 progress: Callable[[float], None] | None = None) -> ArmRun:
+                 progress: Callable[[float], None] | None = None, thermometers: bool = False,
+                 ) -> ArmRun:
     """Return a recording of an arm with hidden effects.
 
     Parameters
@@ -314,6 +321,8 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
     path_seed : int
         Of the motion.
     progress : callable, optional
+    thermometers : bool
+        Whether they take part where no effect needs them.
 
     Raises
     ------
@@ -321,10 +330,11 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         For another name.
     """
     random = np.random.default_rng(seed)
-    choices = sorted((*FORMS, 'payload_mass'))
+    motion = draw_motion(model, duration, path_seed)
+    choices = sorted((*(name for name in FORMS if able_joints(name, model, motion)),
+                      'payload_mass'))
     chosen = tuple(str(random.choice(choices)) if name == 'random' else name for name in names)
     require_known(chosen)
-    motion = draw_motion(model, duration, path_seed)
     engine = ArmEngine(model)
     if progress is not None:
         progress(0.1)
@@ -358,15 +368,23 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
         progress(0.8)
     efforts = bodies + _own_friction(model, engine, motion)
     largest = np.abs(efforts).max(axis=0)
+    assert motion.time is not None
+    # Random numbers of its own, so that what else is drawn does not depend on the weather.
+    temperature = Climate.draw(np.random.default_rng((seed, CLIMATE)), len(largest)).along(
+        motion.time, motion.velocity)
     for name in chosen:
         if name in FORMS:
             hidden.append(_add(name, model, motion, bodies, largest, efforts, random,
-                               scale))
+                               scale, temperature))
+    if 'coupled_drives' in chosen:
+        hidden.append(_hide_motor_friction(model, motion, largest, efforts, random, scale))
     if 'effort_gain' in chosen:
         joint = int(random.integers(len(model.drives)))
         gain = scale * float(random.uniform(0.04, 0.1))
         efforts[:, joint] *= 1 + gain
         hidden.append(truth('effort_gain', [model.drives[joint]], {'gain': gain}, '1 + gain'))
+    if 'current_gain' in chosen:
+        hidden.append(_hide_current_gain(model, motion, temperature, efforts, random, scale))
     if 'time_delay' in chosen:
         assert motion.time is not None
         delay = scale * float(random.uniform(0.008, 0.03))
@@ -391,7 +409,9 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
     sigma = np.full(len(largest), noise) if noise is not None else 0.005 * largest
     position = motion.position + shift + ENCODER * random.uniform(-0.5, 0.5, motion.position.shape)
     return ArmRun(motion, position, efforts + _noise(random, efforts.shape) * sigma,
-                  tuple(hidden))
+                  tuple(hidden), {
+                      'temperature': read_thermometers(motion.time, temperature)}
+                  if thermometers or {*chosen} & {'friction_temperature', 'current_gain'} else {})
 
 
 def _hidden_joint(model: ArmModel, motion: JointMotion, plain: Array, random: np.random.Generator,
@@ -414,14 +434,58 @@ def _hidden_joint(model: ArmModel, motion: JointMotion, plain: Array, random: np
     return name, torque * rate / np.sqrt(rate ** 2 + width ** 2), {'torque': torque}
 
 
+def _hide_motor_friction(model: ArmModel, motion: JointMotion, largest: Array, efforts: Array,
+                         random: np.random.Generator, scale: float) -> dict[str, Any]:
+    """Let a motor rub that moves several joints, and return how."""
+    motors = model.robot.motors
+    if not motors:
+        raise HiddenEffectError('coupled_drives needs a motor that moves several joints: write '
+                                'friction: {motors: {MOTOR: {JOINT: 1.0, OTHER: 1.0}}}')
+    name = str(random.choice(sorted(motors)))
+    row = np.array(motors[name])
+    speed = motion.velocity @ row
+    top = float(np.abs(speed).max())
+    # As large on the joint that feels it most as a hidden force on a drive is.
+    felt = float(np.min(largest[row != 0] / np.abs(row[row != 0])))
+    dry, viscous = (scale * SIZE(random) * felt for _ in range(2))
+    friction = (dry * speed / np.hypot(speed, STEEPNESS * top)
+                + viscous * 2 * np.arcsinh(speed / (2 * top)))
+    efforts += np.outer(friction, row)
+    return truth('coupled_drives', None, {
+        f'{name}.coulomb': dry, f'{name}.viscous': viscous / top},
+        "A' (F v / sqrt(v^2 + w^2) + c v_1 asinh(v / v_1)), v the speed of the motor")
+
+
+def _hide_current_gain(model: ArmModel, motion: JointMotion, temperature: Array, efforts: Array,
+                       random: np.random.Generator, scale: float) -> dict[str, Any]:
+    """Let a motor's torque per current go with its temperature or its angle, and return how."""
+    j = int(random.integers(len(model.drives)))
+    ratio = model.gear_ratios[j]
+    if ratio > 1 and random.random() < 0.5:
+        height, waves = scale * float(random.uniform(0.03, 0.08)), int(random.integers(1, 7))
+        phase = float(random.uniform(-np.pi, np.pi))
+        turn = waves * ratio * motion.position[:, j] + phase
+        constant = 1 + height * (np.sin(turn) + 0.2 * np.sin(3 * turn))
+        parameters = {'ripple': height, 'phase': phase, 'pitch': 2 * np.pi / (waves * ratio)}
+        form = 'F / (1 + a (sin(x) + sin(3 x) / 5)), x = 2 pi q / p + phi'
+    else:
+        weaker = scale * float(random.uniform(0.0015, 0.003))
+        reference = float(random.uniform(*REFERENCE))
+        warmer = temperature[:, j] - reference
+        constant = 1 - weaker * warmer * (1 + warmer / 300)
+        parameters = {'temperature': weaker, 'reference': reference}
+        form = 'F / (1 - kappa (T - T_0) (1 + (T - T_0) / 300 K))'
+    efforts[:, j] /= constant
+    return truth('current_gain', [model.drives[j]], {model.drives[j]: parameters}, form)
+
+
 def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Array:
     """Return friction, offset and armature as the model file has them, under the true loads."""
-    values, v = model.values, motion.velocity
+    v = motion.velocity
     friction: Array = (
-        model.robot.armature * motion.acceleration
-        + np.array(values['friction.viscous']) * v
-        + np.array(values['friction.coulomb']) * np.tanh(v / np.asarray(model.reversal.velocity))
-        + np.array(values['friction.offset']))
+        model.robot.armature * motion.acceleration + np.asarray(model.friction.viscous) * v
+        + np.asarray(model.friction.coulomb) * np.tanh(v / np.asarray(model.reversal.velocity))
+        + np.asarray(model.offset.value))
     for effect in model.effects:
         if isinstance(effect, LinkageFriction):
             state = model.mechanism(motion).loaded(
@@ -431,15 +495,35 @@ def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Ar
     return friction
 
 
+def able_joints(name: str, model: ArmModel, motion: JointMotion) -> list[int]:
+    """Return the joints that a hidden force can act in along a motion."""
+    turn, stroke = FORMS[name].needs_turn, np.ptp(motion.position, axis=0)
+    return [j for j, unit in enumerate(model.units)
+            if not turn or (unit.turns and stroke[j] >= turn)]
+
+
+def one_able_joint(name: str, model: ArmModel, motion: JointMotion,
+                   random: np.random.Generator) -> int:
+    """Return one of the joints that a hidden force can act in along a motion."""
+    able = able_joints(name, model, motion)
+    if not able:
+        raise HiddenEffectError(f'{name} needs a joint that turns by '
+                                f'{FORMS[name].needs_turn:g} rad')
+    return able[int(random.integers(len(able)))]
+
+
 def _add(name: str, model: ArmModel, motion: JointMotion, load: Array, largest: Array,
-         efforts: Array, random: np.random.Generator, scale: float) -> dict[str, Any]:
+         efforts: Array, random: np.random.Generator, scale: float, temperature: Array,
+         ) -> dict[str, Any]:
     """Add a hidden force on one joint, or on all, and return what it is."""
     form, drives = FORMS[name], model.drives
     everywhere = bool(random.random() < 0.25)
-    chosen = range(len(drives)) if everywhere else [int(random.integers(len(drives)))]
+    one = one_able_joint(name, model, motion, random) if not everywhere else None
+    chosen = able_joints(name, model, motion) if one is None else [one]
     parameters = {}
     for j in chosen:
-        moment = JointMoment.along(motion, j, load[:, j], largest[j], model.gear_ratios[j])
+        moment = JointMoment.along(motion, j, load[:, j], largest[j], model.gear_ratios[j],
+                                   temperature)
         drawn = draw_form(name, random, moment, scale)
         efforts[:, j] += form.force(drawn, moment)
         parameters[drives[j]] = drawn

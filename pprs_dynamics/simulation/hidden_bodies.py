@@ -75,7 +75,7 @@ def platform_inertia(chains: ClosedChains, values: Mapping[str, Any], inertia: f
 
 @BodyChange.by_law('a uniform collar of mass m over the middle 60 % of every rod',
                    mass=Range('kg', 0.05, 0.2, 'log', scales=True))
-def rod_mass(chains: ClosedChains, values: Mapping[str, Any], mass: float) -> None:
+def link_mass(chains: ClosedChains, values: Mapping[str, Any], mass: float) -> None:
     """Guiding rods heavier than the model's: a collar in the middle of each."""
     l = values['geometry.rod_length']  # noqa: E741
     for i, own in enumerate(values['masses.rods']):

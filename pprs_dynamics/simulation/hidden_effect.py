@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from pprs_dynamics.simulation.closed_chains import ClosedChains
 
 
+PASSIVE_JOINTS = ('revolute', 'spherical')  # of a 3-PPRS: C_i and A_i
+
+
 class HiddenEffectError(PprsError, ValueError):
     """A hidden effect that does not exist, or parameters that it has not got."""
 
@@ -258,9 +261,37 @@ class SteepDriveForce(DriveForce):
 
 
 class HiddenJointFriction(HiddenEffect):
-    """Friction in the passive joints; `joint` is 'revolute' or 'spherical'."""
+    """Friction in the passive joints.
 
-    joint: ClassVar[str]
+    Parameters
+    ----------
+    joint : {'revolute', 'spherical'}
+    **parameters : float
+        All of `ranges`.
+    """
+
+    def __init__(self, joint: str, **parameters: float) -> None:
+        if joint not in PASSIVE_JOINTS:
+            raise HiddenEffectError(f'{self.name} acts in one of {", ".join(PASSIVE_JOINTS)}, not '
+                                    f'in {joint!r}')
+        super().__init__(**parameters)
+        self.joint = joint
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, scale: float = 1.0) -> Self:
+        """Return it in the joints C_i or A_i."""
+        return cls.draw_on([str(rng.choice(PASSIVE_JOINTS))], rng, scale)
+
+    @classmethod
+    def draw_on(cls, places: Sequence[str], rng: np.random.Generator, scale: float = 1.0) -> Self:
+        """Return it in joints of one kind."""
+        return cls(','.join(places), **{
+            name: r.draw(rng, scale) for name, r in cls.ranges.items()})
+
+    def truth(self) -> dict[str, Any]:
+        """Return name, parameters by joint, and form, as data for JSON."""
+        return {**super().truth(), 'parameters': {
+            f'{self.joint}.{name}': value for name, value in self.parameters.items()}}
 
     @abstractmethod
     def resistance(self, speed: Array, load: Array) -> Array:

@@ -10,21 +10,27 @@ from collections.abc import Sequence
 import numpy as np
 
 from pprs_dynamics.errors import suggestion
+from pprs_dynamics.physics.effects.catalogue import FORMER, told_general_name
 from pprs_dynamics.simulation import hidden_bodies, hidden_forces, sensors
-from pprs_dynamics.simulation.hidden_effect import DriveBound, HiddenEffect, HiddenEffectError
+from pprs_dynamics.simulation.hidden_effect import (
+    DriveBound,
+    HiddenEffect,
+    HiddenEffectError,
+    HiddenJointFriction,
+)
 
 IN_CATALOGUE: dict[str, type[HiddenEffect]] = {effect.name: effect for effect in (
     hidden_forces.viscous_friction, hidden_forces.coulomb_friction,
     hidden_forces.asymmetric_friction, hidden_forces.stribeck_friction,
     hidden_forces.quadratic_friction, hidden_forces.load_friction,
-    hidden_forces.Hysteresis, hidden_forces.FrictionDrift,
+    hidden_forces.Hysteresis, hidden_forces.FrictionDrift, hidden_forces.FrictionTemperature,
     hidden_forces.effort_offset, sensors.EffortGain, sensors.HomingError,
     hidden_forces.drive_spring, hidden_forces.force_ripple, hidden_bodies.DriveInertia,
-    sensors.TimeDelay, sensors.EffortFilter, hidden_forces.RevoluteFriction,
-    hidden_forces.SphericalFriction, hidden_forces.revolute_stiffness,
+    sensors.TimeDelay, sensors.EffortFilter, hidden_forces.JointFriction,
+    hidden_forces.joint_spring,
     hidden_bodies.payload_mass, hidden_bodies.payload_offset, hidden_bodies.platform_inertia,
-    hidden_forces.external_wrench, hidden_bodies.base_tilt, hidden_forces.platform_drag,
-    hidden_bodies.rod_mass)}
+    hidden_forces.external_wrench, hidden_bodies.base_tilt, hidden_forces.tool_drag,
+    hidden_bodies.link_mass)}
 """Effects that the catalogue has under the same name, in the interface's order."""
 
 NOT_IN_CATALOGUE: dict[str, type[HiddenEffect]] = {effect.name: effect for effect in (
@@ -60,7 +66,8 @@ def draw_effect(name: str, rng: np.random.Generator, scale: float = 1.0) -> Hidd
     Parameters
     ----------
     name : str
-        One of `HIDDEN_EFFECTS`, drives may follow after a colon.
+        One of `HIDDEN_EFFECTS`, drives may follow after a colon, of `joint_friction` revolute
+        or spherical.
     rng : numpy.random.Generator
     scale : float
         Multiplies its strength.
@@ -71,6 +78,10 @@ def draw_effect(name: str, rng: np.random.Generator, scale: float = 1.0) -> Hidd
         For another name.
     """
     name, _, drives = name.partition(':')
+    former = FORMER.get(name)
+    if former is not None:
+        name = told_general_name(name)
+        drives = former.place if name == hidden_forces.JointFriction.name else drives
     if name not in HIDDEN_EFFECTS:
         raise HiddenEffectError(f'no hidden effect is called {name!r}'
                                 f'{suggestion(name, HIDDEN_EFFECTS)}; there are '
@@ -78,7 +89,7 @@ def draw_effect(name: str, rng: np.random.Generator, scale: float = 1.0) -> Hidd
     effect = HIDDEN_EFFECTS[name]
     if not drives:
         return effect.draw(rng, scale)
-    if not issubclass(effect, DriveBound):
-        raise HiddenEffectError(f'{name} acts in no drive of its own, so that {drives!r} must '
-                                'not follow')
-    return effect.draw_on(drives.split(','), rng, scale)
+    if issubclass(effect, (DriveBound, HiddenJointFriction)):
+        return effect.draw_on(drives.split(','), rng, scale)
+    raise HiddenEffectError(f'{name} acts in no drive of its own, so that {drives!r} must not '
+                            'follow')

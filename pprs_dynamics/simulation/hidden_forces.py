@@ -21,9 +21,16 @@ from pprs_dynamics.simulation.hidden_effect import (
     SteepDriveForce,
     StructureForce,
 )
+from pprs_dynamics.simulation.temperatures import (
+    REFERENCE,
+    Climate,
+    read_thermometers,
+    thinner,
+)
 
 PHASE = Range('rad', -np.pi, np.pi)
 PULLEY = 3.0  # [m], from the middle of the workspace
+USUAL_SPEED = 0.08  # [m/s], at which drives get as warm as their climate says
 WIDTH = Range('m/s', 0.0005, 0.002, 'log', neutral=1.0)
 
 
@@ -143,6 +150,46 @@ class FrictionDrift(SteepDriveForce):
         self._heat = self._heat + duration * (np.abs(moment.velocity) - cooling)
 
 
+class FrictionTemperature(DriveForce):
+    """Grease that thins as the drive warms by its own work and with the hall."""
+
+    name: ClassVar[str] = 'friction_temperature'
+    form: ClassVar[str] = ('c (eta(T) / eta(T_0) - 1) v_1 asinh(v / v_1), ln eta = B / (T + C), '
+                           'tau dT/dt = T_hall(t) + R |v| / v_u - T')
+    ranges: ClassVar[dict[str, Range]] = {
+        'coefficient': Range('N s/m', 10.0, 30.0, 'log', scales=True),
+        'thinning_velocity': Range('m/s', 0.2, 0.6, 'log', neutral=1.0),
+        'reference': Range('degC', *REFERENCE), 'climate': Range('1', 0, 2 ** 31, 'whole')}
+
+    def prepare(self, coulomb: Array, width: Array) -> None:
+        """Start at the temperature of the hall, which is that of all drives."""
+        self._climate = self.climate
+        self.temperature = self._climate.start()
+
+    @property
+    def climate(self) -> Climate:
+        """Hall and drives, whichever of these have the effect."""
+        seed = int(self.values['climate'].max())
+        return Climate.draw(np.random.default_rng(seed), len(DRIVES))
+
+    def measured(self, time: Array, velocity: Array) -> dict[str, Array]:
+        """Return what thermometers say along a motion, by channel, (N, 6)."""
+        return {'temperature': read_thermometers(
+            time, self.climate.along(time, velocity, USUAL_SPEED))}
+
+    def force(self, moment: DriveMoment) -> Array:
+        """Return c (eta(T) / eta(T_0) - 1) v_1 asinh(v / v_1)."""
+        v_1 = self.values['thinning_velocity']
+        viscous = self.values['coefficient'] * thinner(self.temperature, self.values['reference'])
+        return viscous * v_1 * np.arcsinh(moment.velocity / v_1)
+
+    def advance(self, moment: DriveMoment, duration: float) -> None:
+        """Warm by work, cool towards the hall."""
+        slope = self._climate.slope(self.temperature, float(np.max(moment.time)),
+                                    np.abs(moment.velocity) / USUAL_SPEED)
+        self.temperature = self.temperature + duration * slope
+
+
 @DriveForce.by_law('F',
                    force=Range('N', 0.3, 1.0, 'signed', scales=True))
 def effort_offset(m: DriveMoment, force: Array) -> Array:
@@ -222,7 +269,10 @@ class DriveCoupling(DriveForce):
         return self.values['coefficient'] * moment.velocity[..., sources]
 
 
-class _PassiveJointFriction(HiddenJointFriction):
+class JointFriction(HiddenJointFriction):
+    """Dirt or preload in the revolute joints C_i, or in the spherical joints A_i."""
+
+    name: ClassVar[str] = 'joint_friction'
     form: ClassVar[str] = 'c s_1 asinh(s / s_1) + M s / sqrt(s^2 + w^2)'
     ranges: ClassVar[dict[str, Range]] = {
         'viscous': Range('N m s/rad', 0.04, 0.15, 'log', scales=True),
@@ -238,25 +288,11 @@ class _PassiveJointFriction(HiddenJointFriction):
                 + p['dry'] / np.sqrt(speed * speed + p['width'] ** 2))
 
 
-class RevoluteFriction(_PassiveJointFriction):
-    """Dirt or preload in the revolute joints C_i."""
-
-    name: ClassVar[str] = 'revolute_friction'
-    joint: ClassVar[str] = 'revolute'
-
-
-class SphericalFriction(_PassiveJointFriction):
-    """Dirt or preload in the spherical joints A_i."""
-
-    name: ClassVar[str] = 'spherical_friction'
-    joint: ClassVar[str] = 'spherical'
-
-
 @StructureForce.by_law('k x (1 + (x / x_h)^2), x = u_i - u_0',
                        stiffness=Range('N m/rad', 0.4, 1.5, 'log', scales=True),
                        rest=Range('rad', 1.2, 1.6), hardening=Range('rad', 0.8, 1.5))
-def revolute_stiffness(m: PlatformMoment, stiffness: float, rest: float, hardening: float,
-                       ) -> tuple[Array, Array, Array]:
+def joint_spring(m: PlatformMoment, stiffness: float, rest: float, hardening: float,
+                 ) -> tuple[Array, Array, Array]:
     """Cable looms across the revolute joints C_i, stiffening as they bend."""
     x = m.rod_angle - rest
     return -stiffness * x * (1 + (x / hardening) ** 2), np.zeros(3), np.zeros(3)
@@ -285,8 +321,8 @@ def external_wrench(m: PlatformMoment, force: float, azimuth: float, elevation: 
 @StructureForce.by_law('-c v sqrt(1 + (|v| / v_1)^2)',
                        coefficient=Range('N s/m', 5.0, 15.0, 'log', scales=True),
                        turbulent_velocity=Range('m/s', 0.2, 0.6, 'log'))
-def platform_drag(m: PlatformMoment, coefficient: float, turbulent_velocity: float,
-                  ) -> tuple[Array, Array, Array]:
+def tool_drag(m: PlatformMoment, coefficient: float, turbulent_velocity: float,
+              ) -> tuple[Array, Array, Array]:
     """A liquid or a curtain that the platform moves through."""
     grown = np.sqrt(1 + (m.velocity @ m.velocity) / turbulent_velocity ** 2)
     return np.zeros(3), -coefficient * grown * m.velocity, np.zeros(3)

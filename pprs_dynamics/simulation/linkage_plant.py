@@ -29,10 +29,11 @@ from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
 from pprs_dynamics.physics.mechanism.mechanism import Linkage
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, draw_form, truth
-from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion
+from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion, one_able_joint
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 from pprs_dynamics.simulation.plant import UnsolvedError
+from pprs_dynamics.simulation.temperatures import Climate
 
 LONGEST_STEP = 0.002  # [s]; a hexapod's takes 0.3 to 1 ms of processor time, for real time
 ROUNDS = 12  # of friction's coefficients in a step
@@ -96,12 +97,12 @@ class LinkagePlant:
         motion = draw_motion(model, NOMINAL, seed)
         efforts = self.engine.torques(motion)
         self.largest = np.abs(efforts).max(axis=0)
-        values, reversal = model.values, model.reversal
+        reversal = model.reversal
         self._viscous, self._coulomb, self._offset = (
-            np.asarray(values[f'friction.{key}'], dtype=float)
-            for key in ('viscous', 'coulomb', 'offset'))
+            np.broadcast_to(np.asarray(one, dtype=float), len(s.drives))
+            for one in (model.friction.viscous, model.friction.coulomb, model.offset.value))
         self._width = reversal.widths(len(s.drives))
-        self._passive = [effect.table(reversal) for effect in model.effects
+        self._passive = [effect.table(model.robot, reversal) for effect in model.effects
                          if isinstance(effect, LinkageFriction)]
         self._pushes: list[tuple[int, str, dict[str, float], JointMoment]] = []
         self.hidden = [self._hide(name, motion, efforts, random, scale)
@@ -134,9 +135,12 @@ class LinkagePlant:
             return self.engine.hide_link_mass(random, scale, links)
         if name == 'base_tilt':
             return self.engine.hide_tilt(random, scale)
-        j = int(random.integers(len(model.drives)))
+        j = one_able_joint(name, model, motion, random)
+        assert motion.time is not None
         moment = JointMoment.along(motion, j, efforts[:, j], self.largest[j],
-                                   model.gear_ratios[j])
+                                   model.gear_ratios[j],
+                                   Climate.draw(random, len(model.drives)).along(
+                                       motion.time, motion.velocity))
         drawn = draw_form(name, random, moment, scale)
         self._pushes.append((j, name, drawn, moment))
         return truth(name, [model.drives[j]], drawn, FORMS[name].form)
@@ -280,7 +284,8 @@ class LinkagePlant:
             moment = JointMoment(
                 np.array([self.time]), position[j:j + 1], velocity[j:j + 1],
                 self._acceleration[j:j + 1], self._load[j:j + 1], nominal.effort, nominal.speed,
-                nominal.gear_ratio)
+                nominal.gear_ratio,
+                np.interp([self.time], nominal.time, nominal.temperature))
             pushed = float(FORMS[name].force(drawn, moment)[0])
             if pushed * velocity[j] > 0 and 'friction' in name:
                 slope[j] += pushed / velocity[j]

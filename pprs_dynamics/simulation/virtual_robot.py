@@ -17,9 +17,11 @@ from pprs_dynamics.errors import MotionError, WorkspaceError
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.simulation.drive_control import ControlSettings, DriveControl, Note, Setpoint
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
+from pprs_dynamics.simulation.hidden_forces import FrictionTemperature
 from pprs_dynamics.simulation.linkage_plant import LinkagePlant
 from pprs_dynamics.simulation.plant import Plant, PlantSettings, Truth, UnsolvedError
 from pprs_dynamics.simulation.sensors import Measurement, Sensors, SensorSettings
+from pprs_dynamics.simulation.temperatures import read_thermometers
 
 
 class SimulatedRobot:
@@ -216,6 +218,8 @@ class SimulatedRun:
     notes : list of Note
     saturated_steps : (6,) int array
         Time steps that each drive spent at its limit.
+    channels : mapping of str to (N, 6) array
+        What thermometers say, where an effect follows the temperature.
     """
 
     time: Array
@@ -227,6 +231,7 @@ class SimulatedRun:
     effects: list[dict[str, Any]]
     notes: list[Note]
     saturated_steps: np.ndarray
+    channels: Mapping[str, Array]
 
     def platform_motion(self) -> PlatformMotion:
         """Return the true motion in the form that a model takes."""
@@ -282,7 +287,8 @@ def simulate(
                            control=control, sensors=sensors)
     robot.place(reference.position[0], reference.velocity[0])
     samples = len(reference) if duration is None else max(1, round(duration * rate))
-    measured, true = [], []
+    warm = next((one for one in effects if isinstance(one, FrictionTemperature)), None)
+    measured, true, temperatures = [], [], []
     for k in range(samples):
         if k < len(reference):
             robot.command(reference.setpoint(k),
@@ -292,13 +298,17 @@ def simulate(
             raise robot.unsolved
         measured.append(measurement)
         true.append(moment)
+        if warm is not None:
+            temperatures.append(warm.temperature)
         if progress is not None and k % max(1, samples // 100) == 0:
             progress(k / samples)
+    time = np.array([m.time for m in measured])
     return SimulatedRun(
-        np.array([m.time for m in measured]), np.array([m.position for m in measured]),
+        time, np.array([m.position for m in measured]),
         np.array([m.velocity for m in measured]), np.array([m.effort for m in measured]),
         reference, _stacked(true), robot.hidden,
-        list(robot.notes), robot.control.saturated_steps)
+        list(robot.notes), robot.control.saturated_steps,
+        {'temperature': read_thermometers(time, np.array(temperatures))} if temperatures else {})
 
 
 def _stacked(moments: Sequence[Truth | None]) -> Truth | None:

@@ -7,22 +7,16 @@ from __future__ import annotations
 
 import json
 import struct
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
-from ros_processes import executable
+from pprs_command import pprs
 
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.system.output_files import write_text
-
-
-def pprs(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([executable('pprs'), *arguments], capture_output=True, text=True, cwd=cwd,
-                          timeout=120)
 
 
 def png_size(file: Path) -> tuple[int, int]:

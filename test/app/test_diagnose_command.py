@@ -9,7 +9,6 @@ import hashlib
 import html
 import json
 import re
-import subprocess
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from browser import Seen, chromium, needs_browser
-from ros_processes import executable
+from pprs_command import pprs
 
 from benchmarks.hidden.driven_motion import DrivenMotion
 from benchmarks.hidden.prescribed import PrescribedPlant
@@ -30,11 +29,6 @@ from pprs_dynamics.simulation.hidden_effects import draw_effect
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 HIDDEN, RATE = 'coulomb_friction', 250.0
-
-
-def pprs(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([executable('pprs'), *map(str, arguments)], capture_output=True,
-                          text=True, timeout=300, cwd=cwd)
 
 
 def record(path: Path, seed: int, duration: float) -> dict[str, Any]:

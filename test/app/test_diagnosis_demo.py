@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 from before_after import draw_before_after
 from diagnosis_demo import REFUSED, Story
+from pprs_command import pprs
 from rich.console import Console
-from ros_processes import executable
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
@@ -55,10 +55,8 @@ def test_the_error_falls_and_the_secret_is_told_last(tmp_path: Path) -> None:
     assert f'--seed {SEED}' in after
     # On the motion that was never fitted, evaluated here again: the error falls to the noise,
     # which is that of the same robot on the same motion with nothing hidden.
-    subprocess.run(
-        [executable('pprs'), 'simulate', '--output', str(tmp_path / 'clean.mcap'), '--seed',
-         str(SEED), '--path-seed', '1', '--duration', str(DURATION)],
-        check=True, capture_output=True)
+    assert pprs('simulate', '--output', tmp_path / 'clean.mcap', '--seed', SEED, '--path-seed', 1,
+                '--duration', DURATION).returncode == 0
     paper, adopted = (DriveModel.load(model)
                       for model in ('config/paper.yaml', tmp_path / 'adopted.yaml'))
     noise = error_on(paper, tmp_path / 'clean.mcap')
@@ -73,7 +71,7 @@ def test_nothing_is_claimed_where_nothing_is_hidden(tmp_path: Path) -> None:
     run, answer = tmp_path / 'run.mcap', tmp_path / 'why.json'
     for arguments in (['simulate', '--output', run, '--seed', '1', '--duration', '40'],
                       ['diagnose', run, '--json', answer]):
-        subprocess.run([executable('pprs'), *map(str, arguments)], check=True, capture_output=True)
+        assert pprs(*arguments).returncode == 0
     said = json.loads(answer.read_text())
     assert (said['verdict'], said['effects']) == ('adequate', [])
 
@@ -97,9 +95,9 @@ def answer(verdict: str, *effects: str, rivals: list[list[str]] | None = None,
     ({**HIDDEN, 'drives': ['lift_1', 'lift_2']}, answer('effect', 'viscous_friction'),
      'but on lift_1 instead of lift_1, lift_2.'),
     (HIDDEN, answer('unknown', 'viscous_friction'), 'that something unknown remains is wrong.'),
-    (HIDDEN, answer('ambiguous', 'platform_drag', rivals=[['platform_drag', 'viscous_friction']]),
+    (HIDDEN, answer('ambiguous', 'tool_drag', rivals=[['tool_drag', 'viscous_friction']]),
      'among those that this motion cannot tell apart'),
-    (HIDDEN, answer('effect', 'platform_drag'), 'platform_drag was named: that is wrong'),
+    (HIDDEN, answer('effect', 'tool_drag'), 'tool_drag was named: that is wrong'),
     (HIDDEN, answer('adequate'), 'too weak'),
     (HIDDEN, answer('adequate', suspects=('viscous_friction',)), 'was suspected only'),
     (HIDDEN, answer('unknown'), 'something unknown remains'),

@@ -6,19 +6,11 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 from pprs_dynamics.app.report.layouts import foxglove_layout, plotjuggler_layout
 from pprs_dynamics.drives import DRIVES
-
-CONFIG = Path(__file__).parents[2] / 'config'
-
-
-def test_the_files_are_the_layouts_of_the_papers_robot() -> None:
-    assert (CONFIG / 'plotjuggler/compare.xml').read_text() == plotjuggler_layout(DRIVES)
-    assert (CONFIG / 'foxglove/compare.json').read_text() == foxglove_layout(DRIVES)
 
 
 def test_plotjuggler_finds_what_it_looks_for() -> None:

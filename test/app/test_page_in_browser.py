@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import Seen, chromium, needs_browser
+from browser import LEAST_CONTRAST, LEAST_TEXT, READABLE, Seen, chromium, needs_browser
 from made_up_diagnosis import NOISE, made_up_diagnosis, made_up_residuals
 from made_up_pages import made_up_pages
 
@@ -27,42 +27,6 @@ from pprs_dynamics.physics.mechanism.paths import Excitation
 PAGES = ('diagnosis', 'comparison', 'adoption', 'history', 'experiment', 'fleet', 'robot')
 MOST_BYTES = 4_000_000
 FIRST_PAINT = 500.0  # [ms]
-LEAST_CONTRAST, LEAST_TEXT = 4.5, 12.0  # WCAG 2.2 AA; [px]
-# The text that is seen with the least contrast, and with the least size.
-READABLE = '''() => {
-  const light = (colour) => {
-    const [r, g, b] = colour.match(/[\\d.]+/g).slice(0, 3).map((part) => {
-      const c = part / 255;
-      return c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
-    });
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-  };
-  const ground = (node) => {
-    for (let one = node; one; one = one.parentElement) {
-      const colour = getComputedStyle(one).backgroundColor;
-      if (!/, 0\\)$/.test(colour)) return colour;
-    }
-    return 'rgb(255, 255, 255)';
-  };
-  let contrast = 99, size = 99;
-  for (const node of document.querySelectorAll('main *, header *')) {
-    const own = [...node.childNodes].some((one) => one.nodeType === 3 && one.data.trim());
-    if (!own || node.closest('svg, script') || !node.getClientRects().length) continue;
-    const style = getComputedStyle(node);
-    const [a, b] = [light(style.color), light(ground(node))].sort();
-    contrast = Math.min(contrast, (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05));
-    size = Math.min(size, parseFloat(style.fontSize));
-  }
-  for (const button of document.querySelectorAll('.plot .updatemenu-button')) {
-    const [text, box] = ['text', 'rect'].map(
-      (name) => light(getComputedStyle(button.querySelector(name)).fill));
-    contrast = Math.min(contrast, (Math.max(text, box) + 0.05) / (Math.min(text, box) + 0.05));
-  }
-  for (const text of document.querySelectorAll('.plot text, .plot tspan')) {
-    size = Math.min(size, parseFloat(getComputedStyle(text).fontSize));
-  }
-  return [contrast, size];
-}'''
 
 
 @pytest.fixture(scope='module')

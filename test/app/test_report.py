@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 import json
 import re
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +15,9 @@ import matplotlib.image
 import numpy as np
 import pytest
 from browser import Seen, chromium, needs_browser
+from pprs_command import pprs
 from rich.console import Console
 from rich.progress import Progress
-from ros_processes import executable
 
 from pprs_dynamics.app.report.charts import thinned
 from pprs_dynamics.app.report.comparison_figures import worst_spans
@@ -27,11 +26,6 @@ from pprs_dynamics.app.report.terminal import staged_bar
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
-
-
-def pprs(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([executable('pprs'), *map(str, arguments)], capture_output=True,
-                          text=True, timeout=300)
 
 
 @pytest.fixture(scope='module')

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pprs_command import pprs
 from ros_processes import executable
 
 from pprs_dynamics import DriveModel
@@ -47,7 +48,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def pprs(
+def process(
     folder: Path, *arguments: str, redirect: str = '', **variables: str,
 ) -> subprocess.CompletedProcess[bytes]:
     """Run the command in a shell, which closes or redirects streams."""
@@ -63,20 +64,33 @@ COMMANDS = {
     'adopt': ('adopt', 'viscous_friction', 'run.csv', '--output', '{name}.yaml'),
     'history': ('history', 'model.yaml', '--report', '{name}.html'),
     'reproduce': ('reproduce', '--output', '{name}')}
-STREAMS = {
-    'POSIX': {'LC_ALL': 'POSIX'}, 'ascii': {'PYTHONIOENCODING': 'ascii'},
-    'latin-1': {'PYTHONIOENCODING': 'latin-1'}}
 
 
-@pytest.mark.parametrize('stream', STREAMS)
+@pytest.mark.parametrize('stream', ['ascii', 'latin-1'])
 @pytest.mark.parametrize('command', ['info', 'compare', 'reproduce', 'history'])
 def test_a_terminal_that_is_not_utf_8_gets_plain_characters(
     folder: Path, stream: str, command: str,
 ) -> None:
     arguments = [word.format(name=f'{command}-{stream}') for word in COMMANDS[command]]
-    done = pprs(folder, *arguments, PYTHONUTF8='', **STREAMS[stream])
+    done = pprs(*arguments, cwd=folder, encoding=stream)
     assert done.returncode == 0, done.stderr
-    text = done.stdout.decode('latin-1' if stream == 'latin-1' else 'ascii')
+    assert_plain(done.stdout, command)
+
+
+@pytest.mark.parametrize('variables', [{'LC_ALL': 'POSIX'}, {'PYTHONIOENCODING': 'ascii'}],
+                         ids=' '.join)
+@pytest.mark.parametrize('command', ['info', 'compare'])
+def test_an_environment_that_says_so_makes_it_such_a_terminal(
+    folder: Path, variables: dict[str, str], command: str,
+) -> None:
+    arguments = [word.format(name=f'{command}-{"".join(variables)}') for word in COMMANDS[command]]
+    done = process(folder, *arguments, PYTHONUTF8='', **variables)
+    assert done.returncode == 0, done.stderr
+    assert_plain(done.stdout.decode('ascii'), command)
+
+
+def assert_plain(text: str, command: str) -> None:
+    """Assert that nothing was lost to the encoding."""
     assert len(text.splitlines()) >= 1
     assert '?' not in text
     assert '\\u' not in text
@@ -91,22 +105,22 @@ def test_a_terminal_that_is_not_utf_8_gets_plain_characters(
 @pytest.mark.parametrize('command', ['diagnose', 'adopt'])
 def test_work_of_seconds_is_not_lost_to_a_terminal(folder: Path, command: str) -> None:
     arguments = [word.format(name=command) for word in COMMANDS[command]]
-    done = pprs(folder, *arguments, LC_ALL='POSIX', PYTHONUTF8='')
+    done = process(folder, *arguments, LC_ALL='POSIX', PYTHONUTF8='')
     assert done.returncode == 0, done.stderr
     assert '+/-' in done.stdout.decode('ascii')
 
 
 def test_utf_8_terminals_keep_their_characters(folder: Path) -> None:
     for variables in ({'LC_ALL': 'C.UTF-8'}, {'LC_ALL': 'POSIX', 'PYTHONUTF8': '1'}):
-        text = pprs(folder, 'info', 'run.csv', **variables).stdout.decode('utf-8')
+        text = process(folder, 'info', 'run.csv', **variables).stdout.decode('utf-8')
         assert all(character in text for character in '┃│━…')
 
 
 def test_headings_keep_their_units(folder: Path) -> None:
-    info = pprs(folder, 'info', 'run.csv').stdout.decode()
+    info = pprs('info', 'run.csv', cwd=folder).stdout
     for heading in ('position [m]', 'velocity [m/s]', 'effort [N]'):
         assert heading in info
-    compared = pprs(folder, 'compare', 'run.csv').stdout.decode()
+    compared = pprs('compare', 'run.csv', cwd=folder).stdout
     assert 'rms [N]' in compared
 
 
@@ -114,7 +128,7 @@ def test_headings_keep_their_units(folder: Path) -> None:
 def test_closed_streams_do_not_end_the_work(folder: Path, redirect: str) -> None:
     answer = folder / 'closed.json'
     answer.unlink(missing_ok=True)
-    done = pprs(folder, 'info', 'run.csv', '--json', answer.name, redirect=redirect)
+    done = process(folder, 'info', 'run.csv', '--json', answer.name, redirect=redirect)
     assert done.returncode == 0, done.stderr
     assert done.stderr == b''
     # No text of the terminal in a file that took the place of a closed stream.
@@ -127,7 +141,7 @@ def test_a_reader_that_goes_away_does_not_take_the_files_with_it(
 ) -> None:
     answer = folder / 'read.json'
     answer.unlink(missing_ok=True)
-    done = pprs(folder, 'compare', 'run.csv', '--json', answer.name,
+    done = process(folder, 'compare', 'run.csv', '--json', answer.name,
                 redirect=f'{redirect}; test -s {answer.name}')
     assert done.returncode == 0
     assert done.stderr == b''
@@ -137,7 +151,7 @@ def test_a_full_disk_behind_the_text_is_one_sentence_and_the_files_are_there(
     folder: Path,
 ) -> None:
     answer = folder / 'full.json'
-    done = pprs(folder, 'info', 'run.csv', '--json', answer.name, redirect='> /dev/full')
+    done = process(folder, 'info', 'run.csv', '--json', answer.name, redirect='> /dev/full')
     assert done.returncode == 2
     assert done.stderr == b'pprs info: output: No space left on device\n'
     assert json.loads(answer.read_text())
@@ -148,13 +162,13 @@ def test_names_of_files_are_shown_and_written_as_they_are(folder: Path, name: st
     (folder / 'x[').mkdir(exist_ok=True)
     shown = name.replace(UNDECODABLE, 'bad\\xff[m].csv').replace('\n', '\\n')
     shutil.copy(folder / 'run.csv', folder / name)
-    done = pprs(folder, 'info', name, '--json', 'name.json')
+    done = process(folder, 'info', name, '--json', 'name.json')
     assert done.returncode == 0, done.stderr
     assert f'{shown}: ' in done.stdout.decode()
     content = json.loads((folder / 'name.json').read_text(encoding='utf-8'))
     assert content['recordings'][0]['name'] == shown
     page = name.replace('.csv', '.html')
-    done = pprs(folder, 'compare', name, '--report', page, '--json',
+    done = process(folder, 'compare', name, '--report', page, '--json',
                 name.replace('.csv', '.json'))
     assert done.returncode == 0, done.stderr
     assert f'page: {shown.replace(".csv", ".html")}' in done.stdout.decode()
@@ -165,19 +179,19 @@ def test_a_closing_tag_in_a_path_is_no_markup(folder: Path) -> None:
     (folder / 'x[').mkdir(exist_ok=True)
     shutil.copy(folder / 'run.csv', folder / 'x[' / '].csv')
     for command in ('info', 'compare'):
-        done = pprs(folder, command, 'x[/].csv')
+        done = process(folder, command, 'x[/].csv')
         assert done.returncode == 0, done.stderr
-    done = pprs(folder, 'info', 'x[/]none.csv')
+    done = process(folder, 'info', 'x[/]none.csv')
     assert done.returncode == 2
     assert done.stderr.startswith(b'pprs info: x[/]none.csv: ')
 
 
 def test_names_in_the_ledger_and_on_the_page_of_an_adoption(folder: Path) -> None:
     shutil.copy(folder / 'run.csv', folder / UNDECODABLE)
-    done = pprs(folder, 'adopt', 'viscous_friction:slide_2', UNDECODABLE, '--output', 'bad.yaml',
+    done = process(folder, 'adopt', 'viscous_friction:slide_2', UNDECODABLE, '--output', 'bad.yaml',
                 '--report', 'adopt.html', '--json', 'adopt.json')
     assert done.returncode == 0, done.stderr
-    done = pprs(folder, 'history', 'bad.yaml', '--json', 'history.json')
+    done = process(folder, 'history', 'bad.yaml', '--json', 'history.json')
     assert done.returncode == 0, done.stderr
     assert 'bad\\xff[m].csv' in done.stdout.decode()
     steps = json.loads((folder / 'history.json').read_text(encoding='utf-8'))['steps']
@@ -187,17 +201,17 @@ def test_names_in_the_ledger_and_on_the_page_of_an_adoption(folder: Path) -> Non
 def test_a_model_file_of_an_undecodable_name(folder: Path) -> None:
     name = os.fsdecode(b'model\xfe.yaml')
     shutil.copy(folder / 'model.yaml', folder / name)
-    done = pprs(folder, 'history', name, '--report', 'history.html')
+    done = process(folder, 'history', name, '--report', 'history.html')
     assert done.returncode == 0, done.stderr
     assert 'model\\xfe.yaml' in (folder / 'history.html').read_text(encoding='utf-8')
-    done = pprs(folder, 'info', 'run.csv', '--model', os.fsdecode(b'none\xfe.yaml'))
+    done = process(folder, 'info', 'run.csv', '--model', os.fsdecode(b'none\xfe.yaml'))
     assert done.returncode == 2
     assert done.stderr.startswith(b'pprs info: none\\xfe.yaml: no such file')
 
 
 def test_an_unknown_effect_is_one_line(folder: Path) -> None:
     for name in ('nonsense', 'viscous_frictoin', '[/]'):
-        done = pprs(folder, 'adopt', name, 'run.csv', '--output', 'x.yaml')
+        done = process(folder, 'adopt', name, 'run.csv', '--output', 'x.yaml')
         assert done.returncode == 2
         assert done.stderr.count(b'\n') == 1
         assert b'unknown effect' in done.stderr
@@ -222,7 +236,7 @@ def test_unknown_endings_of_outputs_are_refused_with_those_that_are_known(
     folder: Path, arguments: tuple[str, ...],
 ) -> None:
     before = set(folder.iterdir())
-    done = pprs(folder, *arguments)
+    done = process(folder, *arguments)
     assert done.returncode == 2
     last = done.stderr.decode().splitlines()[-1]
     assert f'must end in {OUTPUTS[arguments]}' in last

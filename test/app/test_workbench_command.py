@@ -10,13 +10,12 @@ import http.client
 import json
 import os
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ros_processes import executable
+from pprs_command import pprs
 from workbench_bench import write_hidden
 from workbench_server import workbench
 
@@ -24,6 +23,7 @@ from pprs_dynamics import load_model
 from pprs_dynamics.app.commands import workbench as workbench_command
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench import Session
+from pprs_dynamics.app.workbench.robot_motion import robot_motion
 from pprs_dynamics.app.workbench.server.serve import serve
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.measurement.files.recording import (
@@ -138,8 +138,7 @@ def test_mistakes_of_usage_are_one_line_before_anything_is_served(tmp_path: Path
                             (('--model', 'no.yaml'), 'no.yaml'), ((str(bad),), 'bad.csv'),
                             ((str(bad), str(bad)), 'twice'),
                             (('--host', '0.0.0.0'), 'one address')):
-        done = subprocess.run([executable('pprs'), 'workbench', '--no-browser', *arguments],
-                              capture_output=True, text=True, timeout=60)
+        done = pprs('workbench', '--no-browser', *arguments)
         assert done.returncode == 2, arguments
         assert done.stdout == ''
         assert done.stderr.count('\n') == 1
@@ -165,6 +164,8 @@ def test_a_single_axis_has_the_same_session(tmp_path: Path) -> None:
     assert shown.estimates['drive_spring']['axis.stiffness'].value == pytest.approx(SPRING, rel=0.1)
     assert session.overall().now < 0.5 * session.overall().before
     json.dumps(session.to_dict(), allow_nan=False)
+    drawn = robot_motion(session).skeleton.points
+    assert np.ptp(drawn, axis=0).max() == pytest.approx(np.ptp(position), rel=0.05)
 
 
 def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,8 +24,8 @@ from rclpy.node import Node
 from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-from test_workbench_page import Page
 from workbench_bench import NOISE, write_hidden
+from workbench_page import Page
 from workbench_server import Workbench, workbench
 
 from pprs_dynamics.measurement.files.recording import Recording, read_recording

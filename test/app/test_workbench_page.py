@@ -14,9 +14,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from accessibility import broken_rules
-from browser import chromium, needs_browser
-from test_page_in_browser import LEAST_CONTRAST, LEAST_TEXT, READABLE
+from browser import LEAST_CONTRAST, LEAST_TEXT, READABLE, chromium, needs_browser
 from workbench_bench import write_hidden
+from workbench_page import Page
 from workbench_server import Workbench, workbench
 
 from pprs_dynamics.app.commands.pprs import main
@@ -24,8 +24,6 @@ from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_file import load_model
 
 pytestmark = needs_browser
-PATIENCE = 180_000  # [ms], on a busy machine
-SETTLED = 'bench.state && bench.state.is_settled && bench.curves'
 
 
 @pytest.fixture(scope='module')
@@ -50,47 +48,6 @@ def bench(folder: Path) -> Iterator[Workbench]:
         yield running
 
 
-class Page:
-    """A tab on the workbench, and what it complained about."""
-
-    def __init__(self, browser: Any, bench: Workbench, **options: Any) -> None:
-        self.context = browser.new_context(**{
-            'viewport': {'width': 1500, 'height': 950}, 'bypass_csp': True, **options})
-        self.tab = self.context.new_page()
-        self.tab.set_default_timeout(PATIENCE)
-        self.complaints: list[str] = []
-        self.tab.on('console', self._hear)
-        self.tab.on('pageerror', lambda error: self.complaints.append(str(error)))
-        self.tab.goto(bench.post('/api/invite').json['address'])
-
-    def _hear(self, message: Any) -> None:
-        # The browser tells of every request that was refused; the page says why.
-        if 'the server responded with a status of 400' not in message.text:
-            self.complaints.append(message.text)
-
-    def settled(self) -> dict[str, Any]:
-        self.tab.wait_for_function(SETTLED)
-        found: dict[str, Any] = self.tab.evaluate('bench.state')
-        return found
-
-    def tick(self, name: str) -> dict[str, Any]:
-        """Click a box and wait for all that follows."""
-        before = self.tab.evaluate('bench.settled.length')
-        self.tab.locator(f'#tick-{name}').click()
-        self.tab.wait_for_function(f'bench.settled.length > {before}')
-        return self.settled()
-
-    def mark(self, drive: int, start: float, end: float) -> None:
-        """Drag over a drive's curve, from and to shares of its width."""
-        self.tab.evaluate('window.scrollTo(0, 0)')
-        box = self.tab.locator('#curves .u-over').nth(drive).bounding_box()
-        y = box['y'] + box['height'] / 2
-        self.tab.mouse.move(box['x'] + start * box['width'], y)
-        self.tab.mouse.down()
-        self.tab.mouse.move(box['x'] + end * box['width'], y, steps=4)
-        self.tab.mouse.up()
-
-
 @pytest.fixture
 def page(browser: Any, bench: Workbench) -> Iterator[Page]:
     bench.settled()
@@ -104,6 +61,11 @@ def page(browser: Any, bench: Workbench) -> Iterator[Page]:
     yield found
     assert found.complaints == []
     found.context.close()
+
+
+def parameters(state: dict[str, Any], effect: str) -> dict[str, Any]:
+    (found,) = (one for one in state['effects'] if one['name'] == effect)
+    return {one['key']: one for one in found['parameters']}
 
 
 def errors(state: dict[str, Any]) -> dict[str, float]:
@@ -167,14 +129,23 @@ def test_drives_are_chips_and_values_can_be_typed(page: Page) -> None:
 
 def test_a_shape_is_dragged(page: Page) -> None:
     page.tick('payload_mass')
-    page.tick('stribeck_friction')
-    slider = page.tab.locator('[data-effect=stribeck_friction] input[type=range]').first
-    slider.focus()
+    before = page.tick('stribeck_friction')
+    row = page.tab.locator('[data-effect=stribeck_friction] .parameter').filter(
+        has=page.tab.locator('input[type=range]')).first
+    key = row.locator('label').inner_text()
+    row.locator('input[type=range]').focus()
     for _ in range(5):
         page.tab.keyboard.press('ArrowRight')
     page.tab.wait_for_function('bench.state.effects.some((one) => one.parameters.some('
                                '(parameter) => parameter.is_chosen))')
-    page.settled()
+    after = page.settled()
+    old, new = (parameters(state, 'stribeck_friction') for state in (before, after))
+    assert [name for name, one in new.items() if one['is_chosen']] == [key]
+    assert new[key]['value'] > old[key]['value']
+    # The forces are fitted again around it, and the error follows.
+    forces = [name for name, one in old.items() if not one['is_shape']]
+    assert any(new[name]['value'] != old[name]['value'] for name in forces)
+    assert errors(after) != errors(before)
 
 
 def test_a_mark_says_where_the_error_is_from(page: Page) -> None:

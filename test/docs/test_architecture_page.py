@@ -9,7 +9,7 @@ import re
 
 import pytest
 from documents import PROJECT
-from test_architecture import FLOORS, MAY_USE, PACKAGE, imported_files
+from layers import FOLDERS, MAY_USE, PACKAGE, imported_files
 
 TEXT = (PROJECT / 'docs' / 'architecture.md').read_text(encoding='utf-8')
 JOURNEYS = re.findall(r'^### (.+?)\n\n(.+?)(?=\n###|\Z)', TEXT, re.M | re.S)
@@ -17,22 +17,22 @@ JOURNEYS = re.findall(r'^### (.+?)\n\n(.+?)(?=\n###|\Z)', TEXT, re.M | re.S)
 
 def table(second: str) -> dict[str, list[str]]:
     """Return the rows of the table with that second heading, names in their order."""
-    rows = TEXT.split(f'| room | {second} |\n')[1].splitlines()[1:]
+    rows = TEXT.split(f'| layer | {second} |\n')[1].splitlines()[1:]
     found = {}
     for row in rows:
         if not row.startswith('|'):
             break
-        _, room, names, _ = row.split('|')
-        found[room.strip(' `')] = re.findall(r'`(\w+)`', names)
+        _, layer, names, _ = row.split('|')
+        found[layer.strip(' `')] = re.findall(r'`(\w+)`', names)
     return found
 
 
 def test_the_rule_that_is_stated_is_the_rule_that_is_tested() -> None:
-    assert {room: set(used) for room, used in table('may use').items()} == MAY_USE
-    assert table('folders') == FLOORS
+    assert {layer: set(used) for layer, used in table('may use').items()} == MAY_USE
+    assert table('folders') == FOLDERS
 
 
-def test_every_room_has_its_paragraph_and_no_other_has() -> None:
+def test_every_layer_has_its_paragraph_and_no_other_has() -> None:
     told = re.findall(r'^\*\*`pprs_dynamics/(\w+)`\*\*', TEXT, re.M)
     there = {file.parent.name for file in PACKAGE.glob('*/__init__.py')}
     assert sorted(told) == sorted(there) == sorted(MAY_USE)

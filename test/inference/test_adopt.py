@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import json
-import os
 import resource
 import shutil
 import subprocess
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 from node_bench import bench
+from pprs_command import pprs
 from ros_processes import environment, executable, node_process
 from short_recordings import short_recordings
 
@@ -57,11 +57,6 @@ class Files:
     text: str
     recordings: tuple[Recording, Recording]
     diagnosis: Diagnosis
-
-
-def pprs(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([executable('pprs'), *map(str, arguments)], capture_output=True,
-                          text=True, env={**os.environ, 'COLUMNS': '200'}, **options)
 
 
 @pytest.fixture(scope='module')
@@ -127,7 +122,8 @@ def test_the_ledger_says_what_from_which_data_and_how_sure(files: Files) -> None
 
 def test_adopting_twice_changes_nothing(files: Files) -> None:
     output = files.folder / 'again.yaml'
-    done = pprs('adopt', HIDDEN, files.first, '--model', files.new, '--output', output)
+    done = pprs('adopt', HIDDEN, files.first, '--model', files.new, '--output', output,
+                columns=200)
     assert done.returncode == 1
     assert 'in the model already' in done.stdout
     assert not output.exists()
@@ -288,8 +284,10 @@ def test_a_full_disk_is_one_line_and_leaves_both_files_whole(
     old, output = tmp_path / 'old.yaml', tmp_path / 'output.yaml'
     shutil.copy(files.new, old)
     output.write_text('what was there')
-    done = pprs('history', old, '--undo', '--output', output, preexec_fn=lambda: (
-        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))))
+    done = subprocess.run(
+        [executable('pprs'), 'history', str(old), '--undo', '--output', str(output)],
+        capture_output=True, text=True, preexec_fn=lambda: (
+            resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))))
     assert done.returncode == 2
     assert 'cannot be written' in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1

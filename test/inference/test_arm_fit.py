@@ -134,10 +134,10 @@ def test_points_of_bodies_begin_at_the_description(tmp_path: Path) -> None:
 
 
 def test_tolerances_of_other_models_are_fitted(tmp_path: Path) -> None:
-    from pprs_dynamics import AxisModel
+    from pprs_dynamics import ArmModel
     from pprs_dynamics.measurement.files.recording import Recording
 
-    given = AxisModel.load()
+    given = ArmModel.load('config/single_axis.yaml')
     open_values = {**given.values, 'tolerances.axis.mass': 0.2, 'tolerances.axis.coulomb': 0.3}
     real = build_model({**given.values, 'axis.mass': 100.0, 'axis.coulomb': 22.0})
     time = np.arange(0, 20, 0.002)

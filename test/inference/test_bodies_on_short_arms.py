@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from planar_arm import planar_arm
 
 from pprs_dynamics import JointMotion
 from pprs_dynamics.app.report.adoption_report import parameter_rows
@@ -18,32 +19,9 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model, load_model
+from pprs_dynamics.physics.model.model_file import build_model
 
-LINK = '''<link name="{name}"><inertial><origin xyz="0 0 -0.25"/><mass value="0.6"/>
-<inertia ixx="0.01" iyy="0.01" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="j{number}" type="revolute"><parent link="{parent}"/><child link="{name}"/>
-<origin xyz="0 0 {at}"/><axis xyz="0 1 0"/><limit lower="-20" upper="20" effort="80"
-velocity="30"/></joint>'''
 NOISE = 0.05  # [N m]
-
-
-def planar_arm(folder: Path, joints: int) -> ForceModel:
-    """Return an arm whose axes are all parallel; its tool frame is on the last of them."""
-    names = ['base', *(f'rod_{k}' for k in range(1, joints + 1))]
-    links = ''.join(LINK.format(name=names[k], number=k, parent=names[k - 1],
-                                at=0 if k == 1 else -0.5) for k in range(1, joints + 1))
-    (folder / 'arm.urdf').write_text(f'<robot name="arm"><link name="base"/>{links}</robot>')
-    listed = ', '.join(f'j{k}' for k in range(1, joints + 1))
-    (folder / 'arm.yaml').write_text(f'''/**:
-  ros__parameters:
-    arm: {{urdf: arm.urdf, base: base, tool: {names[-1]}, joints: [{listed}]}}
-    friction:
-      viscous: [{", ".join(["0.1"] * joints)}]
-      coulomb: [{", ".join(["0.3"] * joints)}]
-      reversal_velocity: 0.01
-''')
-    return load_model(folder / 'arm.yaml')
 
 
 def record(model: ForceModel, seed: int = 0, pace: float = 1.0) -> Recording:

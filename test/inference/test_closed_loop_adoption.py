@@ -9,14 +9,13 @@ of a model: the commands that went over the topics are executed once more in sim
 
 from __future__ import annotations
 
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 from closed_loop import RATE, Case, Tracking, execute, run_case
-from ros_processes import executable
+from pprs_command import pprs
 
 from pprs_dynamics.measurement.files.recording import write_recording
 
@@ -47,9 +46,7 @@ def runs(ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Runs:
     # Where commands come late, the error is theirs, and of the recording little is left.
     on_time = execute(hidden, first.commands)
     write_recording(folder / 'run.mcap', on_time.recording('run'))
-    done = subprocess.run(
-        [executable('pprs'), 'adopt', HIDDEN, str(folder / 'run.mcap'), '--output',
-         str(folder / 'adopted.yaml')], capture_output=True, text=True)
+    done = pprs('adopt', HIDDEN, folder / 'run.mcap', '--output', folder / 'adopted.yaml')
     assert done.returncode == 0, done.stdout + done.stderr
     adopted = Case('adopted', 'friction', (HIDDEN,), folder / 'adopted.yaml')
     second = _run_without_gaps(adopted, ros_domain, folder)

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,11 +15,11 @@ from typing import Any
 import made_up_arm as arm
 import numpy as np
 import pytest
-from ros_processes import executable
+from pprs_command import pprs
 from short_recordings import short_recordings
 
 from benchmarks.hidden import recordings
-from pprs_dynamics import DriveModel
+from pprs_dynamics import ArmModel, DriveModel, JointMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.residuals.conventions import find_mistakes
@@ -28,15 +27,13 @@ from pprs_dynamics.inference.residuals.mistakes import OtherReading, columns_lin
 from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
 from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
-from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.model.axis_model import AxisModel, AxisMotion
 from pprs_dynamics.physics.model.model_file import build_model, load_model
 from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / 'docs'
 MODEL = DriveModel.load()
-AXIS = AxisModel.load()
+AXIS = ArmModel.load('config/single_axis.yaml')
 RATE, DURATION = 250.0, 10.0
 NOISE = 0.05  # [N]
 Arrays = tuple[Array, Array, Array, Array]
@@ -60,7 +57,7 @@ def axis() -> Arrays:
     rate = 2 * np.pi * 0.4
     position, velocity = 0.1 * np.sin(rate * time), 0.1 * rate * np.cos(rate * time)
     acceleration = -0.1 * rate ** 2 * np.sin(rate * time)
-    effort = AXIS.drive_forces(AxisMotion(position, velocity, acceleration, time[:, 0])).total
+    effort = AXIS.drive_forces(JointMotion(position, velocity, acceleration, time[:, 0])).total
     return time[:, 0], position, velocity, effort + rng.normal(0, 1.0, effort.shape)
 
 
@@ -258,21 +255,18 @@ def test_commands_say_it_before_they_compare(tmp_path: Path) -> None:
     write_recording(tmp_path / 'minus.csv', recording(scaled(effort=-1.0)(robot())))
     write_recording(tmp_path / 'mm.csv', recording(scaled(motion=1e3)(robot())))
     for command in (('info',), ('compare', '--as-it-is')):
-        done = subprocess.run([executable('pprs'), *command, 'minus.csv'], cwd=tmp_path,
-                              capture_output=True, text=True, timeout=100)
+        done = pprs(*command, 'minus.csv', cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         said = ' '.join(done.stdout.split())
         assert 'the effort of all drives looks like minus what the model says' in said
         assert 'nothing wrong found' not in said
-    done = subprocess.run([executable('pprs'), 'info', 'mm.csv'], cwd=tmp_path,
-                          capture_output=True, text=True, timeout=100)
+    done = pprs('info', 'mm.csv', cwd=tmp_path)
     assert 'look like millimetres' in ' '.join(done.stdout.split())
     # No mechanism follows such positions: the sentence is about their unit, not about a pose.
     for command in (('compare', 'mm.csv'), ('diagnose', 'mm.csv', '--validate', 'minus.csv'),
                     ('adopt', 'viscous_friction', 'mm.csv', '--output', 'x.yaml'),
                     ('next-experiment', 'mm.csv', '--output', 'x.csv')):
-        done = subprocess.run([executable('pprs'), *command], cwd=tmp_path, capture_output=True,
-                              text=True, timeout=100)
+        done = pprs(*command, cwd=tmp_path)
         assert done.returncode == 1
         scales = ', '.join(f'{drive}: {{position_scale: 0.001}}' for drive in DRIVES)
         stopped = (f'pprs {command[0]}: mm.csv: the positions of all drives look like '

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ros_processes import executable
+from pprs_command import pprs
 
 from pprs_dynamics.inference.adoption.loop import adopt_all
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
@@ -38,9 +38,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def pprs(folder: Path, *arguments: str) -> dict[str, object]:
-    done = subprocess.run([executable('pprs'), *arguments, '--model', str(MODEL), '--json',
-                           'result.json'], cwd=folder, capture_output=True, text=True, timeout=400)
+def result_of(folder: Path, *arguments: str) -> dict[str, object]:
+    done = pprs(*arguments, '--model', MODEL, '--json', 'result.json', cwd=folder)
     assert done.returncode == 0, done.stderr
     found: dict[str, object] = json.loads((folder / 'result.json').read_text())
     return found
@@ -70,7 +69,7 @@ def test_friction_by_direction_lowers_the_error_on_both_runs_as_published() -> N
 
 
 def test_compare_tells_the_published_error(folder: Path) -> None:
-    found = pprs(folder, 'compare', 'DATA_EMPS.csv')
+    found = result_of(folder, 'compare', 'DATA_EMPS.csv')
     assert found['overall']['relative'] == pytest.approx(0.041, abs=0.001)  # type: ignore[index]
 
 

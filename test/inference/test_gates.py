@@ -20,7 +20,7 @@ from made_up_diagnosis import (
     white_noise,
 )
 
-from pprs_dynamics import AxisModel, DriveModel
+from pprs_dynamics import ArmModel, DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption import objections
 from pprs_dynamics.inference.adoption.request import EffectRequest
@@ -28,8 +28,8 @@ from pprs_dynamics.inference.regression.joint_fit import JointFit
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.paired_errors import (
     BLOCKS,
-    block_gains,
-    certainty,
+    PairedGain,
+    paired_gain,
     rms,
     rms_by_drive,
 )
@@ -46,10 +46,10 @@ WITH_EFFECT = build_model({**PLAIN.values, 'effects.active': ['payload_mass'],
                            'effects.payload_mass.mass': 0.1})
 
 
-def gains(mean_in_errors: float) -> np.ndarray:
-    """Return gains of ten blocks whose mean is so many of its standard errors."""
+def gain(in_errors: float) -> PairedGain:
+    """Return a gain over ten blocks that is so many of its standard errors."""
     spread = np.tile([-1.0, 1.0], 5)
-    return spread + mean_in_errors * spread.std(ddof=1) / 10 ** 0.5
+    return PairedGain(spread + in_errors * spread.std(ddof=1) / 10 ** 0.5, np.full(10, 1e-3))
 
 
 # --- held-out errors ------------------------------------------------------------------------------
@@ -58,13 +58,13 @@ def gains(mean_in_errors: float) -> np.ndarray:
 @pytest.mark.parametrize(('model', 'asked'), [(PLAIN, 1.0), (WITH_EFFECT, 2.0)])
 def test_a_held_out_error_must_fall_beyond_its_uncertainty(model: Any, asked: float) -> None:
     def said(sure: float, after: float = 0.9) -> list[str]:
-        return objections.of_held_out_error(1.0, after, gains(sure), model, 'the recordings')
+        return objections.of_held_out_error(1.0, after, gain(sure), model, 'the recordings')
 
     assert said(asked + 0.01) == []
     # It falls, but blocks disagree by more than it does.
     refused, = said(asked - 0.01)
     assert refused == ('the error on the recordings falls from 1 to 0.9 N, which is '
-                       f'{asked - 0.01:.2g} standard errors over blocks, must be more than '
+                       f'{asked - 0.01:.2g} standard errors, must be more than '
                        f'{asked:g}')
     # It does not fall, however sure the whitened gain.
     for after in (1.0, 1.1):
@@ -73,14 +73,34 @@ def test_a_held_out_error_must_fall_beyond_its_uncertainty(model: Any, asked: fl
                            'after')
 
 
-def test_certainty_is_the_mean_in_its_standard_errors() -> None:
+def test_of_blocks_alike_the_certainty_is_the_mean_in_its_standard_errors() -> None:
     values = np.array([1.0, 2.0, 4.0, 5.0])
     # Mean 3, deviation sqrt(10 / 3), four of them.
-    assert certainty(values) == pytest.approx(3 / (np.sqrt(10 / 3) / 2))
-    assert certainty(np.full(5, 2.0)) == np.inf
-    assert certainty(np.full(5, -2.0)) == -np.inf
-    # A standard error below one counts as well.
-    assert certainty(values / 100) == pytest.approx(certainty(values))
+    found = PairedGain(values, np.full(4, 0.1))
+    assert found.certainty == pytest.approx(3 / (np.sqrt(10 / 3) / 2))
+    # As far as noise alone does not make more of it.
+    assert PairedGain(np.full(5, 2.0), np.full(5, 2.0)).certainty == pytest.approx(10 ** 0.5 / 2)
+    assert PairedGain(np.full(5, -2.0), np.full(5, 2.0)).certainty < 0
+    assert PairedGain(np.zeros(5), np.zeros(5)).certainty == 0
+
+
+@pytest.mark.parametrize('blocks', [1, 2, 10])
+@pytest.mark.parametrize('is_there', [True, False])
+def test_certainty_is_in_standard_errors_wherever_an_effect_shows(
+        blocks: int, is_there: bool) -> None:
+    """Of recordings with and without an effect of known force, it has a deviation of one."""
+    rng = np.random.default_rng(blocks)
+    force = np.zeros((10, 200))
+    force[:blocks] = rng.normal(size=(blocks, 200))
+    force *= 6 / np.linalg.norm(force)
+    found = []
+    for _ in range(400):
+        error = rng.normal(size=force.shape) + is_there * force
+        found.append(PairedGain(np.sum(error ** 2 - (error - force) ** 2, axis=1),
+                                np.sum(force ** 2, axis=1)).certainty)
+    # |f|^2 over the deviation 2 |f| of 2 noise . f.
+    assert np.mean(found) == pytest.approx(3 if is_there else -3, abs=0.4)
+    assert 0.75 < np.std(found) < 1.1
 
 
 def residuals_of(error: np.ndarray) -> Residuals:
@@ -107,25 +127,28 @@ def test_a_block_gains_what_an_error_in_it_loses_over_the_noise() -> None:
         one[99:, 2] = np.nan
     before, after = residuals_of(error), residuals_of(noise)
     noises = {'drive_0': white_noise(), 'drive_1': white_noise(), 'drive_2': white_noise()}
-    found = block_gains(before, after, noises)
-    assert found.shape == (BLOCKS,)
+    found = paired_gain(before, after, noises)
+    assert found.gains.shape == found.sizes.shape == (BLOCKS,)
     expected = float(np.sum(error[400:600, 1] ** 2 - noise[400:600, 1] ** 2)) / 0.05 ** 2
-    assert found[2] == pytest.approx(expected, rel=1e-6)
-    assert np.delete(found, 2) == pytest.approx(np.zeros(BLOCKS - 1), abs=1e-6)
+    assert found.gains[2] == pytest.approx(expected, rel=1e-6)
+    size = np.sum((error - noise)[400:600, 1] ** 2) / 0.05 ** 2
+    assert found.sizes[2] == pytest.approx(size, rel=1e-6)
+    for one in (found.gains, found.sizes):
+        assert np.delete(one, 2) == pytest.approx(np.zeros(BLOCKS - 1), abs=1e-6)
     # Both ways, and without a drive whose noise is not known.
-    assert block_gains(after, before, noises) == pytest.approx(-found)
+    assert paired_gain(after, before, noises).gains == pytest.approx(-found.gains)
     del noises['drive_0']
-    assert block_gains(before, after, noises) == pytest.approx(found)
+    assert paired_gain(before, after, noises).gains == pytest.approx(found.gains)
     del noises['drive_1']
-    assert block_gains(before, after, noises) == pytest.approx(np.zeros(BLOCKS))
+    assert paired_gain(before, after, noises).gains == pytest.approx(np.zeros(BLOCKS))
 
 
 @pytest.mark.parametrize('samples', [99, 100])
 def test_a_drive_counts_from_a_hundred_samples_on(samples: int) -> None:
     error = np.full((2000, 1), np.nan)
     error[:samples] = np.random.default_rng(2).normal(size=(samples, 1))
-    found = block_gains(residuals_of(error), residuals_of(0.5 * error), {'drive_0': white_noise()})
-    assert bool(found.sum() > 0) is (samples == 100)
+    found = paired_gain(residuals_of(error), residuals_of(0.5 * error), {'drive_0': white_noise()})
+    assert bool(found.gains.sum() > 0) is (samples == 100)
 
 
 # --- what else speaks against an effect -----------------------------------------------------------
@@ -135,8 +158,9 @@ def fit(effect: str, drives: tuple[str, ...] | None = ('lift_2',), evidence: flo
         own_share: float = 1.0, parameters: dict[str, Estimate] | None = None,
         model: Any = PLAIN) -> Any:
     """Return what the gates look at of a fit."""
-    return SimpleNamespace(request=EffectRequest(CATALOGUE[effect], drives), drives=drives,
-                           evidence=evidence, own_share=own_share, parameters=parameters or {},
+    return SimpleNamespace(request=EffectRequest(model.bound(CATALOGUE[effect]), drives),
+                           drives=drives, evidence=evidence, own_share=own_share,
+                           parameters=parameters or {},
                            model=model, plain=model, nothing_left=())
 
 
@@ -272,7 +296,7 @@ def test_what_is_no_friction_does_not_push() -> None:
 
 
 def test_friction_in_joints_must_not_give_power_to_the_robot() -> None:
-    one = fit('revolute_friction', None, parameters={'torque': Estimate(-1.0, 0.1, 'N m')})
+    one = fit('joint_friction', None, parameters={'revolute.torque': Estimate(-1.0, 0.1, 'N m')})
     assert objections.of_physics(one, friction_residuals(0.09)) == []
     refused, = objections.of_physics(one, friction_residuals(0.2))
     assert refused.endswith('the joints would give power back in 20% of the moving time')
@@ -396,5 +420,6 @@ def test_an_adopted_effect_leaves_as_much_as_one_that_is_found() -> None:
 
 
 def test_an_axis_has_units_too() -> None:
-    assert 'N' in objections.of_held_out_error(1.0, 2.0, gains(3), AxisModel.load(), 'x')[0]
+    model = ArmModel.load('config/single_axis.yaml')
+    assert 'N' in objections.of_held_out_error(1.0, 2.0, gain(3), model, 'x')[0]
     assert DRIVES[4] == 'lift_2'

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pprs_dynamics import ArmModel, JointMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.possible import why_impossible, why_nothing
@@ -16,21 +17,20 @@ from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
-from pprs_dynamics.physics.model.axis_model import AxisModel, AxisMotion
 from pprs_dynamics.physics.model.model_file import build_model
 
-MODEL = AxisModel.load()
+MODEL = ArmModel.load('config/single_axis.yaml')
 MASS, VISCOUS, COULOMB = (MODEL.values[f'axis.{key}'] for key in ('mass', 'viscous', 'coulomb'))
 TIME = np.arange(0, 20, 0.005)
 
 
-def motion() -> AxisMotion:
+def motion() -> JointMotion:
     q = np.zeros((3, len(TIME), 1))
     for rate, size in ((0.2, 0.1), (0.5, 0.05), (1.3, 0.01)):
         w = 2 * np.pi * rate
         q[:, :, 0] += size * np.array([np.sin(w * TIME), w * np.cos(w * TIME),
                                        -w * w * np.sin(w * TIME)])
-    return AxisMotion(*q, TIME)
+    return JointMotion(*q, TIME)
 
 
 def recorded(effort: Array) -> Recording:

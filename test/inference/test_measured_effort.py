@@ -18,7 +18,7 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 
-from pprs_dynamics import DriveModel
+from pprs_dynamics import ArmModel, DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
@@ -30,7 +30,6 @@ from pprs_dynamics.inference.residuals.measured_effort import (
 )
 from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.axis_model import AxisModel, AxisMotion
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model, load_model
 
@@ -91,7 +90,8 @@ def platform_run() -> Run:
 
 
 def axis_run(gravity: float) -> Run:
-    model = build_model({**AxisModel.load().values, 'axis.gravity': gravity})
+    given = ArmModel.load('config/single_axis.yaml').values
+    model = build_model({**given, 'axis.gravity': gravity})
     time = np.arange(0, DURATION, 1 / RATE)
     q = np.zeros((3, len(time), 1))
     for rate, size in ((0.2, 0.1), (0.5, 0.05), (1.3, 0.01)):
@@ -100,7 +100,7 @@ def axis_run(gravity: float) -> Run:
                                   -w * w * np.sin(w * time))):
             q[k, :, 0] += size * part
     rest = np.zeros_like(q[0])
-    return run_of(model, AxisMotion(*q, time), AxisMotion(q[0], rest, rest, time))
+    return run_of(model, JointMotion(*q, time), JointMotion(q[0], rest, rest, time))
 
 
 MACHINES = {'arm': arm_run, 'platform': lambda folder: platform_run(),
@@ -210,12 +210,12 @@ def test_effort_kind_says_that_efforts_are_currents(tmp_path: Path) -> None:
     read = [read_recording(tmp_path / 'run.csv', one.recorded) for one in (run.model, model)]
     np.testing.assert_allclose(read[1].effort, read[0].effort * (2.0, 3.0, 4.0))
     with pytest.raises(ModelError, match='only an arm and a robot with loops have a gain'):
-        build_model({**AxisModel.load().values, 'effort_kind': 'current'})
+        build_model({**ArmModel.load('config/single_axis.yaml').values, 'effort_kind': 'current'})
 
 
 def test_another_kind_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r'effort_kind is .*torque.*, must be one of measured, '):
-        build_model({**AxisModel.load().values, 'effort_kind': 'torque'})
+        build_model({**ArmModel.load('config/single_axis.yaml').values, 'effort_kind': 'torque'})
 
 
 def test_commands_stop_or_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

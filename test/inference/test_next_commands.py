@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from made_up_arm import motion, real_arm
-from test_bodies_on_short_arms import planar_arm
+from planar_arm import planar_arm
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import _parser

@@ -6,13 +6,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ros_processes import executable
+from pprs_command import pprs
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
@@ -343,6 +342,11 @@ def test_a_design_that_cannot_separate_says_so(model: DriveModel) -> None:
     told = experiment_of(question, found)
     assert told.separates == ()
     assert told.to_dict()['does_not_separate'] == [['coulomb_friction', 'load_friction']]
+    # Friction by load grows with a mass, a tenth of the platform's with its load: no motion needed.
+    moved = model.values['masses.platform'] + model.values['masses.payload']
+    assert told.load == pytest.approx(0.1 * moved, rel=0.35)
+    assert f'the same motion once more with {told.load:g} kg more' in told.text
+    assert told.to_dict()['told_by_load'] == [['coulomb_friction', 'load_friction']]
     assert 'hardly tell coulomb_friction from load_friction' in told.text
     # Thirty thousand times the effect is told from its rival.
     strong = [replace(one, truth=3e4 * one.truth) for one in both]
@@ -370,7 +374,7 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
 
     adopted = fitted('coulomb_friction', 'force')
     ranking = Ranking.of(fits, Search(fits), adopted)
-    assert ranking.kept is adopted
+    assert ranking.reported is adopted
     assert question_after(ranking, []).kind == 'estimate'
     free = fitted('asymmetric_friction', 'force_forward', 'force_backward')
     other = fitted('load_friction', 'coefficient')
@@ -399,14 +403,10 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
 
 # The command.
 
-def pprs(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([executable('pprs'), 'next-experiment', *map(str, arguments)],
-                          capture_output=True, text=True, timeout=300, cwd=cwd)
-
-
 def test_commission_writes_poses_json_and_page(tmp_path: Path) -> None:
-    done = pprs('--purpose', 'commission', '--output', 'first.csv', '--duration', '5', '--json',
-                'first.json', '--report', 'first.html', '--velocity', '0.2', cwd=tmp_path)
+    done = pprs('next-experiment', '--purpose', 'commission', '--output', 'first.csv',
+                '--duration', '5', '--json', 'first.json', '--report', 'first.html',
+                '--velocity', '0.2', cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     motion = read_poses(tmp_path / 'first.csv', 100.0)
     assert motion.time is not None
@@ -442,7 +442,7 @@ def test_commission_writes_poses_json_and_page(tmp_path: Path) -> None:
 def test_mistakes_are_told_in_one_line(
     tmp_path: Path, arguments: tuple[str, ...], sentence: str,
 ) -> None:
-    done = pprs(*arguments, cwd=tmp_path)
+    done = pprs('next-experiment', *arguments, cwd=tmp_path)
     assert done.returncode == 2
     assert sentence in done.stderr
     assert len(done.stderr.splitlines()) == 1

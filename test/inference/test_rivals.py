@@ -8,13 +8,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pprs_dynamics import AxisModel
+from pprs_dynamics import ArmModel
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose, rival_effects
 from pprs_dynamics.inference.diagnosis.quantities import in_unit
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.three_pprs.robot import AXIS
+from pprs_dynamics.physics.model.robot_block import AXIS
 
 MASS, VISCOUS, COULOMB, WIDTH = 20.0, 40.0, 6.0, 0.001
 SPRING, OMEGA = 55.0, 2 * np.pi * 0.5  # [N/m], [rad/s]
@@ -30,7 +30,7 @@ def ambiguous() -> Diagnosis:
              + SPRING * q + NOISE * np.random.default_rng(3).standard_normal(len(time)))
     model = build_model({'axis.mass': MASS, 'axis.viscous': VISCOUS, 'axis.coulomb': COULOMB,
                          'axis.offset': 0.0, 'friction.reversal_velocity': WIDTH})
-    assert isinstance(model, AxisModel)
+    assert isinstance(model, ArmModel)
     return diagnose(model, [Recording.from_arrays('sine', time, q[:, None], None, force[:, None],
                                                   (AXIS,))])
 

@@ -6,13 +6,14 @@
 from __future__ import annotations
 
 import ast
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pprs_dynamics import AxisModel, DriveModel
+from pprs_dynamics import ArmModel, DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.regression import design as design_module
 from pprs_dynamics.inference.regression.design import Design
@@ -28,13 +29,18 @@ from pprs_dynamics.inference.search.fitted_model import (
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.ranking import select
+from pprs_dynamics.inference.search.relinearisation import (
+    ExactSet,
+    next_operating_point,
+    search_around_fitted,
+)
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.three_pprs.robot import AXIS
+from pprs_dynamics.physics.model.robot_block import AXIS
 
 AXIS_VALUES = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0,
                'friction.reversal_velocity': 0.001}
@@ -50,15 +56,15 @@ def axis_recording(hidden: dict[str, dict[str, float]], seed: int, noise: float 
     values = {f'effects.{name}.{AXIS}.{key}': value for name, block in hidden.items()
               for key, value in block.items()}
     model = build_model({**AXIS_VALUES, 'effects.active': list(hidden), **values})
-    assert isinstance(model, AxisModel)
+    assert isinstance(model, ArmModel)
     rng = np.random.default_rng(seed)
     time = np.arange(0, 20, 0.002)
     omega = 2 * np.pi * np.array([0.21, 0.37, 0.83])[:, None]
     phase = omega * time + rng.uniform(0, 2 * np.pi, (3, 1))
     size = np.array([0.08, 0.04, 0.015])[:, None]
     q = (size * np.sin(phase)).sum(0)[:, None]
-    from pprs_dynamics import AxisMotion
-    motion = AxisMotion(q, (size * omega * np.cos(phase)).sum(0)[:, None],
+    from pprs_dynamics import JointMotion
+    motion = JointMotion(q, (size * omega * np.cos(phase)).sum(0)[:, None],
                         -(size * omega ** 2 * np.sin(phase)).sum(0)[:, None], time=time)
     force = model.measured(model.drive_forces(motion)).total
     return Recording.from_arrays('axis', time, q, None,
@@ -79,10 +85,7 @@ def small_catalogue(monkeypatch: pytest.MonkeyPatch) -> None:
       'effort_gain': {'gain': 0.05}}, 3),
     ({'quadratic_friction': {'coefficient': 30.0}, 'drive_spring': {
         'stiffness': 20.0, 'position': -0.05}}, 4)])
-def test_the_search_ends_at_the_best_of_all_sets(
-        hidden: dict, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    # All sets within one design, those that would be relinearised around, too.
-    monkeypatch.setattr(Search, 'is_beyond_point', False)
+def test_the_search_ends_at_the_best_of_all_sets(hidden: dict, seed: int) -> None:
     design = Design.of(build_model(AXIS_VALUES), [axis_recording(hidden, seed)])
     search = Search(FittedSets(design, DECISIONS))
     found = search.run()
@@ -146,7 +149,7 @@ def names(found: CandidateSet) -> list[str]:
 def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects: dict) -> None:
     recording = recording_of(effects)
     ranking = select(MODEL, [recording], DECISIONS)
-    found, last = ranking.kept, ranking.last
+    found, last = ranking.reported, ranking.last
     assert names(found) == sorted(effects)
     # Around the last point the linear forces are those of the model that is handed on.
     exact = exact_forces(last.design, fitted_model(last, found))
@@ -159,7 +162,7 @@ def test_without_an_effect_that_bent_the_columns_the_search_begins_again() -> No
     ranking = select(MODEL, [recording_of({
         'time_delay': delayed, 'stribeck_friction': {'lift_1': {'force': 1.0, 'velocity': 0.02}}})],
         DECISIONS)
-    delay, stribeck = (next(one for one in ranking.kept.effects if one.name == name)
+    delay, stribeck = (next(one for one in ranking.reported.effects if one.name == name)
                        for name in ('time_delay', 'stribeck_friction'))
     without = ranking.less(delay)
     assert without.refuted == {(delay.effect, d) for d in range(6)}
@@ -170,44 +173,73 @@ def test_without_an_effect_that_bent_the_columns_the_search_begins_again() -> No
     # One that bends none takes along what paid beside it, and the search stands.
     simpler = ranking.less(stribeck)
     assert simpler.last is ranking.last
-    assert names(simpler.kept) == ['time_delay']
+    assert names(simpler.reported) == ['time_delay']
 
 
 TILTED = EffectCandidate.of([Component.of(CATALOGUE['base_tilt'], None, {}, ('x', 'y'))])
 
 
-@pytest.mark.parametrize(('tilt', 'is_far'), [(0.02, False), (0.9, True)])
-def test_a_set_is_far_where_exact_forces_leave_more_than_linear_ones(
-        tilt: float, is_far: bool) -> None:
-    recording = recording_of({'base_tilt': {'x': tilt, 'y': 0.0}})
-    fits = FittedSets(Design.of(MODEL, [recording]), DECISIONS)
-    found = fits.evaluate((TILTED,))
-    assert names(found) == ['base_tilt']
-    assert relinearisation._is_far(fits, found) is is_far
+def test_what_a_set_costs_by_its_exact_forces_does_not_depend_on_where_it_was_found() -> None:
+    fits = FittedSets(Design.of(MODEL, [recording_of({'base_tilt': {'x': 0.1, 'y': -0.05}})]),
+                      DECISIONS)
+    tilted = fits.evaluate((TILTED,))
+    # Around a model with a wrench and a delay, the linear cost is another.
+    point = next_operating_point(fits, fits.evaluate(tuple(
+        EffectCandidate.of([Component.of(CATALOGUE[name], drive, shape, coefficients)])
+        for name, drive, shape, coefficients in (
+            ('external_wrench', None, {}, CATALOGUE['external_wrench'].variants[-1]),
+            ('time_delay', 0, {'delay': 0.01}, ())))))
+    assert point is not None
+    elsewhere = FittedSets(fits.design.around(point), DECISIONS, fits.regression.error_scale)
+    there = elsewhere.evaluate((TILTED,))
+    assert abs(there.total - tilted.total) > 3
+    costs = [ExactSet.of(*one).cost for one in ((fits, tilted), (elsewhere, there))]
+    assert costs[0] == pytest.approx(costs[1], abs=1)
+    # That of the true set is below its linear cost, of which tilts by 6 degrees are no small part.
+    assert costs[0] < tilted.total
 
 
-def test_a_search_that_is_far_is_not_gone_on_from(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_relinearised_set_is_on_the_drives_where_it_costs_least() -> None:
+    hidden = {drive: {'zero': 0.004} for drive in DRIVES[:2]}
+    fits = FittedSets(Design.of(MODEL, [recording_of({'homing_error': hidden})]), DECISIONS)
+    zeros = [Component.of(CATALOGUE['homing_error'], d, {}, CATALOGUE['homing_error'].variants[0])
+             for d in range(3)]
+    for drives in ((0,), (0, 1, 2)):
+        found = fits.evaluate((EffectCandidate.of(zeros[d] for d in drives),))
+        assert ExactSet.of(fits, found).found.effects[0].drives == (0, 1)
+
+
+def test_what_costs_least_by_exact_forces_is_the_best_whatever_its_linear_cost(
+        monkeypatch: pytest.MonkeyPatch) -> None:
     recording = recording_of({'base_tilt': {'x': 0.05, 'y': 0.0}})
     first = Search(FittedSets(Design.of(MODEL, [recording]), DECISIONS))
-    best = first.run()
-    search, found = relinearisation.around_fitted(first, best, lambda share: None)
+    search, found, _ = search_around_fitted(first, lambda share: None)
     assert search is not first
     assert names(found) == ['base_tilt']
-    monkeypatch.setattr(relinearisation, '_is_far', lambda fits, found: True)
-    assert relinearisation.around_fitted(first, best, lambda share: None) == (first, best)
+    # Were all but the empty set dear by their exact forces, nothing would be found.
+    made = ExactSet.of
+    monkeypatch.setattr(ExactSet, 'of', lambda fits, found: replace(
+        made(fits, found), cost=float(len(found.candidates))))
+    monkeypatch.setattr(relinearisation, '_shortlist', lambda fits, margin: [
+        fits.evaluate(()), fits.evaluate((TILTED,))])
+    first = Search(FittedSets(Design.of(MODEL, [recording]), DECISIONS))
+    search, found, exact = search_around_fitted(first, lambda share: None)
+    assert names(found) == []
+    assert search is first
+    assert exact == {frozenset(): 0.0, frozenset({'base_tilt'}): 1.0}
 
 
 @pytest.mark.parametrize(('viscous', 'stands_out'), [(0.02, False), (0.08, True)])
 def test_what_may_be_lack_of_fit_is_told_once_it_stands_out_of_the_noise(
         viscous: float, stands_out: bool) -> None:
     # Both are less than a tenth of what the drag is.
-    recording = recording_of({'platform_drag': {'coefficient': 12.0, 'rotational': 0.0},
-                              'revolute_friction': {'viscous': viscous, 'torque': 0.0}}, 0.02)
+    recording = recording_of({'tool_drag': {'coefficient': 12.0, 'rotational': 0.0},
+                              'joint_friction': {'revolute.viscous': viscous}}, 0.02)
     ranking = select(MODEL, [recording], DECISIONS)
-    assert names(ranking.best) == ['platform_drag', 'revolute_friction']
-    assert ('revolute_friction' in names(ranking.kept)) is stands_out
+    assert names(ranking.map_set) == ['joint_friction', 'tool_drag']
+    assert ('joint_friction' in names(ranking.reported)) is stands_out
     assert [one.candidate.name for one in ranking.remainders] == [
-        'revolute_friction'] * (not stands_out)
+        'joint_friction'] * (not stands_out)
 
 
 def test_a_wrench_on_preloaded_guides_hides_no_effect_and_makes_none() -> None:
@@ -224,25 +256,25 @@ def test_a_wrench_on_preloaded_guides_hides_no_effect_and_makes_none() -> None:
         recording = Recording.from_arrays('made', TIME, forces.mechanism.position,
                                           effort=total + 0.05 * rng.normal(size=total.shape))
         found = select(MODEL, [recording], DECISIONS)
-        assert names(found.kept) == ['external_wrench'], follows
+        assert names(found.reported) == ['external_wrench'], follows
 
 
 def test_coulomb_and_viscous_friction_are_two_and_not_one_that_is_asymmetric() -> None:
     hidden = {'coulomb_friction': {'lift_1': {'force': 0.5}},
               'viscous_friction': {'lift_1': {'coefficient': 6.0}}}
     found = select(MODEL, [recording_of(hidden)], DECISIONS)
-    assert names(found.best) == ['coulomb_friction', 'viscous_friction']
+    assert names(found.map_set) == ['coulomb_friction', 'viscous_friction']
     assert found.rivals(DECISIONS.rival_margin) == []
     # One that is both is told with its cost.
-    assert found.sets[0] is found.best
+    assert found.sets[0] is found.map_set
     both = next(one for one in found.sets if names(one) == ['asymmetric_friction'])
-    assert both.cost > found.best.cost
+    assert both.cost > found.map_set.cost
 
 
 def test_a_freer_form_of_what_was_found_is_no_rival() -> None:
     found = select(MODEL, [recording_of({'viscous_friction': {'slide_3': {'coefficient': 6.0}}})],
                    DECISIONS)
-    assert names(found.kept) == ['viscous_friction']
+    assert names(found.reported) == ['viscous_friction']
     # It is among the sets, near or not, and never told as another explanation.
     assert any(names(one) == ['asymmetric_friction'] for one in found.sets)
     assert 'asymmetric_friction' not in {
@@ -251,8 +283,8 @@ def test_a_freer_form_of_what_was_found_is_no_rival() -> None:
 
 
 def test_one_cause_wins_over_several_that_imitate_it() -> None:
-    found = select(MODEL, [recording_of({'rod_mass': {'mass': 0.12}})], DECISIONS).best
-    assert names(found) == ['rod_mass']
+    found = select(MODEL, [recording_of({'link_mass': {'rods.mass': 0.12}})], DECISIONS).map_set
+    assert names(found) == ['link_mass']
 
 
 def test_a_line_on_one_drive_is_unknown_at_its_frequency() -> None:
@@ -260,7 +292,7 @@ def test_a_line_on_one_drive_is_unknown_at_its_frequency() -> None:
     effort = recording.effort.copy()
     effort[:, 3] += 0.9 * np.sin(2 * np.pi * 6.1 * TIME)
     found = select(MODEL, [Recording.from_arrays('made', TIME, recording.position, effort=effort)],
-                   DECISIONS).best
+                   DECISIONS).map_set
     assert not found.effects
     assert [c.drives for c in found.unknowns] == [(3,)]
     assert found.unknowns[0].pattern.scale == pytest.approx(6.1, rel=0.001)

@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 
 from benchmarks.hidden.recordings import tolerant_model
-from pprs_dynamics import AxisModel, AxisMotion, DriveModel
+from pprs_dynamics import ArmModel, DriveModel, JointMotion
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.three_pprs.robot import AXIS
+from pprs_dynamics.physics.model.robot_block import AXIS
 
 # Powers of s and k by which base units scale.
 POWERS = {'1': (0.0, 0.0), 'rad': (0.0, 0.0), 'm': (1.0, 0.0), 's': (0.5, 0.0), 'N': (0.0, 1.0),
@@ -61,13 +61,13 @@ def diagnosed(name: str, s: float, k: float) -> Diagnosis:
     values = {f'effects.{effect}.{AXIS}.{key}': value for effect, block in hidden.items()
               for key, value in block.items()}
     true = build_model({**AXIS_VALUES, 'effects.active': list(hidden), **values})
-    assert isinstance(true, AxisModel)
+    assert isinstance(true, ArmModel)
     time = np.arange(0, 20, 0.002)
     omega = 2 * np.pi * np.array([0.21, 0.37, 0.83])[:, None]
     size = np.array([0.08, 0.04, 0.015])[:, None]
     phase = omega * time + np.array([0.3, 1.9, 4.0])[:, None]
     q = (size * np.sin(phase)).sum(0)[:, None]
-    motion = AxisMotion(q, (size * omega * np.cos(phase)).sum(0)[:, None],
+    motion = JointMotion(q, (size * omega * np.cos(phase)).sum(0)[:, None],
                         -(size * omega ** 2 * np.sin(phase)).sum(0)[:, None], time=time)
     force = true.drive_forces(motion).total
     if name == 'bump':

@@ -94,7 +94,7 @@ def fitted(diagnosis: Diagnosis, tried: list[Tried]) -> tuple[JointFit, float]:
     fits = selection.last
     blocks = [block for candidate, one in tried for component in candidate.components
               for block in (fits.library.block(component), *one.nuisance.get(component, ()))]
-    fit = fits.regression.at(blocks, selection.best.fit.amplitudes)
+    fit = fits.regression.at(blocks, selection.map_set.fit.amplitudes)
     components = [component for one, _ in tried for component in one.components]
     price = sum(fits.library.price(one).total for one, _ in tried) + sum(
         fits.prices.of_wrong_signs(one, one.values(fit.of(fits.library.block(one))))
@@ -148,7 +148,8 @@ def test_errors_and_evidence_of_ticked_effects_are_those_of_the_regression(
     diagnosis, _ = found
     assert diagnosis.selection is not None
     assert diagnosis.selection.first is diagnosis.selection.last
-    kept = [(candidate, diagnosis.selection.kept) for candidate in diagnosis.selection.kept.effects]
+    reported = diagnosis.selection.reported
+    kept = [(candidate, reported) for candidate in reported.effects]
     assert {candidate.name for candidate, _ in kept} == HIDDEN
     # In the shape in which it was found, where it was.
     others = {**alone(diagnosis), **{one[0].name: one for one in kept}}

@@ -5,14 +5,13 @@
 
 from __future__ import annotations
 
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from made_up_recordings import judged, measured
-from ros_processes import executable
+from pprs_command import pprs
 
 from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
 from pprs_dynamics.measurement.files.repeats import shared_samples
@@ -26,11 +25,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_recording(folder / name, run)
     write_recording(folder / 'other.csv', judged(measured(seed=1)))
     return folder
-
-
-def pprs(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([executable('pprs'), *arguments], cwd=folder, capture_output=True,
-                          text=True, timeout=100)
 
 
 def part_of(recording: Recording, samples: slice) -> Recording:
@@ -82,7 +76,7 @@ REFUSED = {
 
 @pytest.mark.parametrize('arguments', REFUSED, ids=' '.join)
 def test_what_is_given_twice_is_refused(folder: Path, arguments: tuple[str, ...]) -> None:
-    done = pprs(folder, *arguments)
+    done = pprs(*arguments, cwd=folder)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
     files = [name for name in arguments if name.endswith(('.csv', '.mcap')) and name != 'x.csv']
@@ -93,7 +87,7 @@ def test_what_is_given_twice_is_refused(folder: Path, arguments: tuple[str, ...]
 
 
 def test_info_says_what_repeats(folder: Path) -> None:
-    done = pprs(folder, 'info', 'run.csv', 'other.csv', 'same.db3')
+    done = pprs('info', 'run.csv', 'other.csv', 'same.db3', cwd=folder)
     assert done.returncode == 0
     assert ('! same.db3: all of its 1000 samples are those of run.csv, too'
             in ' '.join(done.stdout.split()))
@@ -103,7 +97,7 @@ def test_what_is_read_is_never_written_over(folder: Path) -> None:
     before = (folder / 'run.csv').read_bytes()
     for arguments in (('next-experiment', 'run.csv', '--output', 'run.csv'),
                       ('simulate', '--path', 'run.csv', '--output', 'run.csv')):
-        done = pprs(folder, *arguments)
+        done = pprs(*arguments, cwd=folder)
         assert done.returncode == 2
         assert 'at once, must be another file' in done.stderr
     assert (folder / 'run.csv').read_bytes() == before

@@ -165,6 +165,18 @@ def test_what_is_not_covered_is_refused_in_a_sentence(tmp_path: Path, text: str,
     assert str(error.value).startswith(str(path))
 
 
+def test_joints_that_share_a_transmission_need_the_turns_of_its_motors(tmp_path: Path) -> None:
+    path = arm.write_arm(tmp_path, arm.urdf(more=TRANSMISSION))
+    way = 'friction: {motors: {MOTOR: {turn: 1.0, swing: 1.0}}}'
+    with pytest.raises(ModelError, match=re.escape(way)):
+        load_model(path)
+    path = arm.write_arm(tmp_path, arm.urdf(more=TRANSMISSION),
+                         friction__motors='{left: {turn: 1.0, swing: 1.0}}')
+    model = load_model(path)
+    assert isinstance(model, ArmModel)
+    assert model.robot.motors == {'left': (1.0, 1.0, 0.0)}
+
+
 @pytest.mark.parametrize(('old', 'new', 'words'), [
     ('tool: flange', 'tool: flansch', 'flansch.*be a link of the URDF'),
     ('tool: flange', 'tool: stand', 'that arm.joints move'),
@@ -187,10 +199,16 @@ def test_a_mistake_in_the_file_is_one_sentence(tmp_path: Path, old: str, new: st
 
 def test_effects_say_where_they_act(tmp_path: Path) -> None:
     path = arm.write_arm(tmp_path)
-    path.write_text(path.read_text() + '    effects:\n      rod_mass: {mass: 0.1}\n')
+    text = path.read_text() + '    effects:\n'
+    path.write_text(text + '      payload_offset: {x: 0.1, y: 0.0, z: 0.0}\n')
     with pytest.raises(ModelError, match='acts in a serial arm'):
         load_model(path)
+    path.write_text(text + '      rod_mass: {mass: 0.1}\n')
+    with pytest.raises(ModelError, match=r'unknown effect rod_mass \(use link_mass\)'):
+        load_model(path)
     with pytest.raises(ModelError, match='acts in a 3-PPRS'):
+        build_model({**DriveModel.load().values, 'effects.coupled_drives.wrist.coulomb': 0.1})
+    with pytest.raises(ModelError, match=r'unknown key effects\.link_mass\.beam\.mass'):
         build_model({**DriveModel.load().values, 'effects.link_mass.beam.mass': 0.1})
 
 

@@ -28,6 +28,7 @@ from pprs_dynamics.physics.effects.laws.effort_filter import EffortFilter
 from pprs_dynamics.physics.effects.laws.effort_offset import EffortOffset
 from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
 from pprs_dynamics.physics.effects.laws.friction_drift import FrictionDrift
+from pprs_dynamics.physics.effects.laws.friction_temperature import FrictionTemperature
 from pprs_dynamics.physics.effects.laws.gear_efficiency import GearEfficiency
 from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
 from pprs_dynamics.physics.effects.laws.load_friction import LoadFriction
@@ -37,14 +38,15 @@ from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 
 EFFECTS: tuple[type[DriveEffect], ...] = (
     AsymmetricFriction, CoulombFriction, DriveInertia, DriveSpring, EffortOffset, ForceRipple,
-    FrictionDrift, GearEfficiency, Hysteresis, LoadFriction, QuadraticFriction, StribeckFriction,
-    ViscousFriction)
+    FrictionDrift, FrictionTemperature, GearEfficiency, Hysteresis, LoadFriction,
+    QuadraticFriction, StribeckFriction, ViscousFriction)
 WITH_MEMORY = (FrictionDrift, Hysteresis)
 # Presliding alone is what is taken away from the model's friction.
 FRICTION = (AsymmetricFriction, CoulombFriction, FrictionDrift, GearEfficiency, LoadFriction,
             QuadraticFriction, StribeckFriction, ViscousFriction)
 STEP = 0.002
-COVERED = DriveRange(duration=20.0, step=STEP, stroke=0.16, top_speed=0.25)
+COVERED = DriveRange(duration=20.0, step=STEP, stroke=0.16, top_speed=0.25,
+                     channels={'temperature': (20.0, 30.0)})
 
 every_effect = pytest.mark.parametrize('effect', EFFECTS, ids=lambda effect: effect.name)
 
@@ -59,6 +61,11 @@ class Axes:
     acceleration: Any
     guide_load: Any
     drives: tuple[str, ...] = ('axis',)
+
+    @property
+    def channels(self):
+        """A drive that is as warm as its load is high."""
+        return {'temperature': self.guide_load}
 
     @property
     def transmitted(self):
@@ -115,6 +122,10 @@ def random_values(effect, rng):
                              (0.2, -40.0, 4.0))),
     (EffortOffset, {'force': -0.4}, {'v': 0.3, 'q': 0.1}, -0.4),
     (FrictionDrift, {'force': 0.9, 'time': 10.0}, {'t': 7.0, 'v': -0.2}, -0.9),
+    # 15 K above the reference, by 0.02 N and 0.2 N s/m a kelvin, the latter less and less.
+    (FrictionTemperature, {'coulomb': -0.02, 'viscous': -0.2, 'reference': 25.0,
+                           'thinning': 25.0},
+     {'v': -0.2, 'load': 40.0}, 0.3 + 1.0 * (1 - math.exp(-0.6))),
     (DriveSpring, {'stiffness': 20.0, 'position': 0.05}, {'q': 0.2}, 3.0),
     (ForceRipple, {'force': 0.5, 'phase': math.pi / 6, 'pitch': 0.004}, {'q': 0.001},
      0.4330127),  # 0.5 cos(30 deg)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 
 import pytest
 import yaml
-from ros_processes import executable
+from pprs_command import pprs
 
 from pprs_dynamics.errors import ModelError, UnreadableFileError
 from pprs_dynamics.physics.model.ledger import (
@@ -132,10 +131,6 @@ def test_a_step_whose_effect_was_removed_by_hand_is_not_taken_back(
               if key != 'effects.coulomb_friction.lift_1.force'}
     with pytest.raises(ModelError, match='would not give the model that was'):
         without_last_step(values)
-
-
-def pprs(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([executable('pprs'), *arguments], capture_output=True, text=True)
 
 
 def test_the_command_shows_draws_and_takes_back(

@@ -18,10 +18,11 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import ArmModel, DriveModel, JointMotion, PlatformMotion, load_model
 from pprs_dynamics.errors import ModelError, PprsError, SingularityError, WorkspaceError
-from pprs_dynamics.physics.effects.laws.joint_friction import friction_rows
 from pprs_dynamics.physics.mechanism import linkage
+from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.model.model_file import build_model
 
 SAMPLES = 30
 ROBOTS = {'hexapod': robots.hexapod, 'delta': robots.delta, 'five_bar': robots.five_bar,
@@ -154,6 +155,44 @@ def test_a_wrench_on_the_platform_loads_every_joint_as_in_the_closed_form(tmp_pa
             JointMotion(s.position, s.velocity, s.acceleration)).parts['passive_friction'])
     assert found[1] == pytest.approx(expected[1], abs=1e-8)
     assert np.max(np.abs(found[1] - found[0])) > 10
+
+
+HINGES, BALLS = ([f'{kind}_{n}' for n in (1, 2, 3)] for kind in ('hinge', 'ball'))
+# Effects of the closed form, and the same of the tree with loops: u_i is a hinge's angle + pi / 2.
+OF_BOTH = {
+    'base_tilt': ({'x': 0.05, 'y': -0.03},) * 2,
+    'joint_friction': (
+        {'revolute.viscous': 0.03, 'revolute.torque': 0.02, 'revolute.coulomb': 0.3,
+         'spherical.viscous': 0.01, 'spherical.torque': 0.04, 'spherical.coulomb': 0.2},
+        {**{f'{one}.{key}': value for one in HINGES for key, value in (
+            ('viscous', 0.03), ('torque', 0.02), ('coulomb', 0.3))},
+         **{f'{one}.{key}': value for one in BALLS for key, value in (
+             ('viscous', 0.01), ('torque', 0.04), ('coulomb', 0.2))}}),
+    'joint_spring': (
+        {'revolute.stiffness': 0.8, 'revolute.position': 1.3},
+        {f'{one}.{key}': value for one in HINGES for key, value in (
+            ('stiffness', 0.8), ('position', 1.3 - np.pi / 2))}),
+    'payload_mass': ({'mass': 0.4},) * 2,
+    'tool_drag': ({'coefficient': 7.0, 'rotational': 0.05},) * 2}
+
+
+@pytest.mark.parametrize('name', OF_BOTH)
+def test_an_effect_is_the_same_in_both_kernels(tmp_path: Path, name: str) -> None:
+    """Its own force, and what loads that it adds bring of friction in joints and guides."""
+    paper, model = three_pprs(tmp_path, drives=True)
+    motion = random_motion(np.random.default_rng(4), 100)
+    parts = []
+    for one, values in zip((paper, model), OF_BOTH[name], strict=True):
+        changed = build_model({**one.values, 'effects.active': [name], **{
+            f'effects.{name}.{key}': value for key, value in values.items()}}, one.source)
+        s = paper.drive_forces(motion).mechanism
+        parts.append(changed.drive_forces(motion if one is paper else JointMotion(
+            s.position, s.velocity, s.acceleration)).parts)
+    closed, tree = parts
+    assert np.abs(closed[name]).max() > 0.05
+    assert tree[name] == pytest.approx(closed[name], abs=1e-9)
+    assert tree['passive_friction'] == pytest.approx(
+        closed['active_friction'] + closed['passive_friction'], abs=1e-9)
 
 
 def test_a_state_with_a_load_is_sliced_with_it(tmp_path: Path) -> None:
@@ -465,7 +504,7 @@ def test_a_robot_from_mjcf_is_that_of_mujoco(tmp_path: Path) -> None:
 def test_it_is_told_as_a_robot_with_loops(tmp_path: Path) -> None:
     file = robots.five_bar().write(tmp_path)
     assert load_model(file).title == 'a robot with loops'
-    values = {**load_model(file).values, 'effects.platform_drag.translation': 0.1}
+    values = {**load_model(file).values, 'effects.payload_offset.x': 0.1}
     with pytest.raises(ModelError, match='acts in a robot with loops'):
         ArmModel.from_parameters(values, str(file))
 

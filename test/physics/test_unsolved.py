@@ -19,7 +19,7 @@ from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
 @pytest.mark.parametrize(('name', 'scale'), [
     ('viscous_friction', 1e6), ('effort_offset', 1e4), ('drive_spring', 1e6),
-    ('payload_mass', 1e6), ('platform_drag', 1e6), ('rod_mass', 1e6)])
+    ('payload_mass', 1e6), ('tool_drag', 1e6), ('link_mass', 1e6)])
 def test_what_the_engine_does_not_solve_is_no_recording(
     tmp_path: Path, name: str, scale: float,
 ) -> None:

@@ -139,8 +139,8 @@ class Windows:
 class Claiming:
     """A live diagnosis that claims a change with the first window, and fails at the second."""
 
-    def __init__(self, model: DriveModel, text: str = '') -> None:
-        self.model, self.text = model, text
+    def __init__(self, model: DriveModel, text: str = '', reference: object = None) -> None:
+        self.model, self.text, self.reference = model, text, reference
 
     def with_window(self, recording: Any, start: float) -> Claiming:
         if self.text:
@@ -159,8 +159,8 @@ def test_what_is_claimed_stands_where_a_window_cannot_be_diagnosed(
     model = DriveModel.load()
     still = StreamWindow(EPOCH + np.arange(100) * SECOND // 100, np.zeros((100, 6)),
                          np.zeros((100, 6)))
-    pipe = Windows((model.values, '', still), (model.values, '', still),
-                   ({'masses.payload': -1.0}, '', still))
+    pipe = Windows((model.values, '', (), still), (model.values, '', (), still),
+                   ({'masses.payload': -1.0}, '', (), still))
     diagnosis_worker._work(pipe)
     claimed, failed, unknown = pipe.answers
     assert claimed['text'] == failed['text'] == 'payload mass'

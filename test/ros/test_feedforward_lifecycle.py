@@ -10,17 +10,17 @@ import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState, GetState
-from node_bench import Bench, bench, overrides
+from lifecycle_msgs.srv import ChangeState
+from node_bench import bench, overrides
 from rclpy.parameter import Parameter
 from ros_processes import executable, node_process
 from std_msgs.msg import Float64MultiArray
+from supervisor import Supervisor
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
@@ -33,38 +33,13 @@ MESSAGE = message_of(MOTION)
 DEMO = [executable('feedforward'), '--ros-args', '-p', 'demo:=true']
 
 
-class Supervisor:
-    """Calls the lifecycle services over DDS."""
-
-    def __init__(self, running: Bench) -> None:
-        self.bench = running
-        self._change = running.probe.create_client(ChangeState, '/feedforward/change_state')
-        self._get = running.probe.create_client(GetState, '/feedforward/get_state')
-
-    def call(self, client: Any, request: Any) -> Any:
-        """Call a service and return its response."""
-        assert self.bench.spin_until(client.service_is_ready)
-        future = client.call_async(request)
-        assert self.bench.spin_until(future.done)
-        return future.result()
-
-    def change(self, transition: int) -> bool:
-        """Return whether a transition was made."""
-        request = ChangeState.Request(transition=Transition(id=transition))
-        return bool(self.call(self._change, request).success)
-
-    def state(self) -> str:
-        """Return the state's label."""
-        return str(self.call(self._get, GetState.Request()).current_state.label)
-
-
 @pytest.fixture
 def supervised() -> Iterator[tuple[FeedforwardBench, Supervisor]]:
     """Give a node that waits for its supervisor."""
     given = overrides(autostart=False, command_timeout=0.0)
     with bench() as running:
         node = FeedforwardBench(running, parameter_overrides=given)
-        yield node, Supervisor(running)
+        yield node, Supervisor(running, 'feedforward')
 
 
 def test_a_supervisor_leads_it_through_its_states(
@@ -138,7 +113,7 @@ def test_parameters_set_while_inactive_are_in_force_when_active(
 
 def test_a_node_that_is_active_by_itself_can_still_be_managed() -> None:
     with feedforward_bench() as node:
-        supervisor = Supervisor(node.bench)
+        supervisor = Supervisor(node.bench, 'feedforward')
         assert supervisor.state() == 'active'
         assert supervisor.change(Transition.TRANSITION_DEACTIVATE)
         # No command was in force, so that there is nothing to hold.

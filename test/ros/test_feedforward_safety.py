@@ -254,7 +254,7 @@ def test_late_messages_are_rejected_and_do_not_keep_alive() -> None:
 
 def test_of_setpoints_that_wait_the_latest_are_executed_and_the_others_are_told() -> None:
     motion = random_motion(np.random.default_rng(2), 30)
-    with feedforward_bench() as node:
+    with feedforward_bench(lag_warning=0.02) as node:
         node.answer(message_of(motion[:1]))
         for k in range(len(motion)):  # nobody spins
             node.publisher.publish(message_of(motion[k:k + 1]))
@@ -305,7 +305,7 @@ def test_the_status_tells_what_a_supervisor_wants_to_know() -> None:
 
 def test_diagnostics_say_the_same_where_their_messages_are_installed() -> None:
     messages = pytest.importorskip('diagnostic_msgs.msg')
-    with feedforward_bench() as node:
+    with feedforward_bench(command_timeout=TIMEOUT) as node:
         told = node.bench.listen(messages.DiagnosticArray, '/diagnostics', 10)
         assert node.bench.connected()
         bad = message_of(MOTION)
@@ -317,6 +317,10 @@ def test_diagnostics_say_the_same_where_their_messages_are_installed() -> None:
         assert (status.name, status.level) == ('/feedforward', b'\x02')
         assert status.hardware_id == '3-PPRS'
         assert {value.key: value.value for value in status.values}['EMPTY'] == '1'
+        # STALE is the word of an aggregator that hears nothing of a node.
+        node.answer(message_of(MOTION))
+        assert node.bench.spin_until(lambda: told[-1].status[0].message.startswith('STALE'))
+        assert told[-1].status[0].level == b'\x02'
 
 
 def test_what_was_sent_too_long_ago_is_not_executed_whether_it_is_stamped_or_not() -> None:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from discovery import LEASE
 from node_bench import Bench, bench
 from rclpy.action import ActionClient, ActionServer, CancelResponse
 from rclpy.node import Node
@@ -30,7 +31,6 @@ pytestmark = pytest.mark.nodes
 
 SERVER = Path(__file__).parents[1] / 'support' / 'counting_controller.py'
 PATIENCE = 1.0  # [s]
-LEASE = 20.0  # [s], after which DDS forgets a process that was killed
 PER_SECOND = 20  # counts of the controller
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 

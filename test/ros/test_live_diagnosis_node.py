@@ -5,12 +5,11 @@
 
 from __future__ import annotations
 
-import json
 import os
 
 import numpy as np
 import pytest
-from node_bench import LATCHED, bench, overrides
+from node_bench import LATCHED, bench, checked, overrides
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -55,7 +54,7 @@ def test_a_change_is_told_within_two_windows() -> None:
         for number in range(1, 5):
             send(round(SPAN * RATE) + 5)
             assert running.spin_until(lambda n=number: len(told) >= n, PATIENCE), number
-        first, second, _, fourth = (json.loads(message.data) for message in told[:4])
+        first, second, _, fourth = (checked(message.data, 'diagnosis') for message in told[:4])
         assert first['effects'] == []
         assert first['confirmed'] is False
         assert second['confirmed'] is False  # one window alone is a hypothesis

@@ -21,8 +21,10 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from ros_processes import executable, node_process
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
 from pprs_dynamics import DriveModel
@@ -63,6 +65,27 @@ def test_what_is_no_message_of_the_monitor_is_passed_over(running: tuple[Bench, 
     error.publish(Float64MultiArray(data=[3.0, 4.0]))
     assert bench.spin_until(lambda: node.to_dict()['monitor_error'] == [3.0, 4.0])
     assert bench.spin_until(lambda: node.to_dict()['diagnosis'] == {'since': None, 'effects': []})
+
+
+@pytest.mark.parametrize('reliability', [
+    ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT], ids=lambda one: one.name)
+@pytest.mark.parametrize('comes', ['before', 'after'])
+def test_joint_states_are_heard_whatever_their_publisher_offers(
+    reliability: ReliabilityPolicy, comes: str,
+) -> None:
+    """A driver over a network publishes best effort, which who asks for more never receives."""
+    message = conversions.joint_state(0, np.zeros(6), np.zeros(6), np.zeros(6))
+    with bench() as running:
+        def publish() -> Any:
+            return running.probe.create_publisher(
+                JointState, '/joint_states', QoSProfile(depth=10, reliability=reliability))
+
+        early = publish() if comes == 'before' else None
+        node: Any = running.add(lambda **options: LiveJointStates(
+            MODEL, 'joint_states', 'monitor', 'feedforward', **options))
+        publisher = early or publish()
+        assert running.spin_until(publisher.get_subscription_count)
+        assert running.spin_until(lambda: publisher.publish(message) or node._counters['received'])
 
 
 HEAVIER = build_model({
@@ -112,6 +135,9 @@ class Robot:
     def close(self) -> None:
         self.live.close()
         self.executor.shutdown()
+        # Else they are in the graph until they are collected, and the next test's have their names.
+        for node in self.nodes.values():
+            node.destroy_node()
         self.context.try_shutdown()
 
 

@@ -9,71 +9,23 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from node_bench import Bench, bench, overrides
+from lifecycle_msgs.msg import Transition
+from monitor_bench import RATE, START, MonitorBench
+from node_bench import bench
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
+from supervisor import Supervisor
 
-from pprs_dynamics import DriveModel
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.monitor import MonitorNode
 
 pytestmark = pytest.mark.nodes
 
-RATE = 500
-ORDER = (3, 0, 5, 1, 4, 2)  # drives are matched by name, in any order
-START = 1_700_000_000_000_000_000  # [ns]; stamps since 1970, as on a robot
 # What smoothing over 0.12 s leaves of exact positions below 0.6 Hz, most of it where friction
 # turns over within a millimetre per second.
 RECONSTRUCTION = 0.01  # [N]
 OFFSET = 0.5  # [N]
-
-
-class MonitorBench:
-    """The node, what it says, and a robot whose efforts the model explains."""
-
-    def __init__(self, running: Bench, **values: object) -> None:
-        self.bench = running
-        self.node = running.add(MonitorNode, parameter_overrides=overrides(
-            **{'error_span': 0.5, **values}))
-        self.model_effort = running.listen(JointState, '/monitor/model_effort', 1000)
-        self.residual = running.listen(JointState, '/monitor/residual', 1000)
-        self.error = running.listen(Float64MultiArray, '/monitor/error', 1000)
-        running.follow_status('/monitor/status')
-        self.publisher = running.probe.create_publisher(JointState, '/joint_states', 1000)
-        assert running.spin_until(self.publisher.get_subscription_count)
-        assert running.connected()
-        motion = Excitation(6.0, seed=3).motion(np.arange(0, 6.0, 1 / RATE))
-        forces = DriveModel.load().drive_forces(motion)
-        self.position, self.effort = forces.mechanism.position, forces.total
-        self.sent = 0
-
-    def send(self, count: int, change: Array | float = 0.0) -> None:
-        """Publish the next samples, efforts changed by a constant per drive."""
-        for row in range(self.sent, self.sent + count):
-            message = conversions.joint_state(
-                START + row * 1_000_000_000 // RATE, self.effort[row] + change,
-                self.position[row], self.position[row])
-            message.velocity = []
-            message.name = [DRIVES[k] for k in ORDER] + ['gripper']
-            for field in ('position', 'effort'):
-                values = list(getattr(message, field))
-                setattr(message, field, [values[k] for k in ORDER] + [float('nan')])
-            self.publisher.publish(message)
-            # No faster than the node takes them: the queue is finite.
-            if row % 20 == 0:
-                assert self.arrived(row + 1)
-        self.sent += count
-        assert self.arrived(self.sent)
-        self.bench.spin_for(0.2)
-
-    def arrived(self, count: int) -> bool:
-        """Spin until the node has received so many messages."""
-        return self.bench.spin_until(lambda: self.node._counters['received'] >= count)
 
 
 @pytest.fixture
@@ -219,3 +171,31 @@ def test_all_joints_are_published_while_somebody_draws_them(monitor: MonitorBenc
     assert {'hinge_1', 'hinge_2', 'hinge_3', 'ball_1_x', *DRIVES} <= set(found)
     row = (stamps(joints)[-1] - START) * RATE // 1_000_000_000
     assert [found[drive] for drive in DRIVES] == pytest.approx(monitor.position[row])
+
+
+def test_a_supervisor_leads_it_through_its_states() -> None:
+    with bench() as running:
+        monitor, supervisor = MonitorBench(running, autostart=False), Supervisor(running, 'monitor')
+        assert supervisor.state() == 'unconfigured'
+        assert not running.probe.count_subscribers('/joint_states')
+        for _ in range(2):
+            assert supervisor.change(Transition.TRANSITION_CONFIGURE)
+            monitor.connect()
+            # Inactive, it takes nothing, and answers nothing of it later.
+            heard, monitor.node._counters['received'] = len(monitor.residual), 0
+            monitor.publisher.publish(JointState())
+            running.spin_for(0.2)
+            assert monitor.node._counters['received'] == 0
+            assert supervisor.change(Transition.TRANSITION_ACTIVATE)
+            assert running.spin_until(lambda: running.status[-1]['code'] == 'WAITING')
+            monitor.sent = 0
+            monitor.send(500)  # stamps of before: another stream
+            assert len(monitor.residual) > heard + 300
+            assert max(monitor.error[-1].data) < RECONSTRUCTION
+            assert supervisor.change(Transition.TRANSITION_DEACTIVATE)
+            assert running.spin_until(lambda: running.status[-1]['code'] == 'INACTIVE')
+            assert supervisor.change(Transition.TRANSITION_CLEANUP)
+            assert running.spin_until(
+                lambda: not monitor.publisher.get_subscription_count())
+        assert supervisor.change(Transition.TRANSITION_UNCONFIGURED_SHUTDOWN)
+        assert running.spin_until(lambda: running.status[-1]['code'] == 'FINALIZED')

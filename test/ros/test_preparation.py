@@ -79,10 +79,11 @@ def test_a_node_without_compiled_kernels_answers_messages_and_services(
         np.testing.assert_allclose(
             commands[0].data, DriveModel.load().drive_forces(MOTION).total[0], rtol=0, atol=EQUAL)
         # Stopped in the middle of it, it ends as ever.
+        cache = tmp_path / 'cache'
+        assert running.spin_until(lambda: cache.is_dir() and os.listdir(cache), 30)
         process.terminate()
         assert process.wait(10) == 0
     assert 'Traceback' not in log.read_text()
-    assert os.listdir(tmp_path / 'cache')
 
 
 # What Numba does to this registry, without pause.

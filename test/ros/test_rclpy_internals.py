@@ -63,7 +63,7 @@ def test_the_node_answers_takes_parameters_and_has_its_last_word(
     file.write_text(PAPER.read_text() + '    effects:\n'
                     '      effort_offset: {lift_2: {force: 1.5}}\n'
                     '      active: [effort_offset]\n'
-                    '    command_timeout: 0.0\n')
+                    '    command_timeout: 0.0\n    max_age: 0.0\n')
     log = tmp_path / 'log'
     node = command('feedforward', without, '--params-file', str(file), '-p',
                    f'masses.payload:={PAYLOAD}', '-p', 'timeout_action:=zero')

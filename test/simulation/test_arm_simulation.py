@@ -100,24 +100,45 @@ def test_an_arm_has_no_passive_joint_that_could_rub(model: ArmModel) -> None:
 
 
 @pytest.mark.parametrize('name', [name for name in NAMES if name != 'joint_friction'])
-def test_every_hidden_effect_shows(model: ArmModel, name: str) -> None:
-    plain, hidden = (simulate_arm(model, names, 4, noise=0.0, duration=10.0)
+def test_every_hidden_effect_shows(wrist: ArmModel, name: str) -> None:
+    model = wrist
+    # A slow motion turns the joints farther, as a cylinder needs.
+    duration = 30.0 if name == 'counterbalance' else 10.0
+    plain, hidden = (simulate_arm(model, names, 4, noise=0.0, duration=duration)
                      for names in ((), (name,)))
     shown = hidden.position - plain.position if name == 'homing_error' else (
         hidden.effort - plain.effort)
     assert np.abs(shown).max() > (0.005 if name == 'homing_error' else 0.05)
     assert hidden.effects[0]['name'] == name
     assert (hidden.effects[0]['drives'] is None) == (
-        name not in {*FORMS, 'effort_gain', 'effort_filter', 'time_delay', 'homing_error'})
+        name not in {*FORMS, 'effort_gain', 'effort_filter', 'time_delay', 'homing_error',
+                     'current_gain'})
+
+
+def test_motors_without_a_map_rub_nowhere(model: ArmModel) -> None:
+    with pytest.raises(HiddenEffectError, match=r'friction: \{motors:'):
+        simulate_arm(model, ('coupled_drives',), 4, duration=10.0)
+
+
+@pytest.fixture(scope='module')
+def wrist(model: ArmModel) -> ArmModel:
+    """Return the arm with a motor that turns with two joints."""
+    found = build_model({**model.values, 'friction.motors.wrist.turn': 1.0,
+                         'friction.motors.wrist.swing': 1.0}, model.source)
+    assert isinstance(found, ArmModel)
+    return found
 
 
 @pytest.mark.parametrize(('name', 'seed'), [
-    ('payload_mass', 1), ('link_mass', 1), ('viscous_friction', 2), ('coulomb_friction', 3)])
-def test_what_is_hidden_is_named(model: ArmModel, name: str, seed: int) -> None:
-    run = simulate_arm(model, (name,), seed)
+    ('payload_mass', 1), ('link_mass', 1), ('viscous_friction', 2), ('coulomb_friction', 3),
+    ('friction_temperature', 1), ('friction_temperature', 2), ('friction_drift', 1),
+    ('counterbalance', 1), ('coupled_drives', 1), ('current_gain', 1), ('effort_gain', 1)])
+def test_what_is_hidden_is_named(wrist: ArmModel, name: str, seed: int) -> None:
+    model = wrist
+    run = simulate_arm(model, (name,), seed, thermometers=True)
     assert run.motion.time is not None
     found = diagnose(model, [Recording.from_arrays(
-        'run', run.motion.time, run.position, None, run.effort, model.drives)])
+        'run', run.motion.time, run.position, None, run.effort, model.drives, run.channels)])
     named = {found.effects[0].name} | {other for rivals in found.indistinguishable
                                        if rivals[0] == found.effects[0].name for other in rivals}
     assert name in named

@@ -25,7 +25,7 @@ from pprs_dynamics.physics.model.model_file import build_model, load_model
 from pprs_dynamics.simulation.arm_run import draw_motion
 from pprs_dynamics.simulation.export.exported_robot import TreePositions, export_robot
 from pprs_dynamics.simulation.export.expressed import MJCF, URDF, express
-from pprs_dynamics.simulation.export.replay import Replay, replay_excitation
+from pprs_dynamics.simulation.export.replay import DURATION, Replay, replay_excitation
 from pprs_dynamics.simulation.export.writers import closures, written
 
 EXACT = 1e-9  # of the largest effort
@@ -103,17 +103,18 @@ def motion() -> Any:
     {'masses.centre': (0.01, -0.02, 0.03), 'masses.inertia': (5e-3, 6e-3, 1e-2, 1e-3, -5e-4, 2e-4),
      'geometry.platform_angles': (0.1, 2.2, 4.3)},
     {'masses.rods': (0.0, 0.3, 0.2), 'geometry.elbow': 'down', 'gravity': (0.3, -0.2, -9.7)},
-    {'effects.active': ('payload_mass', 'payload_offset', 'rod_mass', 'base_tilt'),
+    {'effects.active': ('payload_mass', 'payload_offset', 'link_mass', 'base_tilt'),
      'effects.payload_mass.mass': 0.4, 'effects.payload_offset.x': 0.01,
      'effects.payload_offset.y': 0.0, 'effects.payload_offset.z': 0.02,
-     'effects.rod_mass.mass': 0.1, 'effects.base_tilt.x': 0.03, 'effects.base_tilt.y': -0.02},
-    {'effects.active': ('viscous_friction', 'drive_inertia', 'drive_spring', 'revolute_friction',
-                        'revolute_stiffness'),
+     'effects.link_mass.rods.mass': 0.1, 'effects.base_tilt.x': 0.03, 'effects.base_tilt.y': -0.02},
+    {'effects.active': ('viscous_friction', 'drive_inertia', 'drive_spring', 'joint_friction',
+                        'joint_spring'),
      'effects.viscous_friction.lift_2.coefficient': 7.0,
      'effects.drive_inertia.slide_1.mass': 0.3,
      'effects.drive_spring.lift_1.stiffness': 20.0, 'effects.drive_spring.lift_1.position': 0.1,
-     'effects.revolute_friction.viscous': 0.05, 'effects.revolute_friction.torque': 0.0,
-     'effects.revolute_stiffness.stiffness': 0.2, 'effects.revolute_stiffness.angle': 0.4},
+     'effects.joint_friction.revolute.viscous': 0.05,
+     'effects.joint_spring.revolute.stiffness': 0.2,
+     'effects.joint_spring.revolute.position': 0.4},
 ], ids=['bodies', 'elbow down', 'effects on bodies', 'effects in joints'])
 def test_mujoco_needs_the_forces_of_the_model_where_all_is_expressed(
     more: dict[str, Any], motion: Any,
@@ -272,7 +273,10 @@ def test_a_single_axis(kind: str, gravity: float, tmp_path: Path) -> None:
     (tmp_path / 'axis.yaml').write_text(text)
     _, result = exported(tmp_path / 'axis.yaml', kind, tmp_path)
     assert result['not_expressed'] == ['axis.offset']
-    assert result['replay_error'] == pytest.approx(3.165, abs=0.01)
+    # The offset, and dry friction that turns over at once and not within 0.3 mm/s.
+    v = draw_motion(load_model(tmp_path / 'axis.yaml'), DURATION, 0).velocity
+    left = -3.165 + 20.394 * (np.tanh(v / 0.0003) - np.tanh(v / 1e-9))
+    assert result['replay_error'] == pytest.approx(np.sqrt(np.mean(left ** 2)), abs=1e-3)
     assert result['replay_error'] == pytest.approx(result['expected_error'], abs=1e-9)
 
 

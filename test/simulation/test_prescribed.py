@@ -35,17 +35,16 @@ MODEL = DriveModel.load('config/paper.yaml')
 AGREEMENT = 1e-5  # [N]
 RATE = 500.0
 HOME = MODEL.mechanism(Excitation().motion([0.0])).position[0]
-MEMORY = ('hysteresis', 'friction_drift')
+MEMORY = ('hysteresis', 'friction_drift', 'friction_temperature')
 SENSORS = ('effort_filter', 'effort_gain', 'homing_error', 'time_delay')
 GROUPS = {
     'friction': ('viscous_friction', 'coulomb_friction', 'asymmetric_friction',
                  'stribeck_friction', 'quadratic_friction', 'load_friction'),
     'forces': ('effort_offset', 'drive_spring', 'force_ripple', 'local_bump', 'vibration',
                'drive_coupling'),
-    'joints and platform': ('revolute_friction', 'spherical_friction', 'revolute_stiffness',
-                            'external_wrench', 'platform_drag'),
+    'joints and platform': ('joint_friction', 'joint_spring', 'external_wrench', 'tool_drag'),
     'bodies': ('drive_inertia', 'payload_mass', 'payload_offset', 'platform_inertia',
-               'base_tilt', 'rod_mass'),
+               'base_tilt', 'link_mass'),
 }
 
 

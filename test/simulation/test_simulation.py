@@ -290,10 +290,11 @@ def drawn(name: str, seed: int = 5) -> object:
 def test_every_effect_of_the_interface_is_there() -> None:
     assert ' '.join(IN_CATALOGUE) == (
         'viscous_friction coulomb_friction asymmetric_friction stribeck_friction '
-        'quadratic_friction load_friction hysteresis friction_drift effort_offset effort_gain '
+        'quadratic_friction load_friction hysteresis friction_drift friction_temperature '
+        'effort_offset effort_gain '
         'homing_error drive_spring force_ripple drive_inertia time_delay effort_filter '
-        'revolute_friction spherical_friction revolute_stiffness payload_mass payload_offset '
-        'platform_inertia external_wrench base_tilt platform_drag rod_mass')
+        'joint_friction joint_spring payload_mass payload_offset '
+        'platform_inertia external_wrench base_tilt tool_drag link_mass')
     assert not set(IN_CATALOGUE) & set(NOT_IN_CATALOGUE)
 
 
@@ -432,9 +433,9 @@ def spherical_power(p: dict[str, float], run: SimulatedRun) -> np.ndarray:
 
 
 @pytest.mark.parametrize(('name', 'power'), [
-    ('platform_drag', drag_power), ('revolute_stiffness', stiffness_power),
-    ('external_wrench', cord_power), ('revolute_friction', revolute_power),
-    ('spherical_friction', spherical_power)])
+    ('tool_drag', drag_power), ('joint_spring', stiffness_power),
+    ('external_wrench', cord_power), ('joint_friction:revolute', revolute_power),
+    ('joint_friction:spherical', spherical_power)])
 def test_the_drives_give_the_power_that_the_effect_takes(name: str, power: object) -> None:
     effect = drawn(name)
     run = simulate(NO_DRY.values, wave(0.3), [effect], control=WEIGHT_HELD, sensors=QUIET)
@@ -781,7 +782,7 @@ CONTAINERS = (
     'pprs_dynamics.drives',
     'pprs_dynamics.physics.mechanism.motion', 'pprs_dynamics.physics.mechanism.joint_motion',
     'pprs_dynamics.physics.mechanism.structure_load',
-    'pprs_dynamics.physics.three_pprs.joint_series', 'pprs_dynamics.physics.model.arm_model',
+    'pprs_dynamics.physics.mechanism.joint_series', 'pprs_dynamics.physics.model.arm_model',
     'pprs_dynamics.physics.model.limits')
 # Robots by URDF are built in MuJoCo from what was read of their file: joints, loops and names. Of
 # equations they share one: the friction that the model file itself gives passive joints, which

@@ -79,7 +79,7 @@ class Hose(BodyEffect):
     def load(self, state):
         wrench = np.zeros((len(state.velocity), 6))
         wrench[:, 2] = self.values['force']
-        return StructureLoad(*fault('load', (wrench, np.zeros((len(wrench), 3)))))
+        return StructureLoad(*fault('load', (wrench, {})))
 
     def changed(self, robot):
         return fault('changed', robot)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
+from discovery import LEASE
 from node_bench import Bench, bench, overrides
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
@@ -24,7 +25,7 @@ from pprs_dynamics.ros.messages import conversions
 # Message fields are doubles and the model is deterministic: what remains is the rounding of
 # time_from_start, which the memoryless model does not use.
 EQUAL = 1e-12
-SOON, FORGOTTEN = 10.0, 30.0  # [s], for a status; until discovery forgets a killed node, and more
+SOON, FORGOTTEN = 10.0, LEASE + 10.0  # [s], for a status; until a killed node is forgotten
 
 
 class FeedforwardBench:
@@ -80,8 +81,8 @@ class FeedforwardBench:
     def wait_for_status(self, **wanted: Any) -> dict[str, Any]:
         """Return the first new status with these entries.
 
-        A node that an earlier test killed is a namesake until discovery forgets it, for 20 s, and
-        until then nothing is OK.
+        A node that an earlier test killed is a namesake until discovery forgets it, and until
+        then nothing is OK.
         """
         found = self.bench.spin_until(lambda: all(
             self.bench.status[-1].get(key) == value for key, value in wanted.items()),
@@ -96,12 +97,13 @@ def feedforward_bench(
 ) -> Iterator[FeedforwardBench]:
     """Give a running node with parameters of its own.
 
-    It never goes stale, and asks no message for its age or how early it is, unless told to.
+    It never goes stale or lags, and asks no message for its age or how early it is, unless told to.
 
     Keywords are parameters with `__` for the dot, `message` on `topic` what asks the node for
     forces.
     """
-    given = overrides(**{'command_timeout': 0.0, 'max_age': 0.0, 'max_ahead': 0.0, **parameters})
+    given = overrides(**{'command_timeout': 0.0, 'max_age': 0.0, 'max_ahead': 0.0,
+                         'lag_warning': 0.0, **parameters})
     with bench() as running:
         yield FeedforwardBench(running, message, topic, parameter_overrides=given).connect()
 

@@ -21,7 +21,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 
-STATUS = json.loads((Path(__file__).parents[2] / 'config/schemas/status.schema.json').read_text())
+SCHEMAS = Path(__file__).parents[2] / 'config' / 'schemas'
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
@@ -60,7 +60,7 @@ class Bench:
     def follow_status(self, topic: str) -> None:
         """Keep every status of a node, decoded and as its schema says, in `status`."""
         self.probe.create_subscription(
-            String, topic, lambda message: self.status.append(checked_status(message.data)),
+            String, topic, lambda message: self.status.append(checked(message.data)),
             LATCHED)
 
     def spin_until(self, predicate: Callable[[], Any], timeout: float = 10.0) -> bool:
@@ -77,11 +77,11 @@ class Bench:
         self.spin_until(lambda: False, duration)
 
 
-def checked_status(data: str) -> dict[str, Any]:
-    """Return a status, or raise ValidationError where it is not as the schema says."""
-    status: dict[str, Any] = json.loads(data)
-    jsonschema.validate(status, STATUS)
-    return status
+def checked(data: str, schema: str = 'status') -> dict[str, Any]:
+    """Return a JSON of a node, or raise ValidationError where it is not as its schema says."""
+    content: dict[str, Any] = json.loads(data)
+    jsonschema.validate(content, json.loads((SCHEMAS / f'{schema}.schema.json').read_text()))
+    return content
 
 
 def overrides(**values: Any) -> list[Parameter]:

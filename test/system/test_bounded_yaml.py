@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+from pprs_command import pprs
 from ros_processes import executable
 
 from pprs_dynamics import DriveModel
@@ -72,8 +73,7 @@ def test_numbers_within_bounds_that_are_none_are_one_sentence(
 ) -> None:
     file = tmp_path / 'model.yaml'
     file.write_text(PAPER.read_text().replace('base_radius: 0.15', f'base_radius: {number}'))
-    done = subprocess.run([executable('pprs'), 'history', file.name],
-                          cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    done = pprs('history', file.name, cwd=tmp_path)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
     assert len(done.stderr) < 400

@@ -13,15 +13,18 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
+from scipy.linalg import qr
 
 from benchmarks.naming.entrants.equations import Equations
 from benchmarks.naming.entrants.penalised import best_shapes
 from benchmarks.naming.problems import Answer, Problem
 
-STEPS = 10  # of FROLS
+STEPS = 10  # of FROLS, by its default
+ALIKE = 1e-3  # share of a column that others leave, below which FROLS does not get it
 
 
-def sindy(problem: Problem, optimiser: str = 'STLSQ', threshold: float = 0.1) -> Answer:
+def sindy(problem: Problem, optimiser: str = 'STLSQ', threshold: float = 0.1,
+          steps: int = STEPS) -> Answer:
     """Return what an optimiser of PySINDy keeps.
 
     Parameters
@@ -29,20 +32,28 @@ def sindy(problem: Problem, optimiser: str = 'STLSQ', threshold: float = 0.1) ->
     problem : Problem
     optimiser : {'STLSQ', 'SR3', 'FROLS'}
     threshold : float
-        On coefficients of columns of unit rms; the error is in units of its noise.
+        On coefficients of columns of unit rms; the error is in units of its noise. Not of FROLS.
+    steps : int
+        Terms of FROLS at the most.
     """
     import pysindy
 
     equations = Equations(problem)
     made = {'STLSQ': lambda: pysindy.STLSQ(threshold=threshold),
             'SR3': lambda: pysindy.SR3(reg_weight_lam=threshold ** 2 / 2, max_iter=300),
-            'FROLS': lambda: pysindy.FROLS(max_iter=STEPS)}[optimiser]()
+            'FROLS': lambda: pysindy.FROLS(max_iter=int(steps))}[optimiser]()
+    rows, seen = equations.compressed()
+    columns = list(range(equations.X.shape[1]))
+    if optimiser == 'FROLS':
+        # It divides by what is left of a column beside others: one shape each, and none that
+        # others, or the model's own numbers, make up.
+        columns = equations.best_single()
+        size, order = qr(rows[:, columns], mode='r', pivoting=True)
+        left = np.abs(np.diag(size))
+        columns = sorted(columns[k] for k in order[:np.count_nonzero(left > ALIKE * left[0])])
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')
-        # FROLS orthogonalises column by column and cannot have two that are alike: one shape each.
-        columns = (equations.best_single() if optimiser == 'FROLS'
-                   else list(range(equations.X.shape[1])))
-        made.fit(equations.X[:, columns], equations.y[:, None])
+        made.fit(rows[:, columns], seen[:, None])
     coefficients = np.zeros(equations.X.shape[1])
     coefficients[columns] = np.ravel(made.coef_)
     return equations.answered(best_shapes(equations, coefficients))

@@ -24,7 +24,8 @@ LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
 OUTPUTS = ('output', 'json', 'report', 'mcap', 'picture')
-INPUTS = ('model', 'recordings', 'before', 'after', 'validate', 'beside', 'refit', 'file',
+INPUTS = ('model', 'recordings', 'before', 'after', 'validate', 'reference', 'beside', 'refit',
+          'file',
           'manifest', 'store', 'path')
 
 DEFAULT_MODEL = 'config/paper.yaml'
@@ -74,6 +75,13 @@ def add_validation(parser: argparse.ArgumentParser,
     """Declare --validate."""
     parser.add_argument('--validate', metavar='RECORDING', action='append', default=[],
                         help=f'a recording that is never fitted: {what}; may be repeated')
+
+
+def add_reference(parser: argparse.ArgumentParser) -> None:
+    """Declare --reference."""
+    parser.add_argument('--reference', metavar='RECORDING', nargs='*',
+                        help='runs from a day on which the machine was right (none given: those '
+                        'that the model file names): what has changed since then?')
 
 
 def add_model_output(parser: argparse.ArgumentParser, what: str, required: bool = True) -> None:

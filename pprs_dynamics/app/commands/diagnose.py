@@ -24,6 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_recordings(parser)
     arguments.add_as_it_is(parser)
     arguments.add_validation(parser)
+    arguments.add_reference(parser)
     arguments.add_details(parser)
     arguments.add_report(parser)
     arguments.add_picture(parser, 'draw the error of every drive, before and with what was found')
@@ -43,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
     if options.refit is not None:
         require_open_numbers(inputs.model)
     with staged_bar(screen) as progress:
-        result = diagnose(inputs.model, inputs, progress=progress)
+        result = diagnose(inputs.model, inputs, progress=progress, reference=options.reference)
     tell(result, options, screen,
          view=result.view(options.details, next_step=not options.adopt_all))
     if options.picture:

@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     model = load_model(options.model)
     content: dict[str, Any] = {}
-    if isinstance(model, ArmModel):
+    if isinstance(model, ArmModel) and model.is_described:
         content['robot'] = describe_mechanism(model)
         for line in mechanism_lines(model):
             screen.print(shown(line))

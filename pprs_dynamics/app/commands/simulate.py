@@ -23,6 +23,7 @@ from pprs_dynamics.app.commands.arguments import (
 from pprs_dynamics.app.commands.input_output import tell
 from pprs_dynamics.app.front_door.simulate import FEEDFORWARDS, NOISE, RATE, simulate
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
+from pprs_dynamics.physics.effects.catalogue import FORMER
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
@@ -44,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='.mcap, .csv, or the name of a rosbag2 folder to make')
     add_overwrite(parser)
     parser.add_argument('--effect', metavar='NAME', action='append', default=[],
-                        choices=(*dict.fromkeys((*HIDDEN_EFFECTS, *ARM_EFFECTS)), RANDOM),
+                        choices=(*dict.fromkeys((*HIDDEN_EFFECTS, *ARM_EFFECTS)), RANDOM, *FORMER),
                         help='physics that the model does not know of, drawn from the seed; may '
                         f'be repeated: random, {", ".join(HIDDEN_EFFECTS)}; of an arm or a '
                         f'robot with loops {", ".join(ARM_EFFECTS)}')
@@ -61,6 +62,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'arm [N m, N] half a percent of the largest)')
     parser.add_argument('--feedforward', choices=FEEDFORWARDS, default='friction',
                         help='what the robot is driven with (default friction)')
+    parser.add_argument('--thermometers', action='store_true',
+                        help='of an arm: record the temperatures of the drives, even where no '
+                        'effect follows them')
     add_report(parser, 'the robot moving, as a page')
 
 
@@ -73,7 +77,8 @@ def run(options: argparse.Namespace) -> int:
         result = simulate(
             model, options.effect, seed=options.seed, scale=options.scale, motion=motion,
             duration=options.duration, path_seed=options.path_seed, noise=options.noise,
-            feedforward=options.feedforward, progress=progress)
+            feedforward=options.feedforward, thermometers=options.thermometers,
+            progress=progress)
     result.save(options.output)
     tell(result, options, screen, recording=options.output)
     screen.print(f'recording: {shown(options.output)}')

@@ -13,6 +13,7 @@ from typing import Any
 from pprs_dynamics.app.commands.arguments import (
     DEFAULT_MODEL,
     UsageError,
+    add_reference,
     add_report,
     add_topic,
     output_folder,
@@ -27,6 +28,7 @@ from pprs_dynamics.app.fleet.trend import fleet_trends
 from pprs_dynamics.app.fleet.words import sentences
 from pprs_dynamics.app.report.fleet_page import fleet_page
 from pprs_dynamics.app.report.terminal import console, counting_bar, shown
+from pprs_dynamics.inference.fit.reference_runs import read_reference
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.system.plain_text import counted, displayed
@@ -48,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--effects', metavar='auto|NAME,…', default=AUTO,
                         help='auto: diagnose each recording; else these effects are fitted, many '
                         'times faster; EFFECT or EFFECT:drive+drive')
+    add_reference(parser)
     add_topic(parser)
     where = parser.add_mutually_exclusive_group()
     where.add_argument('--workers', metavar='N', type=whole(1, MOST_WORKERS),
@@ -68,10 +71,18 @@ def run(options: argparse.Namespace) -> int:
     if options.effects != AUTO and not requests_of(options.effects, base):
         raise UsageError(f'--effects {options.effects!r}: must be auto or names of effects')
 
+    if options.reference is not None and options.effects != AUTO:
+        raise UsageError('--reference: it is given with --effects, but only a diagnosis tells what '
+                         'has changed: take one of them out')
+    reference = None if options.reference is None else tuple(options.reference)
+    if reference is not None:
+        read_reference(base, reference)  # what is wrong with it ends the command
+
     def jobs() -> Iterator[SurveyJob]:
         for entry in entries(options.recordings, options.manifest):
             model, name = model_of(entry.model or options.model)
-            yield SurveyJob(entry, model.values, name, options.effects, options.topic)
+            yield SurveyJob(entry, model.values, name, options.effects, options.topic,
+                            reference, model.source)
 
     total = sum(1 for _ in entries(options.recordings, options.manifest))
     if not total:

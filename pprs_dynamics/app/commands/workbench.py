@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import re
 
-from pprs_dynamics.app.commands.arguments import add_topic, add_validation, whole
+from pprs_dynamics.app.commands.arguments import add_reference, add_topic, add_validation, whole
 from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench.server.hub import Hub, LiveSource
 from pprs_dynamics.app.workbench.server.offered import Offered, is_folder
@@ -33,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='rosbag2 folder, .mcap, .db3 or .csv; or a folder of them, or a '
                         'store of pprs survey, to choose from in the browser')
     add_validation(parser, 'adoptions are judged on it')
+    add_reference(parser)
     add_topic(parser)
     parser.add_argument('--live', action='store_true',
                         help='listen to joint_states, and set effects on running nodes')
@@ -54,7 +55,8 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     given = [path for path in options.recordings if not is_folder(path)]
     # What cannot be read ends the command; measuring takes longer, and goes on behind the page.
-    inputs = Inputs.read(options.model, given, options.validate, options.topic)
+    inputs = Inputs.read(options.model, given, options.validate, options.topic).since(
+        options.reference)
     live = _live(options, inputs.model) if options.live else None
     hub = Hub(inputs, Offered.of(options.recordings), live)
     serve(hub, options.host, options.port, not options.no_browser)

@@ -30,6 +30,8 @@ from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.fit.reference import Reference
+from pprs_dynamics.inference.fit.reference_runs import read_reference
 from pprs_dynamics.inference.residuals.conventions import find_mistakes
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import estimate_present
@@ -63,6 +65,10 @@ class SurveyJob:
     options : str
         'auto', or effects as EFFECT or EFFECT:drive+drive, divided by commas.
     topic : str, optional
+    reference : tuple of str, optional
+        Runs since which it is diagnosed what has changed; () for those of the model file.
+    source : str
+        The model's file.
     """
 
     entry: ManifestEntry
@@ -70,10 +76,19 @@ class SurveyJob:
     model: str
     options: str = AUTO
     topic: str | None = None
+    reference: tuple[str, ...] | None = None
+    source: str = ''
+
+    @property
+    def told_options(self) -> str:
+        """The options as a store tells them, reference runs among them."""
+        if self.reference is None:
+            return self.options
+        return f'{self.options} since {", ".join(self.reference) or "reference"}'
 
     def key(self, content: str) -> str:
         """Return the key of its rows; `content` is the recording's SHA-256."""
-        return key_of(content, self.model, self.options, __version__)
+        return key_of(content, self.model, self.told_options, __version__)
 
 
 @dataclass(frozen=True)
@@ -183,24 +198,32 @@ def _common(job: SurveyJob, content: str | None) -> dict[str, Any]:
     return {'recording': displayed(PurePosixPath(entry.path.rstrip('/')).name),
             'path': displayed(entry.path), 'sha256': content,
             'time': None if entry.time is None else datetime.fromtimestamp(entry.time, UTC),
-            'model': job.model, 'options': job.options, 'version': __version__,
+            'model': job.model, 'options': job.told_options, 'version': __version__,
             'conditions': list(entry.conditions.items())}
 
 
 @lru_cache(MODELS_KEPT)
-def _model(fingerprint: str, values: tuple[tuple[str, Any], ...]) -> ForceModel:
-    return build_model(dict(values))
+def _model(fingerprint: str, values: tuple[tuple[str, Any], ...], source: str = '') -> ForceModel:
+    return build_model(dict(values), source)
+
+
+@lru_cache(MODELS_KEPT)
+def _reference(fingerprint: str, values: tuple[tuple[str, Any], ...], source: str,
+               files: tuple[str, ...]) -> Reference:
+    return read_reference(_model(fingerprint, values, source), files)
 
 
 def _examined(job: SurveyJob, path: str, common: dict[str, Any]) -> list[dict[str, Any]]:
-    model = _model(job.model, tuple(
-        (key, tuple(value) if isinstance(value, list) else value)  # as files have lists
-        for key, value in job.values.items()))
+    values = tuple((key, tuple(value) if isinstance(value, list) else value)  # as files have lists
+                   for key, value in job.values.items())
+    model = _model(job.model, values, job.source)
+    reference = None if job.reference is None else _reference(
+        job.model, values, job.source, job.reference)
     recording = read_recording(path, model.recorded, job.topic)
     summary = describe(recording)
     if common['time'] is None:
         common = {**common, 'time': datetime.fromtimestamp(recording.epoch + summary.start, UTC)}
-    rows, drives, verdict = _judged(model, recording, job)
+    rows, drives, verdict = _judged(model, recording, job, reference)
     common = {**common, 'duration': summary.duration, 'verdict': verdict}
     return [{**common, 'drive': drive, **numbers} for drive, numbers in drives.items()] + [
         {**common, **drives.get(row.get('drive') or '', {}), **row} for row in rows]
@@ -210,14 +233,15 @@ Examined = tuple[list[dict[str, Any]], dict[str, dict[str, float]], str]
 """Rows of values, numbers by drive, and the verdict."""
 
 
-def _judged(model: ForceModel, recording: Recording, job: SurveyJob) -> Examined:
+def _judged(model: ForceModel, recording: Recording, job: SurveyJob,
+            reference: Reference | None) -> Examined:
     """Return what is found; a recording of other units, signs or drives is refused.
 
     The search for these takes longer than a fit, so that there only what fits badly is searched.
     """
     if job.options == AUTO:
         _refuse_mistakes(model, recording, job)
-        return _diagnosed(model, recording)
+        return _diagnosed(model, recording, reference)
     try:
         rows, residuals, noise = fit_named_effects(model, recording,
                                                    requests_of(job.options, model))
@@ -248,8 +272,9 @@ def _drives(residuals: Residuals, noise: Mapping[str, float]) -> dict[str, dict[
     return found
 
 
-def _diagnosed(model: ForceModel, recording: Recording) -> Examined:
-    diagnosis = diagnose(model, [recording])
+def _diagnosed(model: ForceModel, recording: Recording,
+               reference: Reference | None) -> Examined:
+    diagnosis = diagnose(model, [recording], reference=reference)
     rows: list[dict[str, Any]] = []
     for effect in diagnosis.effects:
         for key, one in effect.parameters.items():
@@ -271,7 +296,7 @@ def _as_in_model(diagnosis: Diagnosis, told: Container[tuple[str | None, str]],
     for effect in diagnosis.model.effects:
         if not isinstance(effect, (DriveEffect, StructureEffect)):
             continue
-        for key, one in estimate_present(selection.last, selection.kept, effect).items():
+        for key, one in estimate_present(selection.last, selection.reported, effect).items():
             drive, parameter = effect.place_and_parameter(key)
             if (drive or None, effect.name) not in told:
                 yield {'drive': drive or None, 'effect': effect.name, 'parameter': parameter,

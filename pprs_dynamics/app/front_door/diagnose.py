@@ -9,7 +9,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings, stage
+from pprs_dynamics.app.front_door.inputs import (
+    Given,
+    Inputs,
+    Model,
+    Progress,
+    Recordings,
+    stage,
+)
 from pprs_dynamics.app.front_door.result import Result, data_frame
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_recordings
@@ -101,7 +108,7 @@ class DiagnosisResult(Result):
 
 def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,
              topic: str | None = None, progress: Progress | None = None, as_it_is: bool = False,
-             ) -> DiagnosisResult:
+             reference: Given | None = None) -> DiagnosisResult:
     """Find the physical effect that a model lacks, as far as recordings can tell.
 
     Parameters
@@ -113,6 +120,9 @@ def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,
         Of other motions, never fitted: held-out errors are taken on them, instead of on blocks.
     topic, progress, as_it_is : optional
         As in `compare`.
+    reference : path, Recording, or a sequence of them, optional
+        Runs from a day on which the machine was right: what has changed since then is looked for,
+        not what the model lacks. An empty sequence: those that the model file names.
 
     Returns
     -------
@@ -124,7 +134,8 @@ def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,
         As `compare`.
     """
     inputs = Inputs.of(
-        model, recordings, validate, topic, progress, as_it_is=as_it_is).require_recordings()
+        model, recordings, validate, topic, progress, as_it_is=as_it_is).require_recordings().since(
+            reference)
     return DiagnosisResult(inputs, diagnose_recordings(
         inputs.model, inputs.fitted, inputs.held_out, stage(progress, 'diagnosing'),
-        as_it_is=inputs.as_it_is))
+        as_it_is=inputs.as_it_is, reference=inputs.reference))

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from pprs_dynamics.drives import RecordedDrives
+from pprs_dynamics.drives import CHANNELS, RecordedDrives
 from pprs_dynamics.errors import PprsError, UnknownNameError, UnreadableFileError, meant
 from pprs_dynamics.measurement.files.array_files import is_lerobot
 from pprs_dynamics.measurement.files.bag_storage import is_storage
@@ -151,7 +151,7 @@ def first_model(
     if shared and not drives:
         chosen = tuple(name for name in chosen if name not in shared)
         notes.append(f'{" and ".join(shared)} share a transmission: they are left out, and '
-                     'taken to stand')
+                     'taken to stand; to drive them list them, with friction: {motors: …}')
     if contents is not None and contents.joints and not names.joints:
         names = _by_numbers(contents, chosen)
         notes.append('joints are matched by the numbers in their names')
@@ -422,7 +422,7 @@ def _drive_lines(guess: Guess, drives: Sequence[str], decimal: str) -> Iterator[
     if decimal != '.':
         yield f'decimal: "{decimal}"'
     for drive in drives:
-        cells = [f'{kind}: {scalar(guess.columns[drive, kind])}' for kind in SETTLED
+        cells = [f'{kind}: {scalar(guess.columns[drive, kind])}' for kind in (*SETTLED, *CHANNELS)
                  if (drive, kind) in guess.columns]
         cells += [f'{SCALE_KEYS[kind]}: {scale:.12g}' for kind in SETTLED
                   if (scale := guess.scales.get((drive, kind))) is not None]

@@ -5,14 +5,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.front_door.result import Result, data_frame
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.inference.fit.base_fit import BaseFit, fit_base
+from pprs_dynamics.inference.fit.reference_runs import with_own_reference
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
@@ -82,13 +84,16 @@ class FitResult(Result):
 
 def fit(model: Model, recordings: Recordings, validate: Recordings = (), *,
         topic: str | None = None, progress: Progress | None = None, as_it_is: bool = False,
-        ) -> FitResult:
+        keep_residual: bool = False) -> FitResult:
     """Fit a base model: an arm's inertia and friction, or what `tolerances` leave open.
 
     Parameters
     ----------
     model, recordings, validate, topic, progress, as_it_is
         As in `diagnose`; recordings of free motion.
+    keep_residual : bool
+        Whether the model keeps, beside the names of its recordings, what it leaves of them, as a
+        reference that needs no files.
 
     Returns
     -------
@@ -103,5 +108,9 @@ def fit(model: Model, recordings: Recordings, validate: Recordings = (), *,
     """
     inputs = Inputs.of(
         model, recordings, validate, topic, progress, as_it_is=as_it_is).require_measurements()
-    return FitResult(inputs, fit_base(inputs.model, inputs.fitted, inputs.held_out,
-                                      stage(progress, 'fitting')))
+    found = fit_base(inputs.model, inputs.fitted, inputs.held_out, stage(progress, 'fitting'))
+    if set(inputs.recordings) <= inputs.paths:
+        found = replace(found, model=with_own_reference(
+            found.model, inputs.fitted, [Path(name) for name in inputs.recordings],
+            keep_residual))
+    return FitResult(inputs, found)

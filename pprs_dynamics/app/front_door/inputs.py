@@ -29,6 +29,7 @@ from pprs_dynamics.system.plain_text import displayed
 if TYPE_CHECKING:
     from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook
     from pprs_dynamics.inference.diagnosis.next_step import GivenFiles
+    from pprs_dynamics.inference.fit.reference import Reference
 
 File = str | PathLike[str]
 Model = ForceModel | File
@@ -66,6 +67,8 @@ class Inputs:
         As given; '' for none.
     as_it_is : bool
         Whether recordings are taken as their names and units say, whatever they look like.
+    reference : Reference, optional
+        Run since which it is asked what has changed.
     """
 
     model: ForceModel
@@ -76,6 +79,7 @@ class Inputs:
     model_path: str = ''
     topic: str = ''
     as_it_is: bool = False
+    reference: Reference | None = None
 
     @classmethod
     def of(cls, model: Model, recordings: Recordings, validate: Recordings = (),
@@ -115,8 +119,8 @@ class Inputs:
         given = base or '' if isinstance(model, ForceModel) else model
         name = '' if shipped else str(given)
         # Before anything is read, which may take minutes.
-        _refuse_same_paths(_listed(recordings), [], ONCE)
-        _refuse_same_paths(_listed(validate), _listed(recordings), OTHER)
+        _refuse_same_paths(listed_recordings(recordings), [], ONCE)
+        _refuse_same_paths(listed_recordings(validate), listed_recordings(recordings), OTHER)
         fitted, held_out = (_read_all(found, listed, topic, progress)
                             for listed in (recordings, validate))
         _refuse_repeats(fitted, [], ONCE)
@@ -178,6 +182,19 @@ class Inputs:
                            for given in (self.recordings, self.validation))
         return replace(self, recordings=fewer, validation=held_out,
                        paths=self.paths - {name}).require_recordings()
+
+    def since(self, reference: Given | None) -> Inputs:
+        """Return this with reference runs, () for the model's own; as it is for None.
+
+        Raises
+        ------
+        PprsError
+            As `read_reference`.
+        """
+        from pprs_dynamics.inference.fit.reference_runs import read_reference
+
+        return self if reference is None else replace(self, reference=read_reference(
+            self.model, listed_recordings(reference), [*self.fitted, *self.held_out]))
 
     def require_recordings(self) -> Inputs:
         """Return this, or raise InputError where there is no recording to fit to."""
@@ -272,10 +289,11 @@ def _read_all(model: ForceModel, given: Given, topic: str | None, progress: Prog
               ) -> list[_Read]:
     return [_Read(one.name, one, False) if isinstance(one, Recording)
             else _Read(str(one), _read(model, one, topic, progress), True)
-            for one in _listed(given)]
+            for one in listed_recordings(given)]
 
 
-def _listed(given: Given) -> Sequence[File | Recording]:
+def listed_recordings(given: Given) -> Sequence[File | Recording]:
+    """Return what is given as one or several, as several."""
     return [given] if isinstance(given, (str, PathLike, Recording)) else given
 
 
@@ -292,8 +310,8 @@ def _refuse_same_paths(given: Sequence[File | Recording], earlier: Sequence[File
 def _require_kinds(recordings: Given, validate: Given) -> None:
     """Raise InputError for recordings that are neither a path nor a Recording."""
     for name, given in (('recordings', recordings), ('validate', validate)):
-        listed = _listed(given) if isinstance(given, (str, PathLike, Recording, Sequence)) else (
-            [given])
+        listed = (listed_recordings(given) if isinstance(
+            given, (str, PathLike, Recording, Sequence)) else [given])
         for one in listed:
             if not isinstance(one, (Recording, str, PathLike)):
                 raise InputError(f'{name}: one is of type {type(one).__name__}, must be a path or '

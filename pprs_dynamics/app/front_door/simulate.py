@@ -114,7 +114,7 @@ class SimulationResult(Result):
 def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
              scale: float = 1.0, motion: PlatformMotion | None = None, duration: float = 40.0,
              path_seed: int = 0, noise: float | None = None, feedforward: str = 'friction',
-             progress: Progress | None = None) -> SimulationResult:
+             thermometers: bool = False, progress: Progress | None = None) -> SimulationResult:
     """Record a robot of a physics engine that has effects which its model does not know of.
 
     Parameters
@@ -137,6 +137,8 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
         [N m, N].
     feedforward : {'friction', 'rigid_body', 'none'}
         What the 3-PPRS is driven with.
+    thermometers : bool
+        Whether those of an arm are recorded, even where no effect follows the temperature.
     progress : callable, optional
         Called with what is being done and the share of it that is done.
 
@@ -154,14 +156,15 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     found = model if isinstance(model, ForceModel) else load_model(find_file(model))
     names = [effects] if isinstance(effects, str) else list(effects)
     share_done = stage(progress, 'simulating')
-    if isinstance(found, ArmModel):
+    if isinstance(found, ArmModel) and found.is_described:
         from pprs_dynamics.simulation.arm_run import RATE as ARM_RATE
         from pprs_dynamics.simulation.arm_run import simulate_arm
 
-        arm = simulate_arm(found, names, seed, scale, noise, duration, path_seed, share_done)
+        arm = simulate_arm(found, names, seed, scale, noise, duration, path_seed, share_done,
+                           thermometers)
         assert arm.motion.time is not None
         recording = Recording.from_arrays('simulated', arm.motion.time, arm.position, None,
-                                          arm.effort, found.drives)
+                                          arm.effort, found.drives, arm.channels)
         return SimulationResult(found, recording, arm.effects, (), arm.motion, ARM_RATE, seed)
     if not isinstance(found, DriveModel):
         raise MotionError('model', f'it is of {found.title}', 'be of a 3-PPRS or an arm', 'shape')
@@ -186,6 +189,7 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
         truth=False, control=ControlSettings(gravity_compensation=feedforward == 'none'),
         sensors=SensorSettings.with_effort_noise(NOISE if noise is None else noise),
         progress=share_done)
-    recording = Recording.from_arrays('simulated', run.time, run.position, run.velocity, run.effort)
+    recording = Recording.from_arrays('simulated', run.time, run.position, run.velocity, run.effort,
+                                      channels=run.channels)
     return SimulationResult(found, recording, tuple(run.effects), tuple(run.notes), motion, RATE,
                             seed)

@@ -78,6 +78,7 @@ def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False
 def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     """Yield verdict, fall and next step, in at most 25 lines of 80 columns."""
     yield verdict_panel(diagnosis.verdict, COLOURS[diagnosis.verdict], words.headline)
+    yield from (f'[blue]i[/] {escape(text)}' for text in words.reference)
     second = runner_up(diagnosis)
     room = max(LONGEST - _room(f'Runner-up {second}') - WIDTH * len(diagnosis.effects), WIDTH)
     if diagnosis.effects:
@@ -121,6 +122,7 @@ def _following(words: Sentences) -> Iterator[Any]:
 
 def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     yield verdict_panel(diagnosis.verdict, COLOURS[diagnosis.verdict], words.headline)
+    yield from (f'[blue]i[/] {escape(text)}' for text in words.reference)
     if diagnosis.effects:
         held = ('the --validate recordings' if diagnosis.held_out_on == 'validation'
                 else 'blocks of the same recordings')
@@ -241,6 +243,8 @@ def diagnosis_page(
     """
     page = Page(f'Diagnosis: {diagnosis.verdict}')
     page.text(words.headline, 'lead')
+    for text in words.reference:
+        page.text(f'{text[:1].upper()}{text[1:]}.')
     page.sources(diagnosis.model.source, recordings, validation)
     steps = error_steps(diagnosis, after)
     with page.columns():

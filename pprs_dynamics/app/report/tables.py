@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.report.terminal import escape, stacked, text_table
+from pprs_dynamics.drives import CHANNELS
 from pprs_dynamics.system.plain_text import counted
 
 if TYPE_CHECKING:
@@ -40,11 +41,14 @@ def recording_table(summary: Summary, units: Sequence[DriveUnits]) -> list[Any]:
 
 def _recording_table(summary: Summary, units: DriveUnits, drives: Sequence[str]) -> Any:
     position = units.of('m')
+    channels = [name for name in CHANNELS
+                if any(name in summary.drives[drive].channels for drive in drives)]
     return text_table(
         ('drive', f'position [{position}]', f'velocity [{position}/s]', f'effort [{units.effort}]',
-         'measured'),
+         'measured', *(f'{name} [{CHANNELS[name]}]' for name in channels)),
         [(escape(drive), *map(_span, (found.position, found.velocity, found.effort)),
-          f'{found.measured:.1%}') for drive in drives for found in [summary.drives[drive]]],
+          f'{found.measured:.1%}', *(_span(found.channels.get(name)) for name in channels))
+         for drive in drives for found in [summary.drives[drive]]],
         caption=escape(summary.source), title=escape(
             f'{summary.name}: {summary.used} of {summary.samples} samples in '
             f'{counted(len(summary.segments), "segment")}, '

@@ -13,6 +13,7 @@ import numpy as np
 
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.experiments.next_experiment import next_experiment
+from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -39,9 +40,11 @@ class DesignedMotion:
     motion: PlatformMotion | JointMotion
 
 
-def diagnosed(model: ForceModel, recordings: Sequence[Recording], progress: Progress) -> Diagnosis:
+def diagnosed(model: ForceModel, recordings: Sequence[Recording], reference: Reference | None,
+              progress: Progress) -> Diagnosis:
     """Return a diagnosis without its searches, which are large."""
-    return replace(diagnose(model, recordings, (), progress), selection=None)
+    return replace(diagnose(model, recordings, (), progress, reference=reference),
+                   selection=None)
 
 
 def designed(model: DriveModel | ArmModel, recordings: Sequence[Recording], duration: float,

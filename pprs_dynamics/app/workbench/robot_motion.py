@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.model.arm_model import ArmModel
@@ -39,16 +38,9 @@ class RobotMotion:
 
 
 def robot_motion(session: Session) -> RobotMotion:
-    """Return the poses of all recordings, one after the other.
-
-    Raises
-    ------
-    SessionError
-        For a model that moves nothing.
-    """
+    """Return the poses of all recordings, one after the other."""
     model = session.model
-    if not isinstance(model, (DriveModel, ArmModel)):
-        raise SessionError(f'{model.title} is not drawn: it moves along a line')
+    assert isinstance(model, (DriveModel, ArmModel))
     chosen = np.unique(np.linspace(0, len(session.data) - 1, MOST_POSES).astype(int))
     found: list[Skeleton] = []
     first = 0

@@ -31,6 +31,7 @@ from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.quantities import word_little
 from pprs_dynamics.inference.experiments.next_experiment import check_duration
+from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
@@ -61,6 +62,8 @@ class Session:
         Never fitted, adoptions are judged on them.
     base : path, optional
         The model's file, whose comments exported models keep.
+    reference : Reference, optional
+        Run since which it is asked what has changed.
 
     Attributes
     ----------
@@ -87,11 +90,12 @@ class Session:
 
     def __init__(self, model: ForceModel, recordings: Mapping[str, Recording],
                  validation: Mapping[str, Recording] | None = None,
-                 base: str | PathLike[str] | None = None) -> None:
+                 base: str | PathLike[str] | None = None,
+                 reference: Reference | None = None) -> None:
         if not recordings:
             raise SessionError('no recording is given, must be at least one')
         self.inputs = Inputs(model, recordings, validation or {},
-                             base=None if base is None else Path(base))
+                             base=None if base is None else Path(base), reference=reference)
         self.diagnosis: Diagnosis | None = None
         self.last_adoption: Adoption | None = None
         self.experiment: DesignedMotion | None = None
@@ -100,7 +104,7 @@ class Session:
         self.history = History()
         self._lock, self._settling, self._reading = RLock(), RLock(), Lock()
         self._listeners: list[Callable[[], None]] = []
-        self._use(TickFits(model, list(recordings.values())))
+        self._use(TickFits(model, list(recordings.values()), reference))
 
     @classmethod
     def open(cls, recordings: Sequence[str | PathLike[str]],
@@ -128,7 +132,8 @@ class Session:
         """
         inputs = inputs.within_memory()
         try:
-            session = cls(inputs.model, inputs.recordings, inputs.validation)
+            session = cls(inputs.model, inputs.recordings, inputs.validation,
+                          reference=inputs.reference)
         except PprsError:
             # Positions in millimetres are told as that, not as a pose out of reach.
             inputs.checked()
@@ -160,7 +165,7 @@ class Session:
         with self._reading:
             more = self.inputs.with_more(path, is_held_out)
             while not self._take(more, self.fits if is_held_out
-                                 else TickFits(self.model, more.fitted)):
+                                 else TickFits(self.model, more.fitted, more.reference)):
                 pass  # the model was changed meanwhile
         self.notify()
 
@@ -473,7 +478,7 @@ class Session:
 
         def work(report: Callable[[float], None]) -> Diagnosis:
             found: Diagnosis = run_in_process(diagnosed, original(fits.model), fits.recordings,
-                                              report=report)
+                                              self.inputs.reference, report=report)
             with self._lock:
                 if fits is self.fits:
                     self.diagnosis, self.noise_floors = found, found.noise_floors
@@ -516,7 +521,8 @@ class Session:
             partial(adopt, diagnosis=self.diagnosis), fits.model, request, fits.recordings,
             inputs.held_out, force, report=lambda share: report(0.9 * share))
         if answer.adopted:
-            after = TickFits(inputs.ledger.entered(answer), fits.recordings)
+            after = TickFits(inputs.ledger.entered(answer), fits.recordings,
+                             inputs.reference)
             report(0.95)
             with self._lock:
                 if fits is not self.fits:
@@ -545,8 +551,7 @@ class Session:
             For a model of another mechanism, or a duration that no design is made for.
         """
         model = self.model
-        if not isinstance(model, (DriveModel, ArmModel)):
-            raise SessionError(f'no motions are designed for {model.title}')
+        assert isinstance(model, (DriveModel, ArmModel))
         check_duration(duration)
 
         def work(report: Callable[[float], None]) -> DesignedMotion:
@@ -582,7 +587,8 @@ class Session:
             values, step = without_last_step(self.model.values)
             model = replace(build_model(values), source=self.model.source)
             self.diagnosis = None
-            self._use(TickFits(model, self.fits.recordings), self.view_state.ticks)
+            self._use(TickFits(model, self.fits.recordings, self.inputs.reference),
+                      self.view_state.ticks)
             return step
 
     # What goes out

@@ -17,6 +17,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.adoption.adopt import original
+from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -104,6 +105,8 @@ class TickFits:
     model : ForceModel
         As it is; its numbers count from where its ledger says they began.
     recordings : sequence of Recording
+    reference : Reference, optional
+        Whose forces are taken from all errors.
 
     Attributes
     ----------
@@ -116,17 +119,20 @@ class TickFits:
         As `measure_residuals` and `Regression`.
     """
 
-    def __init__(self, model: ForceModel, recordings: Sequence[Recording]) -> None:
+    def __init__(self, model: ForceModel, recordings: Sequence[Recording],
+                 reference: Reference | None = None) -> None:
         self.model, self.recordings = model, tuple(recordings)
         start = original(model)
         self.design = Design.of(start, recordings)
+        if reference is not None:
+            self.design = self.design.beside(reference.carried_over(self.design))
         self.fits = FittedSets(self.design, DECISIONS)
         self.scan = Scan(self.fits)
         self.none = self.fits.evaluate(())
         self._scanning = RLock()  # of the library
         self.measured = self.design.residuals.measured
-        self.before = (self.design.residuals if start is model
-                       else measure_residuals(model, recordings)[0]).error
+        self.before = (self.design.residuals.error if start is model else
+                       self.measured - measure_residuals(model, recordings)[0].model)
 
     @property
     def drives(self) -> tuple[str, ...]:

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.adoption import objections
 from pprs_dynamics.inference.adoption.adoption import BLOCKS, VALIDATION, Adoption
@@ -31,7 +30,7 @@ from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.paired_errors import block_gains, rms
+from pprs_dynamics.inference.residuals.paired_errors import PairedGain, paired_gain, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.inference.search.fitted_model import linear_error
@@ -120,12 +119,12 @@ def adopt(
     if others and named:
         remarks.append(f'the recordings call for {", ".join(others)}, too')
     if validate:
-        held_out, gains = case.validated(fitted.plain, fitted.model, diagnosis.noise)
+        held_out, gain = case.validated(fitted.plain, fitted.model, diagnosis.noise)
     else:
-        held_out, gains = (fitted.held_out_before, fitted.held_out_after), fitted.block_gains
+        held_out, gain = (fitted.held_out_before, fitted.held_out_after), fitted.gain
     promised = linear_error(fitted.fits, fitted.found)
     found += [*objections.of_linearity(promised, rms(after), after.unit),
-              *objections.of_held_out_error(*held_out, gains, model, case.held_out)]
+              *objections.of_held_out_error(*held_out, gain, model, case.held_out)]
     report(1.0)
     return case.answer(fitted.model, fitted.drives, found, [*remarks, *case.weakness(found)],
                        before, after, held_out, fitted.parameters, tuple(fitted.calibrated), rivals,
@@ -169,12 +168,12 @@ class _Case:
         return before, measure_residuals(after, self.recordings)[0]
 
     def validated(self, plain: ForceModel, fitted: ForceModel, noises: dict[str, NoiseSpectrum],
-                  ) -> tuple[tuple[float, float], Array]:
-        """Return errors on the validation recordings, and what the effect gains per block."""
+                  ) -> tuple[tuple[float, float], PairedGain]:
+        """Return errors on the validation recordings, and what the effect gains."""
         given, before, after = (measure_residuals(one, self.validate)[0]
                                 for one in (self.model, plain, fitted))
         # What the model's own numbers gain by being fitted is not the effect's.
-        return (rms(given), rms(after)), block_gains(before, after, noises)
+        return (rms(given), rms(after)), paired_gain(before, after, noises)
 
     def weakness(self, objections: list[str]) -> list[str]:
         """Return what to say of the evidence for an effect that nothing speaks against."""
@@ -231,7 +230,7 @@ def _adopt_curve(case: _Case, request: CurveRequest, report: Callable[[float], N
         f'no curve over {request.variable} is called for on {drive}: evidence {evidence:.3g}, '
         'where 0 is the threshold']
     against += objections.of_held_out_error(
-        *held_out, block_gains(given, found, {drive: noise}), model, case.held_out)
+        *held_out, paired_gain(given, found, {drive: noise}), model, case.held_out)
     remarks = [f'a measured curve, not a cause: {fitted.freedom:.0f} degrees of freedom over '
                f'{request.variable} from {fitted.curve.start:.4g} to {fitted.curve.end:.4g}; '
                'beyond, it goes on with its last value']

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.residuals.paired_errors import PairedGain
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import (
@@ -72,8 +72,8 @@ class EffectFit:
     found : CandidateSet
     held_out_before, held_out_after : float
         Over blocks, each predicted from the others [N].
-    block_gains : (B,) array
-        What the effect takes off the whitened squared error of each held-out block.
+    gain : PairedGain
+        What the effect takes off the whitened squared error of held-out blocks.
     nothing_left : tuple of str
         What keys of parameters begin with where the model had the effect and recordings leave
         nothing of it: a drive, a link, or nothing for all of it. `model` has it there no more.
@@ -94,7 +94,7 @@ class EffectFit:
     found: CandidateSet
     held_out_before: float
     held_out_after: float
-    block_gains: Array
+    gain: PairedGain
     nothing_left: tuple[str, ...] = ()
     moments: Mapping[str, Estimate] = field(default_factory=dict)
 
@@ -128,7 +128,7 @@ def fit_effect(
     before = hold_out(fits, without)
     # At the noise of the fit with the effect, so that losses of both are comparable.
     plain_set = replace(without, fit=fits.regression.at((), found.fit.amplitudes))
-    plain_losses = hold_out(fits, plain_set).losses
+    plain_held_out = hold_out(fits, plain_set)
     evidence = without.cost - found.cost
     last, found = relinearised(fits, found)
     report(0.8)
@@ -149,7 +149,7 @@ def fit_effect(
     return EffectFit(
         request, design.named(candidate.drives), final, fitted_model(fits, plain_set), parameters,
         said.at_bound, moved, evidence, share, last, found, before.error, after.error,
-        plain_losses - after.losses, nothing, said.moments)
+        plain_held_out.gain(after), nothing, said.moments)
 
 
 def _numbers(design: Design, request: EffectRequest) -> tuple[int, ...] | None:

@@ -9,26 +9,26 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.inference.adoption.fit_effect import SURE, EffectFit
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.quantities import as_fitted, with_uncertainty
-from pprs_dynamics.inference.residuals.paired_errors import certainty
+from pprs_dynamics.inference.residuals.paired_errors import PairedGain
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
-from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
-from pprs_dynamics.physics.effects.laws.passive_friction import PassiveFriction
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.force_model import (
+    ACTIVE_FRICTION,
+    PASSIVE_FRICTION,
+    ForceModel,
+)
 
 MOVING = 5.0  # widths in which friction turns over
 BENT = 1.5  # error of a fitted model over that of its linear fit
 PUSHES = 0.1  # of the moving time, in which a drive's friction may give power back
-# Standard errors of the blocks' losses by which the first effect, and further ones, must gain.
+# Standard errors by which the first effect, and further ones, must gain.
 FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0
 OWN_SHARE = 1e-6  # of a column's whitened square, below which nothing tells its coefficient
 
@@ -77,7 +77,7 @@ def _evidence(fitted: EffectFit, diagnosis: Diagnosis) -> list[str]:
             f'{fitted.evidence:.3g}, where 0 is the threshold']
 
 
-def of_held_out_error(before: float, after: float, gains: Array, model: ForceModel,
+def of_held_out_error(before: float, after: float, gain: PairedGain, model: ForceModel,
                       where: str) -> list[str]:
     """Return whether the error on held-out data fails to fall beyond its uncertainty.
 
@@ -85,15 +85,15 @@ def of_held_out_error(before: float, after: float, gains: Array, model: ForceMod
     ----------
     before, after : float
         [N]
-    gains : (B,) array
-        Of whitened squared error, block by block.
+    gain : PairedGain
+        Of the fitted model.
     model : ForceModel
         As given: more is asked where it has effects already.
     where : str
         What was held out, for the sentence.
     """
     unit = common_effort(model.units)
-    sure = certainty(gains)
+    sure = gain.certainty
     asked = FURTHER_ERRORS if any(
         isinstance(effect, CatalogueEffect) for effect in model.effects) else FIRST_ERRORS
     if after < before and sure > asked:
@@ -102,7 +102,7 @@ def of_held_out_error(before: float, after: float, gains: Array, model: ForceMod
         return [f'the error on {where} does not fall: {before:.4g} {unit} before, '
                 f'{after:.4g} {unit} after']
     return [f'the error on {where} falls from {before:.4g} to {after:.4g} {unit}, which is '
-            f'{sure:.2g} standard errors over blocks, must be more than {asked:g}']
+            f'{sure:.2g} standard errors, must be more than {asked:g}']
 
 
 def of_linearity(promised: float, found: float, unit: str) -> list[str]:
@@ -186,9 +186,9 @@ def _pushing_drives(model: ForceModel, residuals: Residuals) -> dict[str, float]
         part = residuals.parts.get(effect.name)
         if part is None:
             continue
-        if isinstance(effect, (ActiveFriction, AxisFriction)):
+        if effect.name == ACTIVE_FRICTION:
             own += part
-        elif isinstance(effect, PassiveFriction):
+        elif effect.name == PASSIVE_FRICTION:
             passive += part
         elif (isinstance(effect, CatalogueEffect) and effect.unphysical_below
               and effect.is_friction):

@@ -11,7 +11,12 @@ from dataclasses import dataclass, replace
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import PprsError, suggestion
 from pprs_dynamics.inference.adoption.fit_curve import CurveRequest
-from pprs_dynamics.physics.effects.catalogue import REPLACED, catalogue, find_effect
+from pprs_dynamics.physics.effects.catalogue import (
+    REPLACED,
+    catalogue,
+    find_effect,
+    told_general_name,
+)
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
@@ -59,7 +64,7 @@ class EffectRequest:
         EffectRequestError
             For an effect or a drive that does not exist.
         """
-        effect = find_effect(name)
+        effect = find_effect(told_general_name(name))
         if effect is None:
             if name in REPLACED:
                 raise EffectRequestError(f'unknown effect {name!r}, must be one of the catalogue: '

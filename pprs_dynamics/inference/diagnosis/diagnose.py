@@ -29,11 +29,13 @@ from pprs_dynamics.inference.diagnosis.statements import (
     word_statement,
     word_stick_slip,
 )
+from pprs_dynamics.inference.fit.reference import Reference
+from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measured_effort import kinds_of, looks_like
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.paired_errors import certainty, rms
+from pprs_dynamics.inference.residuals.paired_errors import paired_gain, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import (
     DURING,
@@ -78,6 +80,44 @@ from pprs_dynamics.system.numbers import finite
 
 MOST_SETS, MOST_BARRED = 8, 3  # that are told with their costs, and those that may not be
 MOST_AVERAGED = 5  # sets that estimates are averaged over
+
+
+@dataclass(frozen=True)
+class SinceReference:
+    """What a reference run says of the recordings of a diagnosis.
+
+    Parameters
+    ----------
+    recordings : tuple of str
+        The reference runs.
+    covered : float
+        Share of the samples whose states they know.
+    explained : mapping of str to float
+        Share of each drive's squared error, under the model as given, that they show as well.
+    note : str
+        What must be known of them; '' for nothing.
+    """
+
+    recordings: tuple[str, ...]
+    covered: float
+    explained: Mapping[str, float]
+    note: str
+
+    @classmethod
+    def of(cls, reference: Reference, design: Design) -> SinceReference:
+        """Return it for a design beside a reference."""
+        assert design.carried is not None
+        left = design.residuals.error
+        whole = left + design.carried.mean
+        before, after = (np.nansum(one ** 2, axis=0) for one in (whole, left))
+        explained = {drive: max(0.0, 1 - float(after[d] / before[d]))
+                     for d, drive in enumerate(design.drives) if before[d] > 0}
+        return cls(reference.names, design.carried.covered, explained, reference.note)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it for JSON."""
+        return {'recordings': list(self.recordings), 'covered': self.covered,
+                'explained': dict(self.explained)}
 
 
 @dataclass(frozen=True)
@@ -131,6 +171,8 @@ class Diagnosis:
         Drives whose efforts are no measurement: then nothing is claimed.
     stick_slip : mapping of str to StickSlip
         Drives that stick and slip for much of the time: then nothing else is claimed.
+    since : SinceReference, optional
+        The reference run since which it is told what has changed; None: what the model lacks.
     selection : Ranking, optional
         All that was tried, for looking closer.
     decisions : Decisions
@@ -163,6 +205,7 @@ class Diagnosis:
     held_out_on: str = 'blocks'
     effort_looks_like: Mapping[str, NoMeasurement] = field(default_factory=dict)
     stick_slip: Mapping[str, StickSlip] = field(default_factory=dict)
+    since: SinceReference | None = None
     selection: Ranking | None = field(default=None, repr=False, compare=False)
     decisions: Decisions = DECISIONS
 
@@ -191,6 +234,8 @@ class Diagnosis:
             'explained': _for_json(explained_shares(self.residuals)),
             'little_explained': dict(self.little),
             'explained_after': _for_json(explained_shares(self.residuals, self.remaining)),
+            'reference': None if self.since is None else self.since.to_dict(),
+            'changed_since': None if self.since is None else [one.name for one in self.effects],
             'noise_floor': self.noise_floor,
             'noise_floors': dict(self.noise_floors), 'warnings': list(self.warnings)}
 
@@ -198,7 +243,7 @@ class Diagnosis:
 def diagnose(
     model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
     progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
-    as_it_is: bool = False,
+    as_it_is: bool = False, reference: Reference | None = None,
 ) -> Diagnosis:
     """Return which physical effect a model lacks, as far as recordings can tell.
 
@@ -214,6 +259,8 @@ def diagnose(
     decisions : Decisions, optional
     as_it_is : bool
         Whether efforts that look like no measurement are taken for one all the same.
+    reference : Reference, optional
+        Since when it is asked what has changed; without it, what the model lacks.
 
     Raises
     ------
@@ -226,6 +273,11 @@ def diagnose(
                           f'in {", ".join(one.name for one in recordings)}', 'move: a robot that '
                           'stands tells nothing of friction, masses or delays', 'shape')
     other = {} if as_it_is else looks_like(model, recordings)
+    if other and reference is not None:
+        # What the reference looks like as well is no change.
+        before = looks_like(model, reference.recordings)
+        other = {drive: one for drive, one in other.items()
+                 if drive not in before or before[drive].kind != one.kind}
     # No law of the drive's own motion describes what its controller and its elasticity do.
     sticking = {} if as_it_is or other else {
         drive: one for drive, one in sticking_drives(recordings).items()
@@ -237,8 +289,11 @@ def diagnose(
                        stick_slip=sticking, depends_on=tuple(
                            word_stick_slip(drive, one, bare.residuals)
                            for drive, one in sticking.items()))
-    answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share)),
+    answer = _Answer(select(model, recordings, decisions, lambda share: report(0.9 * share),
+                            None if reference is None else reference.carried_over),
                      validate, decisions)
+    since = None if reference is None else SinceReference.of(
+        reference, answer.ranking.first.design)
     unconfirmed: list[FoundEffect] = []
     if any(one.is_impossible for one in answer.effects):
         # Whatever stands for what cannot be, or beside it, would be as wrong.
@@ -246,14 +301,15 @@ def diagnose(
         answer = _Answer(answer.ranking.claiming_nothing(), validate, decisions,
                          claims=False)
         report(1.0)
-        return replace(answer.diagnosis(found), verdict='unknown')
-    while weak := [one for one in answer.effects if one.objection or not one.is_confirmed]:
+        return replace(answer.diagnosis(found), verdict='unknown', since=since)
+    while weak := [one for one in answer.effects
+                   if one.objection or one.certainty < -decisions.sure]:
         unconfirmed.append(min(weak, key=lambda one: one.evidence))
         gone = answer.ranking.order[answer.effects.index(unconfirmed[-1])]
         answer = _Answer(answer.ranking.less(gone), validate, decisions)
     diagnosis = answer.diagnosis(tuple(unconfirmed))
     report(1.0)
-    return diagnosis
+    return replace(diagnosis, since=since)
 
 
 def _all_objected(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
@@ -270,16 +326,18 @@ class _Answer:
     def __init__(self, ranking: Ranking, validate: Sequence[Recording],
                  decisions: Decisions, claims: bool = True) -> None:
         self.ranking, self.validate, self.decisions = ranking, validate, decisions
-        self.fits, self.best, self.kept = ranking.last, ranking.best, ranking.kept
+        self.fits, self.map_set, self.reported = ranking.last, ranking.map_set, ranking.reported
         self.design = self.fits.design
         self.drives = self.design.drives
-        self.final = settled(self.fits, self.kept)
+        self.final = settled(self.fits, self.reported)
         self.remaining = ranking.first.design.residuals.measured - exact_forces(
-            self.design, self.final.model)
+            self.design, self.final.model) - self.design.carried_forces(
+                self.final.found.fit.coefficients)
         # Before a constant form is believed.
         self.dated_fits, self.dated = with_courses(
-            self.fits, self.kept, ranking.alone.values()) if claims else (self.fits, self.kept)
-        self.is_dated, self.adopted = self.dated is not self.kept, self.final.model
+            self.fits, self.reported, ranking.alone.values()) if claims else (
+                self.fits, self.reported)
+        self.is_dated, self.adopted = self.dated is not self.reported, self.final.model
         if self.is_dated:
             self.remaining = linear_residual(self.dated_fits, self.dated)
             self.adopted = self._dated_model()
@@ -288,11 +346,11 @@ class _Answer:
     def diagnosis(self, unconfirmed: tuple[FoundEffect, ...]) -> Diagnosis:
         first, final, effects = self.ranking.first.design, self.final, self.effects
         regression = self.fits.regression
-        noise = {self.drives[d]: one for d, one in regression.noise(self.best.fit).items()}
-        seen = noise_floors(self.fits, blocks=self.best.fit.blocks)
+        noise = {self.drives[d]: one for d, one in regression.noise(self.map_set.fit).items()}
+        seen = noise_floors(self.fits, best=self.map_set.fit)
         # Where the noise cannot be told it is at most what the best set leaves.
         floors = {self.drives[d]: seen.get(self.drives[d], regression.noise_floor(
-            self.best.fit, d)) for d in regression.drives}
+            self.map_set.fit, d)) for d in regression.drives}
         rivals = self._rivals()
         if self.is_dated:
             # What imitates a constant form is no rival of one that changes.
@@ -314,7 +372,7 @@ class _Answer:
             verdict, tuple(effects), sets, unconfirmed, self._candidates(),
             self._suspects(), depends, tuple(map(self._within_model_error, remainders)),
             self._sets(), self._barred(), tuple(moved),
-            find_cautions(self.fits, self.best, effects), first.notes,
+            find_cautions(self.fits, self.map_set, effects), first.notes,
             first.given, self.adopted, first.residuals, self.remaining, noise, floors,
             root_mean_square(list(floors.values())), above, little,
             tuple(name for name in floors if name not in seen),
@@ -353,11 +411,7 @@ class _Answer:
                 candidate.effect, self.design.named(candidate.drives), said.parameters,
                 final.fits.library.force(final.found, last, self.remaining.shape),
                 without.cost, errors[k], errors[k + 1], held_out[k], held_out[k + 1],
-                said.at_bound, self.ranking.shares[k],
-                (errors[k + 1] < errors[k] and (
-                    held_out[k + 1] < held_out[k]
-                    or (not self.validate and self._is_predicted(*steps[k:k + 2]))))
-                or self._is_needed(self.ranking.without[candidate], errors[-1], held_out[-1]),
+                said.at_bound, self.ranking.shares[k], self._certainty(candidate),
                 impossible or nothing, bool(impossible),
                 without, in_model, moments=said.moments))
         return found
@@ -450,26 +504,21 @@ class _Answer:
     def _nearly(self, candidate: EffectCandidate) -> list[tuple[float, Estimates]]:
         """Return what sets that are nearly as good say of an effect, and what they cost more."""
         near = self.ranking.near(self.decisions.rival_margin)[:MOST_AVERAGED]
-        return [(one.cost - self.kept.cost, estimate(self.fits, one, same))
-                for one in near if one is not self.kept
+        return [(one.cost - self.reported.cost, estimate(self.fits, one, same))
+                for one in near if one is not self.reported
                 for same in one.effects if same.effect is candidate.effect]
 
-    def _is_predicted(self, without: CandidateSet, found: CandidateSet) -> bool:
-        """Return whether held-out blocks are predicted better for certain with an effect more."""
-        before, after = (hold_out(self.fits, self.fits.at_noise_of(
-            self.kept, one.candidates)).losses for one in (without, found))
-        return certainty(before - after) > self.decisions.sure
-
-    def _is_needed(self, without: CandidateSet, error: float, held_out: float) -> bool:
-        """Return whether all that was found, with its errors, is better than without one of them.
-
-        Before what explains most is there, what another effect adds may look like an error.
-        """
-        if linear_error(self.fits, without) <= error:
-            return False
-        if self.validate:
-            return self._error_held_out(settled(self.fits, without).model) > held_out
-        return self._is_predicted(without, self.kept)
+    def _certainty(self, candidate: EffectCandidate) -> float:
+        """Return by how many standard errors held-out data are predicted better with an effect."""
+        without = self.ranking.without[candidate]
+        if not self.validate:
+            at_noise = self.fits.at_noise_of(self.reported, without.candidates)
+            return hold_out(self.fits, at_noise).gain(hold_out(self.fits, self.reported)).certainty
+        before, after = (measure_residuals(one, self.validate)[0] for one in (
+            settled(self.fits, without).model, self.final.model))
+        noise = {self.drives[d]: one for d, one in self.fits.regression.noise(
+            self.reported.fit).items()}
+        return paired_gain(before, after, noise).certainty
 
     def _above_noise(self, floors: Mapping[str, float]) -> dict[str, float]:
         """Return the drives that keep an error above their noise, as multiples of it."""
@@ -486,11 +535,11 @@ class _Answer:
             self.decisions.negligible * float(np.nanstd(effort)))
 
     def _evidence(self, candidate: Candidate) -> float:
-        return self.ranking.without[candidate].total - self.kept.total
+        return self.ranking.without[candidate].total - self.reported.total
 
     def _rivals(self) -> dict[str, list[str]]:
         """Return, for each adopted effect, what stands for it in sets that are nearly as good."""
-        rivals: dict[str, list[str]] = {c.name: [] for c in self.kept.effects}
+        rivals: dict[str, list[str]] = {c.name: [] for c in self.reported.effects}
         for rival in self.ranking.rivals(self.decisions.rival_margin):
             for name in rival.missing:
                 rivals[name] += [one for one in rival.instead if one not in rivals[name]]
@@ -526,7 +575,7 @@ class _Answer:
 
     def _suspects(self) -> tuple[RankedEffect, ...]:
         """Return effects that nearly pay beside those adopted: slow noise would do as well."""
-        return tuple(self._ranked(self.fits, one, candidate, self.best.cost - one.cost)
+        return tuple(self._ranked(self.fits, one, candidate, self.map_set.cost - one.cost)
                      for candidate, one in self.ranking.suspects(self.decisions.suspect_margin))
 
     def _ranked(self, fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
@@ -551,7 +600,7 @@ class _Answer:
         """Return the first set of every choice of names."""
         found: dict[frozenset[str], RankedSet] = {}
         for one in sets:
-            told = self._told(one, self.best)
+            told = self._told(one, self.map_set)
             found.setdefault(frozenset(name for name, _ in told.names), told)
             if len(found) == most:
                 break
@@ -588,7 +637,7 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
     if selection is None:
         return ()
     found = []
-    adopted = {c.name: c.claim for c in selection.kept.effects}
+    adopted = {c.name: c.claim for c in selection.reported.effects}
     for of, name in ((names[0], name) for names in diagnosis.indistinguishable
                      for name in names[1:]):
         best = next((one for one in selection.sets
@@ -603,7 +652,7 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
             candidate.effect, fits.design.named(candidate.drives),
             estimate(fits, best, candidate).parameters,
             fits.library.force(best, candidate, remaining.shape), of, linear_error(fits, best),
-            _held_out(fits, best, validate), best.cost - selection.best.cost, remaining))
+            _held_out(fits, best, validate), best.cost - selection.map_set.cost, remaining))
     return tuple(found)
 
 

@@ -9,11 +9,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.search.candidates import SINCE, Course
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.system.numbers import finite
 
 Drives = tuple[str, ...] | None
 
@@ -98,10 +101,10 @@ class FoundEffect(FittedEffect):
     share : float
         Of the error that it takes away, beside the effects before it: of the root mean square
         over drives, each as a multiple of its noise.
-    is_confirmed : bool
-        Whether the error falls with it, and that on held-out data: either their rms, or for
-        certain that of each frequency in units of its noise. In the former slow noise and the
-        model's own numbers have a share.
+    certainty : float
+        Standard errors by which all that was found predicts held-out data better than without it,
+        in units of the noise: see `PairedGain`. In their rms slow noise and the model's own
+        numbers have a share.
     objection : str
         Why it is no finding whatever the error does, as a clause; '' where nothing speaks against.
     is_impossible : bool
@@ -124,7 +127,7 @@ class FoundEffect(FittedEffect):
     held_out_after: float
     at_bound: tuple[str, ...] = ()
     share: float = 0.0
-    is_confirmed: bool = True
+    certainty: float = np.inf
     objection: str = ''
     is_impossible: bool = False
     without: RankedSet | None = None
@@ -154,7 +157,8 @@ class FoundEffect(FittedEffect):
                 'evidence': self.evidence,
                 'without': None if self.without is None else self.without.to_dict(),
                 'error_before': self.error_before, 'error_after': self.error_after,
-                'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after}
+                'held_out_before': self.held_out_before, 'held_out_after': self.held_out_after,
+                'held_out_certainty': finite(self.certainty)}
 
 
 @dataclass(frozen=True)

@@ -29,13 +29,10 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     with_uncertainty,
     word_little,
 )
+from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.paired_errors import (
-    block_gains,
-    certainty,
-    sample_gains,
-)
+from pprs_dynamics.inference.residuals.paired_errors import paired_gain, sample_gains
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -161,6 +158,8 @@ class LiveDiagnosis:
     recent : tuple of (Recording, float)
         The latest windows and when they begin [s], in which the beginning of a change is looked
         for.
+    reference : Reference, optional
+        Since which every window is diagnosed.
     """
 
     model: ForceModel
@@ -169,6 +168,7 @@ class LiveDiagnosis:
     withdrawn: tuple[LiveEffect, ...] = ()
     note: str = ''
     recent: tuple[tuple[Recording, float], ...] = ()
+    reference: Reference | None = None
 
     @property
     def claimed(self) -> tuple[LiveEffect, ...]:
@@ -208,7 +208,7 @@ class LiveDiagnosis:
         live = LIVE_DECISIONS
         if share_in_motion(recording.time, recording.position, live.moving) < live.least_motion:
             return replace(self, withdrawn=(), note='the robot stands: nothing is fitted')
-        answer = diagnose(self.model, [recording])
+        answer = diagnose(self.model, [recording], reference=self.reference)
         noise = answer.noise
         window = Window(recording, start, start + float(recording.time[-1] - recording.time[0]),
                         answer.to_dict(), answer.adopted,
@@ -245,7 +245,7 @@ class LiveDiagnosis:
             return False
         after, _ = measure_residuals(self.last.adopted, [recording])
         return all(
-            certainty(block_gains(measure_residuals(model, [recording])[0], after, noise)) > least
+            paired_gain(measure_residuals(model, [recording])[0], after, noise).certainty > least
             for model in (self.model, self.last.plain))
 
     def _beginning(self, window: Window) -> float | None:
@@ -254,7 +254,7 @@ class LiveDiagnosis:
         for each, start in (*self.recent, (window.recording, window.start)):
             before, _ = measure_residuals(window.plain, [each])
             after, _ = measure_residuals(window.adopted, [each])
-            gains.append(sample_gains(before, after, window.noise))
+            gains.append(sample_gains(before, after, window.noise)[0])
             times.append(start + before.time - before.time[0])
         return change_point(np.concatenate(times), np.concatenate(gains))
 

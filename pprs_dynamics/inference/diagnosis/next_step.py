@@ -88,7 +88,7 @@ def first_step(model: ForceModel, files: GivenFiles) -> tuple[str, str]:
 
     A description alone, without friction and with the maker's masses, is fitted first.
     """
-    if isinstance(model, ArmModel):
+    if isinstance(model, ArmModel) and model.is_described:
         bare = not any(np.any(model.values[key]) for key in OWN_FRICTION)
         words = ('The model has no friction yet: fit inertia and friction first' if bare else
                  'Check units, signs and zeros, and that this is the model of this machine as it '

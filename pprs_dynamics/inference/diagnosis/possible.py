@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.quantities import INTERVAL, with_uncertainty
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.decisions import Decisions
@@ -27,7 +26,7 @@ from pprs_dynamics.physics.effects.laws.effort_gain import EffortGain
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import RIGID_BODY, ForceModel
+from pprs_dynamics.physics.model.force_model import RIGID_BODY
 
 # Parameters that add to the model's own friction of a drive.
 VISCOUS = {ViscousFriction.name: ('coefficient',),
@@ -112,7 +111,7 @@ def _negative(effect: type[CatalogueEffect], name: str, drive: str, one: Estimat
     if effect is DriveInertia:
         own, what = _own_inertia(design, d), 'inertia'
     elif name in VISCOUS.get(effect.name, ()):
-        own, what = _own_viscous(design.given, d), 'viscous friction'
+        own, what = _own_viscous(design, d), 'viscous friction'
     elif name in DRY.get(effect.name, ()):
         own, what = _own_dry(design, d), 'dry friction'
     else:
@@ -123,24 +122,19 @@ def _negative(effect: type[CatalogueEffect], name: str, drive: str, one: Estimat
         yield f'{drive} would have {what} of {total} with what the model has'
 
 
-def _own_viscous(model: ForceModel, drive: int) -> float:
+def _own_viscous(design: Design, drive: int) -> float:
     """Return the model's own viscous friction of a drive [N s/m, N m s/rad]."""
-    values = model.values
-    for key in ('friction.viscous', 'friction.drives.viscous'):
-        if key in values:
-            return float(values[key][drive])
-    return float(values.get('axis.viscous', 0.0))
+    friction = design.friction()
+    return 0.0 if friction is None else float(
+        np.broadcast_to(friction.viscous, len(design.drives))[drive])
 
 
 def _own_dry(design: Design, drive: int) -> float:
     """Return the model's own dry friction of a drive, under its usual load [N, N m]."""
-    values = design.given.values
-    if 'friction.drives.coulomb' in values:
-        load: Array = np.abs(design.residuals.variables['load'][:, drive])
-        return float(values['friction.drives.coulomb'][drive] * np.median(load))
-    if 'friction.coulomb' in values:
-        return float(values['friction.coulomb'][drive])
-    return float(values.get('axis.coulomb', 0.0))
+    friction, usual = design.friction(), np.zeros(len(design.drives))
+    if 'load' in design.residuals.variables:
+        usual = np.median(np.abs(design.residuals.variables['load']), axis=0)
+    return 0.0 if friction is None else float(friction.dry(usual)[drive])
 
 
 def _own_inertia(design: Design, drive: int) -> float:

@@ -50,6 +50,7 @@ MOST_CHANGED = 4  # values of an effect of the model that a sentence sets agains
 MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
 TOLD_COST = 0.05  # of a term of a cost, that one digit shows
 VAGUE = 0.1  # of a mass, an uncertainty beyond which its first moment is told as well, if surer
+MOSTLY = 0.95  # of a recording, from which on a reference knows its states
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
 
 
@@ -116,6 +117,8 @@ class Sentences:
     suspects, within_model_error, barred, calibrated, warnings : tuple of str
     following, command : str
         What to do next, in words and for a shell.
+    reference : tuple of str
+        How far what has changed since a reference run can be told; none without one.
     """
 
     headline: str
@@ -129,6 +132,7 @@ class Sentences:
     warnings: tuple[str, ...]
     following: str
     command: str
+    reference: tuple[str, ...] = ()
 
 
 def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
@@ -145,7 +149,7 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
     """
     following, command = next_step(diagnosis, files)
     return Sentences(
-        _headline(diagnosis),
+        _since(diagnosis) + _headline(diagnosis),
         tuple(_effect(diagnosis, one, k == 0) for k, one in enumerate(diagnosis.effects)),
         tuple(_rival(diagnosis, one) for one in rivals),
         tuple(Finding(*describe_unexplained(group, bool(diagnosis.effects)))
@@ -155,7 +159,7 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(f'{_set(diagnosis, one)} may not be, whatever it costs: {one.barred}. It '
               f'{_cost(one)}' for one in diagnosis.barred),
         tuple(_calibrated(diagnosis, one) for one in diagnosis.calibrated),
-        diagnosis.warnings, following, command)
+        diagnosis.warnings, following, command, _reference(diagnosis))
 
 
 def unexplained_groups(diagnosis: Diagnosis) -> list[tuple[Statement, ...]]:
@@ -222,6 +226,25 @@ def runner_up(diagnosis: Diagnosis) -> str:
     return f'{", ".join(filter(None, words))}: {_cost(second)}'
 
 
+def _since(diagnosis: Diagnosis) -> str:
+    """Return since when what follows has changed, for a headline; '' without a reference."""
+    return f'Since {listed(diagnosis.since.recordings)}: ' if diagnosis.since else ''
+
+
+def _reference(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Return how far a reference run can tell what has changed."""
+    since = diagnosis.since
+    if since is None:
+        return ()
+    shares = listed([f'{share:.0%} on {drive}' for drive, share in since.explained.items()])
+    told = (f'{listed(since.recordings)} knows the states of {since.covered:.0%} of this '
+            'recording' + ('' if since.covered > MOSTLY else
+                           ': elsewhere only the model\'s numbers are known')
+            + f', and shows this share of its squared error as well: {shares}',
+            'a fault that was there in the reference cannot be seen')
+    return (*told, since.note) if since.note else told
+
+
 def _headline(diagnosis: Diagnosis) -> str:
     held, unit = diagnosis.effects, diagnosis.residuals.unit
     doubt = _doubt(diagnosis)
@@ -265,6 +288,9 @@ def _headline(diagnosis: Diagnosis) -> str:
     unseen = (f'How much of the error of {listed(diagnosis.unseen_noise)} is noise cannot be told '
               'from this recording.') if diagnosis.unseen_noise else ''
     if diagnosis.verdict == 'adequate':
+        if diagnosis.since:
+            return (f'nothing has changed beyond noise, which is {noise} rms. Changes much weaker '
+                    'than that could still hide in it.')
         if unseen:
             return f'Nothing stands out. {unseen}'
         return (f'Nothing is missing beyond noise, which is {noise} rms. Effects much weaker than '
@@ -318,12 +344,12 @@ def _doubt(diagnosis: Diagnosis) -> str:
         if one.objection:
             told.append(f' {title} was fitted as well and is no finding: {one.objection}.')
             continue
-        on, before, after = (
-            'the error', one.error_before, one.error_after) if (
-            one.error_after >= one.error_before) else (
-            'the error on held-out data', one.held_out_before, one.held_out_after)
-        told.append(f' {title} was fitted as well and is no finding: with it {on} '
-                    f'{change(before, after, diagnosis.residuals.unit)}.')
+        worse = (f'with it the error on held-out data '
+                 f'{change(one.held_out_before, one.held_out_after, diagnosis.residuals.unit)}'
+                 if one.held_out_after >= one.held_out_before else
+                 f'held-out data are predicted worse with it, by {-one.certainty:.2g} standard '
+                 'errors in units of the noise')
+        told.append(f' {title} was fitted as well and is no finding: {worse}.')
     return ''.join(told)
 
 

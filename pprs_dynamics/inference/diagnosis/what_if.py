@@ -162,7 +162,7 @@ class _System:
     """Columns of all placements that were tried, in the last search."""
 
     def __init__(self, diagnosis: Diagnosis, selection: Ranking) -> None:
-        self.diagnosis, self.kept, self.fits = diagnosis, selection.kept, selection.last
+        self.diagnosis, self.kept, self.fits = diagnosis, selection.reported, selection.last
         self.first_choice: dict[str, set[int | None]] = {}
         self.placements: dict[tuple[str, int | None], Component] = {}
         self.blocks: dict[Component, tuple[Block, ...]] = {}
@@ -193,7 +193,7 @@ class _System:
         for d, drive, index in zip(self.fits.regression.drives, self.equations.drives,
                                    self.equations.indices, strict=True):
             products, with_error = drive.weighted(
-                self.fits.regression.weights(selection.best.fit, d))
+                self.fits.regression.weights(selection.map_set.fit, d))
             self.gram[np.ix_(index, index)] += products
             self.side[index] += with_error
 

@@ -26,8 +26,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.inference.fit.bodies import Bodies
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
 
 HARMONICS = 8  # of the duration
 WIDEST = np.pi  # [rad, m]: a joint is not moved further from the middle, whatever its range

@@ -23,7 +23,6 @@ from pprs_dynamics.inference.regression.base_columns import (
     PresentShape,
     ReversalShape,
 )
-from pprs_dynamics.inference.regression.collecting import sensitivities_of
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.sensitivities import (
     DRIVE_WIDTHS,
@@ -32,6 +31,7 @@ from pprs_dynamics.inference.regression.sensitivities import (
     OF_DRIVES,
     OF_JOINTS,
     PRESENT,
+    Sensitivities,
 )
 from pprs_dynamics.inference.regression.terms import FullRate, Rows, Term
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -79,6 +79,17 @@ class FittedTerm:
         """Return an effect with its coefficients at the sizes at which they matter."""
         return cls(effect, drive, shape, tuple(c.name for c in effect.coefficients),
                    np.array([c.scale for c in effect.coefficients] or [1.0]))
+
+    @classmethod
+    def at_places(cls, effect: type[CatalogueEffect]) -> list[FittedTerm]:
+        """Return an effect in the structure, once for each of its places, with all that it has."""
+        scale = {c.name: c.scale for c in effect.coefficients}
+        most: dict[tuple[tuple[str, ...], ...], tuple[str, ...]] = {}
+        for names in effect.variants:
+            place = effect.places_of(names)
+            most[place] = max(most.get(place, ()), names, key=len)
+        return [cls(effect, None, {}, names, np.array([scale[name] for name in names]))
+                for names in most.values()]
 
     @property
     def size(self) -> int:
@@ -222,12 +233,12 @@ class ColumnPlan:
         By name as `Sensitivities.columns`, those of an effect by its own, whether it is in the
         model or not.
         """
-        sensitivities = sensitivities_of(self.model, self.given)
+        sensitivities = Sensitivities(self.model, self.given)
         known = {effect.name for effect in self.given.effects}
         sensitivities.searched = tuple(effect for effect in self._wanted if issubclass(
             effect, StructureEffect) and effect.name not in known)
-        shifts = any(effect.shifts_positions() for effect in self._wanted)
-        sensitivities.homing_stride = max(1, samples // HOMING_SAMPLES) if shifts else 0
+        sensitivities.of_zeros = any(effect.shifts_positions() for effect in self._wanted)
+        sensitivities.homing_stride = max(1, samples // HOMING_SAMPLES)
         return {name.removeprefix(PRESENT): column
                 for name, column in sensitivities.columns(forces).items()}
 
@@ -236,7 +247,7 @@ class ColumnPlan:
         s, total = forces.mechanism, forces.total[part]
         full = FullRate(time, s.position[part], s.velocity[part], s.acceleration[part],
                         s.direction[part], s.guide_load[part], s.transmitted[part], total, total,
-                        (slice(0, len(time)),), treat, float(time[0]))
+                        (slice(0, len(time)),), treat, float(time[0]), {})
         means = treat(total)
         residuals = Residuals(self.model.drives, treat(time), np.zeros(len(means), dtype=int),
                               means, means, period=float(time[1] - time[0]) * block)

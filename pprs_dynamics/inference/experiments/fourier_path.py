@@ -25,8 +25,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.mechanism.joint_series import resting_series
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.three_pprs.joint_series import resting_series
 
 FREEDOMS = 6  # x, y, z [m]; turns about z, then y, then x [rad]
 CONDITIONS = 3  # on each series, for rest at its ends

@@ -12,9 +12,9 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.effects.laws.passive_friction import IndependentChainsFriction
 from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
+from pprs_dynamics.physics.three_pprs.passive_friction import IndependentChainsFriction
 
 
 @dataclass(frozen=True)

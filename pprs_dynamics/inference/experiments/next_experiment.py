@@ -37,6 +37,15 @@ from pprs_dynamics.physics.model.force_model import ForceModel, Forces
 PURPOSES = ('separate', 'commission')
 SURE = 0.9  # probability from which a design counts as separating
 SHORTEST, LONGEST = 5.0, 120.0  # [s]
+# Effects of which the same motion with a known mass more shows at once which of them it is: one
+# grows with it, the other stays, or the mass is seen too large.
+TOLD_BY_LOAD = tuple(map(frozenset, (
+    ('coulomb_friction', 'load_friction'), ('coulomb_friction', 'gear_efficiency'),
+    ('payload_mass', 'external_wrench'), ('link_mass', 'external_wrench'),
+    ('counterbalance', 'link_mass'), ('counterbalance', 'payload_mass'),
+    ('effort_gain', 'payload_mass'), ('effort_gain', 'link_mass'),
+    ('effort_gain', 'drive_inertia'))))
+LOAD_SHARE = 0.1  # of all that moves, that such a mass is about
 RESERVE = 4.0  # standard deviations of noise that efforts are kept below their limits by
 
 
@@ -152,6 +161,18 @@ class Experiment:
         return tuple(pair for pair in self.pairs if pair not in self.separates)
 
     @property
+    def told_by_load(self) -> tuple[tuple[str, str], ...]:
+        """Pairs that no motion tells for sure, but the same motion with another load."""
+        return tuple(pair for pair in self.fails if frozenset(pair) in TOLD_BY_LOAD)
+
+    @property
+    def load(self) -> float | None:
+        """Mass that the tool should carry more in a second recording [kg]; None: no need."""
+        if not self.told_by_load:
+            return None
+        return float(f'{LOAD_SHARE * _moved_mass(self.model):.1g}')
+
+    @property
     def text(self) -> str:
         """What it is for, and whether it will do, in one or two sentences."""
         if self.kind == 'separate':
@@ -162,6 +183,10 @@ class Experiment:
             if self.fails:
                 found.append(f'It will hardly tell {_listed(self.fails)}: no motion within these '
                              'limits that was tried does so for sure.')
+            if self.load:
+                found.append(f'For {_listed(self.told_by_load)} record the same motion once more '
+                             f'with {self.load:g} kg more at the tool, and diagnose that recording '
+                             'with this payload in the model.')
             return ' '.join(found)
         last = (f' At the size at which they matter it would not show {", ".join(self.hidden)}: '
                 'a longer motion or wider limits would.' if self.hidden else '')
@@ -180,11 +205,19 @@ class Experiment:
         return {'separates': [list(pair) for pair in self.separates],
                 'does_not_separate': [list(pair) for pair in self.fails],
                 'expected_evidence': self.expected_evidence,
+                'load': self.load, 'told_by_load': [list(pair) for pair in self.told_by_load],
                 'question': self.kind, 'subjects': list(self.subjects),
                 'hidden': list(self.hidden), 'text': self.text,
                 'contests': [one.to_dict() for one in self.contests],
                 'accuracy': [one.to_dict() for one in self.accuracies],
                 'limits': self.limits, 'duration': self.duration}
+
+
+def _moved_mass(model: ForceModel) -> float:
+    """Return the mass of what a robot moves [kg]."""
+    if isinstance(model, ArmModel):
+        return float(model.robot.masses.sum())
+    return float(model.values['masses.platform'] + model.values['masses.payload'])
 
 
 def _listed(pairs: Sequence[tuple[str, str]]) -> str:

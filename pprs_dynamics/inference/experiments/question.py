@@ -57,8 +57,7 @@ HELD = 1e-3  # of a column's square may lie outside the span of another effect's
 ON_DRIVES = ('viscous_friction', 'coulomb_friction', 'stribeck_friction', 'effort_offset',
              'drive_spring', 'drive_inertia')
 IN_STRUCTURE = ('payload_mass', 'payload_offset', 'platform_inertia', 'external_wrench',
-                'base_tilt', 'platform_drag', 'rod_mass', 'revolute_friction',
-                'spherical_friction')
+                'base_tilt', 'tool_drag', 'link_mass', 'joint_friction')
 # How well the numbers of a new robot are known where its file does not say.
 TOLERANCE = 0.1
 NUMBERS = ('masses.platform', 'masses.payload', 'masses.slides', 'masses.lifts', 'masses.rods',
@@ -147,7 +146,7 @@ def question_after(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
     rivals : sequence of Rival
         The best first.
     """
-    adopted = ranking.kept
+    adopted = ranking.reported
     if rivals:
         return _separation(ranking, rivals)
     search = ranking.last
@@ -159,7 +158,7 @@ def question_after(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
 def _separation(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
     """Return how to tell sets apart, each pair of effects in the sets of lowest cost."""
     pairs: set[tuple[str, str]] = set()
-    sets = [ranking.kept]
+    sets = [ranking.reported]
     for rival in rivals:
         new = set(product(rival.missing, rival.instead))
         if not new <= pairs:
@@ -360,12 +359,13 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: flo
     for name, effect in catalogue().items():
         if name in present or name not in ON_DRIVES + IN_STRUCTURE:
             continue
+        effect = model.bound(effect)
         if issubclass(effect, DriveEffect):
             trials = effect.trials(TYPICAL)
             terms += [FittedTerm.at_scale(effect, drive, trials[len(trials) // 3])
                       for drive in range(len(DRIVES))]
         else:
-            terms.append(FittedTerm.at_scale(effect, None, {}))
+            terms += FittedTerm.at_places(effect)
     samples = round(TYPICAL.duration / BLOCK_DURATION)
     if recordings:
         design = Design.of(model, recordings)

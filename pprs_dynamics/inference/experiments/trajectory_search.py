@@ -28,9 +28,9 @@ from pprs_dynamics.inference.experiments.fourier_path import (
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits, limit_names
 from pprs_dynamics.inference.experiments.question import Question
 from pprs_dynamics.measurement.motion.treatment import block_length
+from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.paths import HOME
 from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel
-from pprs_dynamics.physics.three_pprs.joint_series import JointSeries
 from pprs_dynamics.system.parallel import each
 
 HARMONICS = 4  # of each degree of freedom

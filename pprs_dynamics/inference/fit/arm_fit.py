@@ -72,7 +72,11 @@ class ArmColumns:
     @classmethod
     def of(cls, model: ArmModel, recording: Recording) -> ArmColumns:
         """Return the columns of a recording; errors as `reconstruct`."""
-        found = reconstruct(model, recording)
+        return cls.of_motion(model, reconstruct(model, recording))
+
+    @classmethod
+    def of_motion(cls, model: ArmModel, found: Reconstruction) -> ArmColumns:
+        """Return the columns of a recording whose motion is known."""
         treat = found.treat
         total = treated_forces(model, found)['total']
         count = len(model.drives)
@@ -97,6 +101,11 @@ class ArmColumns:
         turning = self.turning(width)
         return np.concatenate((self.motion, turning[..., None],
                                np.ones_like(turning)[..., None]), axis=-1)
+
+    def numbers(self, width: Array) -> Array:
+        """Return the columns of all numbers, (M, n, 14 n): of the links, then of each joint."""
+        numbers: Array = np.concatenate((self.inertial, _of_each(self.of_joints(width))), axis=2)
+        return numbers
 
     def efforts(self, own: Array, inertial: Array, width: Array) -> Array:
         """Return the efforts of a model, (M, n).
@@ -209,6 +218,65 @@ def _with(model: ArmModel, inertial: Array, own: Array, width: Array) -> ArmMode
     return fitted
 
 
+def numbers_at(model: ArmModel, position: Array, velocity: Array, acceleration: Array,
+               width: Array) -> Array:
+    """Return the columns of all numbers at states (M, n), (M, n, 14 n), as `ArmColumns.numbers`."""
+    joints = np.stack((acceleration, velocity, np.asarray(smooth_sign(velocity, width)),
+                       np.ones_like(velocity)), axis=-1)
+    numbers: Array = np.concatenate((model.robot.regressor(position, velocity, acceleration),
+                                     _of_each(joints)), axis=2)
+    return numbers
+
+
+def _of_each(joints: Array) -> Array:
+    """Return columns of each joint, (M, n, 4), beside those of the others, (M, n, 4 n)."""
+    samples, count = joints.shape[:2]
+    own = np.zeros((samples, count, count, OF_JOINT))
+    own[:, np.arange(count), np.arange(count)] = joints
+    return own.reshape(samples, count, -1)
+
+
+def own_spread(efforts: Array, joints: Array) -> Array:
+    """Return by how much each joint's own numbers may be otherwise, (n, 4), standard deviations.
+
+    Parameters
+    ----------
+    efforts : (M, n) array
+        NaN where they were not measured.
+    joints : (M, n, 4) array
+    """
+    known = np.isfinite(efforts)
+    size = np.max(np.abs(efforts), axis=0, initial=0.0, where=known)
+    scale = np.sqrt(np.sum(joints ** 2 * known[..., None], axis=0)
+                    / np.maximum(known.sum(axis=0), 1)[:, None])
+    spread: Array = OWN_SPREAD * np.maximum(size, 1e-3)[:, None] / np.maximum(scale, 1e-6)
+    return spread
+
+
+def base_prior(model: ArmModel, spread: Array) -> Array:
+    """Return directions of unit variance of a base's numbers, (14 n, 14 n): links, then joints.
+
+    Of what is expected before any recording, about the model as it is.
+
+    Parameters
+    ----------
+    model : ArmModel
+    spread : (n, 4) array
+        See `own_spread`.
+    """
+    bodies = Bodies(model.robot.inertial)
+    at, step = np.zeros(len(bodies)), 1e-6
+    moves, away = (np.column_stack([(of(at + step * unit) - of(at)).ravel() / step
+                                    for unit in np.eye(len(at))])
+                   for of in (bodies.inertial, bodies.distance))
+    values, axes = np.linalg.eigh(away.T @ away / SPREAD ** 2)
+    links = moves @ (axes / np.sqrt(values))
+    directions = np.zeros((len(links) + spread.size,) * 2)
+    directions[:len(links), :len(links)] = links
+    directions[len(links):, len(links):] = np.diag(spread.ravel())
+    return directions
+
+
 class _Problem:
     """Least squares in points of `Bodies` and the joints' own numbers.
 
@@ -237,11 +305,7 @@ class _Problem:
         # All that depends on the samples, once: R and Q' y of each joint.
         self.reduced = [np.linalg.qr(np.column_stack((rows, y)), mode='r') if len(y) else None
                         for rows, y in zip(self.rows, self.target, strict=True)]
-        size = np.array([np.abs(y).max(initial=0.0) for y in self.target])
-        scale = np.sqrt(np.array([np.mean(joints[known[:, j], j] ** 2, axis=0)
-                                  if len(self.target[j]) else np.ones(OF_JOINT)
-                                  for j in range(count)]))
-        self.own_spread = OWN_SPREAD * np.maximum(size, 1e-3)[:, None] / np.maximum(scale, 1e-6)
+        self.own_spread = own_spread(np.where(known, rest, np.nan), joints)
 
     def errors(self, point: Array, own: Array) -> list[Array]:
         """Return what is left of each joint's efforts."""

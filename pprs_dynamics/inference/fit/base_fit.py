@@ -142,9 +142,14 @@ def fit_base(model: ForceModel, recordings: Sequence[Recording],
 
 def require_open_numbers(model: ForceModel) -> None:
     """Raise FitError where a model has nothing that a fit may move."""
-    if not isinstance(model, ArmModel) and not model_numbers(model):
+    if not _is_fitted_whole(model) and not model_numbers(model):
         raise FitError('tolerances: the model gives none, must name the numbers that are to be '
                        'fitted, e.g. masses.payload: 0.05')
+
+
+def _is_fitted_whole(model: ForceModel) -> bool:
+    """Return whether all numbers are fitted, and not those alone that tolerances leave open."""
+    return isinstance(model, ArmModel) and model.is_described
 
 
 def halves(recording: Recording) -> list[Recording]:
@@ -178,7 +183,8 @@ def _rms(model: ForceModel, squares: Array) -> dict[str, float]:
 
 def _fitted(model: ForceModel, recordings: Sequence[Recording],
             ) -> tuple[ForceModel, tuple[FittedNumber, ...], tuple[str, ...]]:
-    if isinstance(model, ArmModel):
+    if _is_fitted_whole(model):
+        assert isinstance(model, ArmModel)
         fit = fit_arm(model, columns_of(model, recordings))
         return fit.model, _numbers(model, fit), _told(model, fit)
     # As in a diagnosis without any effect: the tolerance is the prior, and how friction turns over

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -38,7 +38,14 @@ class BaseColumn:
         Change of the drive's force per unit of the coefficient [N].
     precision : float
         Of the Gaussian prior about 0, in which the coefficient is what the model file says.
+
+    Attributes
+    ----------
+    in_model : bool
+        Whether a coefficient moves a number of the fitted model; else it is a nuisance.
     """
+
+    in_model: ClassVar[bool] = True
 
     rows: Mapping[int, Array]
     precision: float
@@ -63,8 +70,17 @@ class ReversalShape(BaseColumn):
     `number` counts the ways in which it may, in the order of `sensitivities.reversal_columns`.
     """
 
+    in_model = False
+
     drive: int | None
     number: int
+
+
+@dataclass(frozen=True)
+class ReferenceDirection(BaseColumn):
+    """A principal direction of what a reference run leaves unknown, of unit prior."""
+
+    in_model = False
 
 
 @dataclass(frozen=True)

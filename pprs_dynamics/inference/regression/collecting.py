@@ -10,17 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.regression.arm_sensitivities import ArmSensitivities
-from pprs_dynamics.inference.regression.axis_sensitivities import AxisSensitivities
-from pprs_dynamics.inference.regression.platform_sensitivities import PlatformSensitivities
 from pprs_dynamics.inference.regression.sensitivities import NUMBERS, Sensitivities
 from pprs_dynamics.inference.regression.terms import FullRate
 from pprs_dynamics.inference.residuals.reconstruction import Reconstruction
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.model.axis_model import AxisModel
-from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel, Forces
+from pprs_dynamics.physics.model.force_model import Forces
 from pprs_dynamics.physics.model.keys import is_gain
 
 
@@ -36,16 +30,6 @@ def stacked_columns(tables: list[dict[Any, Array]]) -> dict[str, Array]:
     for key in [key for key in tables[0] if isinstance(key, Column)]:
         stacked[key.name] = np.concatenate([table.pop(key) for table in tables]).transpose(1, 2, 0)
     return stacked
-
-
-def sensitivities_of(model: ForceModel, given: ForceModel) -> Sensitivities:
-    """Return the sensitivities of a model of any kind."""
-    if isinstance(model, ArmModel):
-        return ArmSensitivities(model, given)
-    if isinstance(model, AxisModel):
-        return AxisSensitivities(model, given)
-    assert isinstance(model, DriveModel)
-    return PlatformSensitivities(model, given)
 
 
 class ColumnCollector:
@@ -81,4 +65,4 @@ class ColumnCollector:
         return FullRate(
             reconstruction.time, reconstruction.position, velocity, acceleration, direction, load,
             transmitted, effort, reconstruction.effort, reconstruction.segments,
-            reconstruction.treat, reconstruction.start)
+            reconstruction.treat, reconstruction.start, reconstruction.channels)

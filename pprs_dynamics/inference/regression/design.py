@@ -27,13 +27,13 @@ from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
     PresentCoefficient,
     PresentShape,
+    ReferenceDirection,
     ReversalShape,
     present_columns,
     present_values,
 )
 from pprs_dynamics.inference.regression.collecting import (
     ColumnCollector,
-    sensitivities_of,
     stacked_columns,
 )
 from pprs_dynamics.inference.regression.sensitivities import (
@@ -43,6 +43,7 @@ from pprs_dynamics.inference.regression.sensitivities import (
     OF_DRIVES,
     OF_JOINTS,
     PRESENT,
+    Sensitivities,
 )
 from pprs_dynamics.inference.regression.terms import FullRate, OperatingPoint, Term
 from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
@@ -55,14 +56,15 @@ from pprs_dynamics.physics.effects.drive_effect import (
     DriveEffect,
     DriveRange,
     DriveSamples,
+    GainEffect,
     MeasurementEffect,
 )
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
+from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 
 SHAPE_STEP = 1e-3  # amount of movement, for derivatives by shape parameters
 LONGEST_DELAY = 0.3  # [s], that a recording may show at once
@@ -72,6 +74,25 @@ LEANING = 10.0
 # A drive hardly moves whose speed is seldom beyond the width in which the model's friction turns
 # over, times the first: in less than the second of the time.
 TURNED, LEAST_MOVING = 2.0, 0.05
+
+
+@dataclass(frozen=True)
+class CarriedOver:
+    """What a reference run says of recordings; see `pprs_dynamics.inference.fit.reference`.
+
+    Parameters
+    ----------
+    mean : (M, D) array
+        Forces that the model lacks there as well [N].
+    directions : tuple of ReferenceDirection
+        In which they are uncertain.
+    covered : float
+        Share of the samples whose states the reference knows.
+    """
+
+    mean: Array
+    directions: tuple[ReferenceDirection, ...]
+    covered: float
 
 
 @dataclass
@@ -98,6 +119,8 @@ class Design:
         None: the given model.
     joining : str
         See `of`.
+    carried : CarriedOver, optional
+        Its mean is taken from what was measured, its directions are columns of every fit.
     """
 
     given: ForceModel
@@ -112,6 +135,7 @@ class Design:
     forces: Array = field(repr=False)
     point: OperatingPoint | None = None
     joining: str = ''
+    carried: CarriedOver | None = None
     _moved: dict[bytes, tuple[Reconstruction, ...]] = field(
         default_factory=dict, repr=False, compare=False)
     _own_rows: dict[tuple[type[CatalogueEffect], int], Array] = field(
@@ -166,10 +190,10 @@ class Design:
             point.model, self.given, self.reconstructed(point.model), None,
             {one.effect for one in point.effects} if alone else None,
             {(one.drive, one.number) for one in self.base if isinstance(one, ReversalShape)},
-            self.joining)
+            self.joining).beside(self.carried)
         shift = np.zeros_like(design.residuals.model)
         for column, c in zip(design.base, point.base, strict=True):
-            if not isinstance(column, ReversalShape):
+            if column.in_model:
                 for d, row in column.rows.items():
                     shift[:, d] += c * row
         for one in point.effects:
@@ -183,6 +207,29 @@ class Design:
                 shift[:, d] += row
         residuals = replace(design.residuals, model=design.residuals.model - shift)
         return replace(design, residuals=residuals, point=point)
+
+    def beside(self, carried: CarriedOver | None) -> Design:
+        """Return this with what a reference says of the recordings, or as it is for None."""
+        if carried is None:
+            return self
+        residuals = replace(self.residuals, measured=self.residuals.measured - carried.mean)
+        return replace(self, residuals=residuals, base=(*self.base, *carried.directions),
+                       carried=carried)
+
+    def carried_forces(self, coefficients: Array) -> Array:
+        """Return what the directions of a reference add to the forces, (M, D) [N].
+
+        Parameters
+        ----------
+        coefficients : (P,) array
+            Of the base columns first.
+        """
+        forces = np.zeros_like(self.residuals.model)
+        for column, c in zip(self.base, coefficients, strict=False):
+            if isinstance(column, ReferenceDirection):
+                for d, row in column.rows.items():
+                    forces[:, d] += c * row
+        return forces
 
     def reconstructed(self, model: ForceModel) -> tuple[Reconstruction, ...]:
         """Return the motion of the recordings with the zeros that a model's drives have."""
@@ -208,7 +255,7 @@ class Design:
         They are those of the given model around every other one: a sensor that says nothing of
         small efforts, say, would leave some of them without a column.
         """
-        sensitivities = sensitivities_of(model, given)
+        sensitivities = Sensitivities(model, given)
         if effects is not None:
             sensitivities.restrict(effects)
         tables: list[dict[Any, Array]] = []
@@ -287,19 +334,30 @@ class Design:
                           float(np.median(np.diff(longest.time))),
                           float(np.ptp(position)), float(np.abs(velocity).max()),
                           self.given.gear_ratios[drive], _delay(longest, drive),
-                          self.given.units[drive].turns)
+                          self.given.units[drive].turns,
+                          any(np.any(one.guide_load[:, drive]) for one in self.recordings),
+                          self._channels(drive))
+
+    def _channels(self, drive: int) -> dict[str, tuple[float, float]]:
+        """Return the ranges of what was measured of a drive beside motion and effort."""
+        found = {}
+        for name in {name for one in self.recordings for name in one.channels}:
+            values = np.concatenate([one.channels[name][:, drive] for one in self.recordings
+                                     if name in one.channels])
+            if np.isfinite(values).any():
+                found[name] = float(np.nanmin(values)), float(np.nanmax(values))
+        return found
 
     def acts_on(self, effect: type[CatalogueEffect], drive: int) -> bool:
         """Return whether an effect may be looked for on a drive, there already or not."""
         return (issubclass(effect, DriveEffect) and self.given.offers(effect)
                 and (not effect.is_friction or self.moves(drive))
-                and (not effect.needs_load or any(np.any(one.guide_load[:, drive])
-                                                  for one in self.recordings)))
+                and effect.may_show(self.covered[drive]))
 
     def present(self, effect: type[CatalogueEffect], drive: int | None,
                 ) -> Mapping[str, float] | None:
         """Return the parameters that the given model has of an effect; None where it lacks it."""
-        there = next((e for e in self.given.effects if type(e) is effect), None)
+        there = next((e for e in self.given.effects if e.name == effect.name), None)
         name = None if drive is None else self.drives[drive]
         if there is None or (isinstance(there, DriveEffect) and name not in there.drives):
             return None
@@ -343,9 +401,12 @@ class Design:
         """Return the treated columns of an effect on one drive, (k, M)."""
         if issubclass(effect, MeasurementEffect):
             def seen(recording: FullRate, part: slice) -> Array:
-                time = recording.time[part]
-                effort = self.sensed(recording.effort[None, part, drive], time, drive, effect)[0]
-                return np.stack(effect.sensor_columns(effort, time, **shape))
+                effort = self.sensed(recording.effort[None, part, drive], recording, part, drive,
+                                     effect)[0]
+                if issubclass(effect, GainEffect):
+                    samples = recording.samples(part, drive)
+                    return np.stack([effort * one for one in effect.shares(samples, **shape)])
+                return np.stack(effect.sensor_columns(effort, recording.time[part], **shape))
 
             return self.treated(lambda recording: np.concatenate(
                 [seen(recording, part) for part in recording.segments], axis=1))
@@ -363,7 +424,7 @@ class Design:
         """Return forces on a drive, (k, N) of a recording, as its sensor shows them, (k, M)."""
         def behind_sensor(recording: FullRate) -> Array:
             whole = rows(recording)
-            return np.concatenate([self.sensed(whole[:, part], recording.time[part], drive)
+            return np.concatenate([self.sensed(whole[:, part], recording, part, drive)
                                    for part in recording.segments], axis=1)
         return self.treated(behind_sensor)
 
@@ -372,14 +433,21 @@ class Design:
         return np.concatenate([recording.treat(rows(recording).T).T
                                for recording in self.recordings], axis=1)
 
-    def sensed(self, rows: Array, time: Array, drive: int,
+    def sensed(self, rows: Array, recording: FullRate, part: slice, drive: int,
                without: type[CatalogueEffect] | None = None) -> Array:
-        """Return forces (k, N) on a drive as the model's sensors show them, but for one kind."""
+        """Return forces (k, N) on a drive in a segment as the model's sensors show them.
+
+        All but those of one kind.
+        """
         name = self.drives[drive]
         for effect in self.model.effects:
             if (isinstance(effect, MeasurementEffect) and name in effect.drives
-                    and type(effect) is not without):
+                    and (without is None or effect.name != without.name)):
+                if isinstance(effect, GainEffect):
+                    rows = rows * effect.factor(recording.samples(part, drive), name)
+                    continue
                 alone = type(effect)({name: effect.drives[name]})
+                time = recording.time[part]
                 rows = np.reshape([alone.sensed(row[:, None], time, (name,))[:, 0]
                                    for row in rows], rows.shape)
         return rows
@@ -441,7 +509,7 @@ class Design:
 
     def present_rows(self, column: PresentCoefficient | PresentShape) -> dict[int, Array]:
         """Return the rows, (M,) by drive, of what the model's effects may be otherwise."""
-        there = next(e for e in self.model.effects if type(e) is column.effect)
+        there = next(e for e in self.model.effects if e.name == column.effect.name)
         assert isinstance(there, CatalogueEffect)
         values = present_values(there, column.drive)
         drive = None if column.drive is None else self.drives.index(column.drive)

@@ -95,8 +95,8 @@ def joint_reversal_rows(design: Design, term: Term, names: Sequence[str]) -> dic
         state = forces.mechanism
         columns = np.stack([passive_reversal_columns(unit, state) for unit in units])
         for sensor in sensors:
-            columns = np.stack([[sensor.sensed(column, state.time, design.drives)
-                                 for column in one] for one in columns])
+            columns = np.stack([[sensor.seen(column, state) for column in one]
+                                for one in columns])
         return {'rows': columns.transpose(2, 0, 1, 3)}
 
     stacked = np.concatenate([

@@ -4,17 +4,15 @@
 """Derivatives of a model's forces by its own numbers and by effects that it may lack.
 
 Everything is linear here: a column is the change of all drives' measured efforts per unit of one
-coefficient, at one chunk of a recording, at full rate. What a kind of model has for columns beside
-those of effects in its drives is behind `Sensitivities`; the rest of the diagnosis is the same.
+coefficient, at one chunk of a recording, at full rate.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -25,13 +23,23 @@ from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.force_model import (
+    ACTIVE_FRICTION,
+    PASSIVE_FRICTION,
+    ForceModel,
+)
+from pprs_dynamics.physics.model.keys import is_gain
 from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.system.parallel import each
 
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
 RELATIVE_STEP = 1e-3
 DEVIATIONS = 2.5
-HOMING_STRIDE = 5  # samples; columns of wrong zeros change slowly between reversals
+HOMING_TIME = 0.01  # [s]; columns of wrong zeros change slowly between reversals
+# Numbers by drive that act on it alone, and those of a 3-PPRS that act on a chain's slide and lift.
+PER_DRIVE = ('friction.viscous', 'friction.coulomb', 'friction.offset', 'friction.drives.viscous',
+             'friction.drives.coulomb')
+PER_CHAIN = ('masses.slides', 'masses.lifts')
 # Friction that turns over in another width than the model's is no effect: multiples of the
 # width whose differences span what is between 0.2 and 5 times the model's.
 DRIVE_WIDTHS = (0.2, 0.5, 2.0, 5.0)
@@ -91,7 +99,7 @@ def _unit(model: ForceModel, key: str, element: int | None) -> str:
     return turning if turns or not pushing else pushing[0]
 
 
-class Sensitivities(ABC):
+class Sensitivities:
     """Columns that a model has, chunk by chunk.
 
     Bodies change the loads, and loads change friction: most columns are differences of the whole
@@ -112,27 +120,29 @@ class Sensitivities(ABC):
         Effects outside the drives that the given model could have and has not.
     each : callable
         Evaluates columns, in threads where they take long.
+    of_zeros : bool
+        Whether `HOMING` is computed.
     homing_stride : int
-        Samples between those at which `HOMING` is computed where that takes long; 0: not at all.
+        Samples between those at which it is; 0: those within `HOMING_TIME`.
     """
-
-    each: ClassVar[Callable[..., Iterable[Any]]] = map
 
     def __init__(self, model: ForceModel, given: ForceModel) -> None:
         self.model, self.given = model, given
+        self.each: Callable[..., Iterable[Any]] = each if model.takes_long else map
         self.numbers = model_numbers(given)
         present = {effect.name for effect in given.effects}
         self.searched: tuple[type[StructureEffect], ...] = tuple(
             bound for effect in catalogue().values() if issubclass(effect, StructureEffect)
             and given.offers(effect) and effect.name not in present
             if issubclass(bound := given.bound(effect), StructureEffect) and bound.coefficients)
-        self.homing_stride = HOMING_STRIDE
+        self.of_zeros, self.homing_stride = any(
+            one.shifts_positions() and given.offers(one) for one in catalogue().values()), 0
 
     def restrict(self, effects: Container[type[CatalogueEffect]]) -> None:
         """Leave out columns that effects other than these would need."""
         self.searched = tuple(one for one in self.searched if one in effects)
         if not any(one.shifts_positions() and one in effects for one in catalogue().values()):
-            self.homing_stride = 0
+            self.of_zeros = False
 
     def columns(self, forces: Any) -> dict[str, Array]:
         """Return columns by name, (K, N, D) each.
@@ -155,12 +165,11 @@ class Sensitivities(ABC):
         columns = {NUMBERS: self._of_numbers(forces, reference), OF_DRIVES: self._sensed_each(
             reversal_columns(self.dry(state), state.velocity, state.direction,
                              np.asarray(self.model.reversal.velocity)), state)}
-        for friction in filter(self.is_in_passive_joints, following(self.model)):
+        for friction in (one for one in following(self.model) if one.name == PASSIVE_FRICTION):
             columns[OF_JOINTS] = self._sensed_each(
                 passive_reversal_columns(friction, state), state)
-        homing = self.of_homing(state, reference) if self.homing_stride else None
-        if homing is not None:
-            columns[HOMING] = homing
+        if self.of_zeros:
+            columns[HOMING] = self._of_homing(state)
         for effect in self.searched:
             columns[effect.name], bare = self._of_structure(effect, state, reference)
             if issubclass(effect, BodyEffect):
@@ -174,30 +183,41 @@ class Sensitivities(ABC):
                     columns[BARE + PRESENT + present.name] = bare
         return columns
 
-    @abstractmethod
     def dry(self, state: Any) -> Array:
         """Return the size of the drives' dry friction in full motion, (N, D) [N, N m]."""
+        friction: Any = next(one for one in self.model.effects if one.name == ACTIVE_FRICTION)
+        size: Array = friction.dry(state.guide_load)
+        return size
 
-    @abstractmethod
-    def is_in_passive_joints(self, effect: Effect) -> bool:
-        """Return whether an effect is the model's own friction in the passive joints."""
+    def _of_homing(self, state: Any) -> Array:
+        """Return the change per metre, or radian, that each drive is measured too far, (D, N, D).
 
-    @abstractmethod
-    def of_homing(self, state: Any, reference: Array) -> Array | None:
-        """Return the change per metre that each drive is measured too far, (D, N, D), if known.
-
-        Parameters
-        ----------
-        state : MechanismState or LinkageState
-        reference : (N, D) array
-            Efforts there.
+        Evaluated at some samples, straight lines between.
         """
+        every, stride = np.arange(len(state.velocity)), self.homing_stride
+        if not stride:
+            step = (HOMING_TIME if state.time is None or len(every) < 2
+                    else float(np.median(np.diff(state.time))))
+            stride = max(1, round(HOMING_TIME / step))
+        samples = every[min(stride // 2, len(every) - 1)::stride]
+        there = state[samples]
+        step = there.position_step
+
+        def efforts(drive: int, move: float) -> Array:
+            return self._efforts(self.model, self._at(self.model, there.moved(drive, move)))
+
+        def column(drive: int) -> Array:
+            change = (efforts(drive, -step) - before) / step
+            return np.stack([np.interp(every, samples, one) for one in change.T], axis=1)
+
+        before = efforts(0, 0.0)
+        return np.stack(list(self.each(column, range(len(self.model.drives)))))
 
     def sensed(self, column: Array, state: Any) -> Array:
         """Return what the model's sensors make of a change of the drives' forces, (N, D)."""
         for effect in self.model.effects:
             if isinstance(effect, MeasurementEffect):
-                column = effect.sensed(column, state.time, self.model.drives)
+                column = effect.seen(column, state)
         return column
 
     def _sensed_each(self, columns: Iterable[Array], state: Any) -> Array:
@@ -220,9 +240,13 @@ class Sensitivities(ABC):
     def drives_of(self, number: Number) -> list[int] | None:
         """Return the drives that a number of a list acts on, and no other of that list does.
 
-        None, the default, where it may act on all. The others are moved at once.
+        None where it may act on all. The others are moved at once.
         """
-        return None
+        if number.element is None:
+            return None
+        if number.key in PER_CHAIN:
+            return [number.element, number.element + len(self.model.drives) // 2]
+        return [number.element] if number.key in PER_DRIVE or is_gain(number.key) else None
 
     @cached_property
     def _moved(self) -> dict[Number, ForceModel]:
@@ -262,9 +286,16 @@ class Sensitivities(ABC):
 
     def _change(self, number: Number, forces: Any, reference: Array) -> Array:
         """Return what a number moved by `RELATIVE_STEP` of itself changes, (N, D)."""
-        moved = self._moved[number]
-        change: Array = self._efforts(moved, self._at(moved, forces.mechanism)) - reference
-        return change
+        moved, state = self._moved[number], forces.mechanism
+        if is_gain(number.key):
+            # The more torque an ampere gives, the fewer amperes the model's torque takes.
+            given = np.asarray(self.given.values[number.key])
+            return np.asarray(-forces.total * RELATIVE_STEP * given / self.model.gain)
+        if number.key.startswith('friction.'):
+            return self._efforts(moved, state.turning_over(moved.reversal)) - reference
+        if number.key.startswith('geometry.'):
+            state = moved.at_drives(state)
+        return self._efforts(moved, self._at(moved, state)) - reference
 
     def _of_structure(self, effect: type[StructureEffect], state: Any, reference: Array,
                       ) -> tuple[Array, Array]:
@@ -274,7 +305,7 @@ class Sensitivities(ABC):
         effect adds (a preloaded guide). Those of bodies are around none: `AddedBody.around` makes
         them exact for where one is.
         """
-        present = next((one for one in self.model.effects if type(one) is effect
+        present = next((one for one in self.model.effects if one.name == effect.name
                         and isinstance(one, StructureEffect)), None)
         if issubclass(effect, AddedBody) and effect in self.searched:
             present = None

@@ -61,7 +61,8 @@ class FullRate:
     """What the drives did at every sample of a recording, in segments; (N, D) arrays.
 
     `effort` is what the model's drives apply, before any sensor; `effort_measured` the
-    recording's; `start` the time at which the recording began [s].
+    recording's; `start` the time at which the recording began [s]; `channels` what was measured
+    beside.
     """
 
     time: Array
@@ -76,13 +77,15 @@ class FullRate:
     segments: tuple[slice, ...]
     treat: Treatment
     start: float
+    channels: Mapping[str, Array]
 
     def samples(self, part: slice, drive: int, memory: object = None) -> DriveSamples:
         """Return one drive in one segment."""
         return DriveSamples(
             self.time[part], self.position[part, drive], self.velocity[part, drive],
             self.acceleration[part, drive], self.direction[part, drive],
-            self.guide_load[part, drive], self.transmitted[part, drive], memory)
+            self.guide_load[part, drive], self.transmitted[part, drive], memory,
+            {name: values[part, drive] for name, values in self.channels.items()})
 
 
 @dataclass(frozen=True)

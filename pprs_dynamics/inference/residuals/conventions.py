@@ -247,10 +247,8 @@ class _Search:
 
     @property
     def _strokes(self) -> tuple[Array, Array]:
-        if isinstance(self.model, (DriveModel, ArmModel)):
-            return self.model.limits.strokes
-        endless = np.full(len(self.model.drives), np.inf)
-        return -endless, endless
+        assert isinstance(self.model, (DriveModel, ArmModel))
+        return self.model.limits.strokes
 
     def _possible(self, reading: Reading, excerpt: Excerpt) -> bool:
         """Return whether a reading brings positions into the strokes, and units where needed."""
@@ -418,8 +416,7 @@ def _of_shares(model: ForceModel, contents: Mapping[str, EffortContent]) -> list
 
 def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Defect]:
     """Yield what positions far outside of the strokes say without any effort."""
-    if not isinstance(model, (DriveModel, ArmModel)):
-        return
+    assert isinstance(model, (DriveModel, ArmModel))
     lower, upper = model.limits.strokes
     drives, ends = recording.drives, np.maximum(-lower, upper)
     reach = np.abs(recording.position).max(axis=0)

@@ -27,7 +27,6 @@ from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.model.axis_model import AxisModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.three_pprs.forward_motion import find_pose_jumps, solve_forward_motion
@@ -108,6 +107,9 @@ class Reconstruction(DriveMotion):
         Samples of the recording's segments that are not here: edges and short segments.
     start : float
         Time of the recording's first sample, which may be dropped here [s].
+    channels : mapping of str to (N, D) array
+        What was measured of the drives beside, between its samples by straight lines; NaN in drives
+        where it never was.
     """
 
     time: Array
@@ -119,6 +121,7 @@ class Reconstruction(DriveMotion):
     gain: Array
     dropped: int
     start: float
+    channels: Mapping[str, Array]
 
     def __len__(self) -> int:
         return len(self.time)
@@ -143,7 +146,9 @@ class Reconstruction(DriveMotion):
                 last = min(max(last, first + 1), end)
                 stop = int(starts[last]) if last < len(starts) else len(self)
                 rows = slice(int(starts[first]), stop)
-                yield Chunk(self.motion[rows].with_time(self.time[rows]), rows,
+                measured = {name: values[rows] for name, values in self.channels.items()}
+                yield Chunk(self.motion[rows].with_time(self.time[rows]).with_channels(measured),
+                            rows,
                             slice(first, last), rows.start == segment.start,
                             self.treat.blocks(first, last))
                 first = last
@@ -168,7 +173,7 @@ def follow(model: ForceModel | Geometry, time: Array, drives: DriveMotion,
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    if isinstance(model, (AxisModel, ArmModel)):
+    if isinstance(model, ArmModel):
         return FollowedMotion(JointMotion(drives.position, drives.velocity, drives.acceleration),
                               np.zeros(len(time), dtype=bool), np.zeros(0, dtype=int))
     geometry = model.robot.geometry if isinstance(model, DriveModel) else model
@@ -273,7 +278,7 @@ def reconstruct(
         **vars(drives), time=time, motion=followed.motion, effort=effort,
         treat=Treatment(drives.block_starts, total), near_branch=followed.near_branch,
         jumps=followed.jumps, gain=_applied_gain(recording), dropped=dropped,
-        start=float(recording.time[0]))
+        start=float(recording.time[0]), channels=_channels(recording, drives.index))
 
 
 def with_zeros(found: Reconstruction, model: ForceModel, shift: Array) -> Reconstruction:
@@ -304,6 +309,19 @@ def _applied_gain(recording: Recording) -> Array:
     """Return by which gain currents became efforts, (D,); NaN where efforts were recorded."""
     gain: Array | None = getattr(recording, 'gain', None)
     return np.full(len(recording.drives), np.nan) if gain is None else gain
+
+
+def _channels(recording: Recording, index: Array) -> dict[str, Array]:
+    """Return what was measured beside motion and effort, at some samples, (N, D) by name."""
+    found = {}
+    for name, values in recording.channels.items():
+        filled = np.full((len(index), values.shape[1]), np.nan)
+        for d in range(values.shape[1]):
+            known = np.flatnonzero(np.isfinite(values[:, d]))
+            if len(known):
+                filled[:, d] = np.interp(index, known, values[known, d])
+        found[name] = filled
+    return found
 
 
 def _efforts(model: ForceModel | Geometry, recording: Recording) -> Array:

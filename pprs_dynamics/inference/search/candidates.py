@@ -24,6 +24,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE, catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 
+Claims = frozenset[str]  # the names of a set's effects, bodies and joint friction with their place
 COURSE_TIMES = 200  # beginnings that are tried, evenly over the recordings
 SINCE, DURING, DRIFT = 'since', 'during', 'drift'  # kinds of courses
 
@@ -304,6 +305,16 @@ class CandidateSet:
         return tuple(c for c in self.candidates if isinstance(c, EffectCandidate))
 
     @property
+    def claims(self) -> Claims:
+        """What its effects claim."""
+        return frozenset(candidate.claim for candidate in self.effects)
+
+    @property
+    def is_bent(self) -> bool:
+        """Whether one of its effects changes how others show."""
+        return any(candidate.effect.bends_columns for candidate in self.effects)
+
+    @property
     def unknowns(self) -> tuple[UnknownCandidate, ...]:
         """Those of no catalogue."""
         return tuple(c for c in self.candidates if isinstance(c, UnknownCandidate))
@@ -321,11 +332,6 @@ class CandidateSet:
         if isinstance(candidate, UnknownCandidate):
             return candidate.blocks
         return tuple(self.blocks[component] for component in candidate.components)
-
-
-def bends(candidate: Candidate) -> bool:
-    """Return whether a candidate changes how others show."""
-    return isinstance(candidate, EffectCandidate) and candidate.effect.bends_columns
 
 
 def set_key(candidates: tuple[Candidate, ...]) -> Hashable:

@@ -104,7 +104,8 @@ class Decisions:
         0.35, 'rad', 'lean of a base beyond which it is no effect of how the machine was put up',
         'a base is levelled to a degree; what leans by 20 stands on a slope or a wall on purpose')
     sure: float = _number(
-        2.0, 'deviations', 'by how much a number must have moved to be told as calibrated',
+        2.0, 'deviations', 'by how much a number must have moved to be told as calibrated, and '
+        'held-out data be predicted worse with an effect for it to be refuted',
         '95 %')
     edge_share: float = _number(
         0.02, '1', 'how near the edge of what was tried a shape is not to be trusted',
@@ -124,6 +125,19 @@ class Decisions:
     filtered: float = _number(
         0.05, '1', 'fast part of an effort over that of white noise, below which it looks filtered',
         'any amplifier and converter leaves more')
+    run_repeats: float = _number(
+        0.6, '1', 'correlation, in two runs, of what repeats of the error of a reference, as '
+        'expected before its parts tell it', 'between six pairs of runs of a UR10e it is 0.4 to '
+        '0.8')
+    run_repeats_spread: float = _number(
+        0.2, '1', 'standard deviation of that expectation', 'the same')
+    reference_direction: float = _number(
+        4.0, '1', 'whitened square of what a reference leaves unknown in one direction, from '
+        'which that is a column of every fit', 'two standard deviations of the noise; what is '
+        'less the spectrum of the noise takes')
+    reference_known: float = _number(
+        0.5, '1', 'share of the variance of what repeats, from which a state counts as covered '
+        'by a reference', 'it says more of the force there than is left open')
 
     def table(self) -> list[tuple[str, float, str, str, str]]:
         """Return name, value, unit, what it decides and why, for the documentation."""

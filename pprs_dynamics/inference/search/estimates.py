@@ -189,7 +189,11 @@ def _left_out(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
         prefix = '' if component.drive is None else f'{fits.design.drives[component.drive]}.'
         changed = replace(component, given=()).values(found.coefficients(component))
         fitted = {prefix + p.name for p in candidate.effect.linear if changed[p.name]}
-        estimates.update({key: one for key, one in some.items() if key not in fitted})
+        # Of what the recordings do not show at all no more is known than its bounds.
+        widest = {prefix + p.name: p.widest.upper - p.widest.lower
+                  for p in candidate.effect.linear}
+        estimates.update({key: replace(one, std=min(one.std, widest[key]))
+                          for key, one in some.items() if key not in fitted})
     return estimates
 
 

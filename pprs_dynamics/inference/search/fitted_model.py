@@ -13,7 +13,6 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.regression.base_columns import (
-    ReversalShape,
     move_numbers,
     move_present,
     units_of,
@@ -29,9 +28,9 @@ from pprs_dynamics.physics.model.model_file import build_model
 
 
 def parts_of(fits: FittedSets, found: CandidateSet) -> tuple[Array, tuple[PlacedEffect, ...]]:
-    """Return coefficients of the base columns, 0 for reversals, and effects with theirs."""
+    """Return coefficients of the base columns, 0 for nuisances, and effects with theirs."""
     base = found.fit.coefficients[:len(fits.design.base)].copy()
-    base[[isinstance(column, ReversalShape) for column in fits.design.base]] = 0.0
+    base[[not column.in_model for column in fits.design.base]] = 0.0
     effects = []
     for one in found.blocks:
         every = one.every(found.coefficients(one)).tolist()
@@ -103,7 +102,7 @@ def linear_prediction(fits: FittedSets, found: CandidateSet) -> Array:
     design = fits.design
     prediction = design.residuals.model.copy()
     for column, c in zip(design.base, found.fit.coefficients, strict=False):
-        if not isinstance(column, ReversalShape):
+        if column.in_model:
             for d, row in column.rows.items():
                 prediction[:, d] += c * row
     for candidate in found.effects:

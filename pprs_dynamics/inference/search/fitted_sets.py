@@ -58,6 +58,8 @@ class FittedSets:
     ----------
     stepped : callable
         Called for each set that is fitted and each drive that is scanned: work is done.
+    settled : dict
+        By key of a set, what `relinearisation.settled` has found for it.
     """
 
     def __init__(self, design: Design, decisions: Decisions,
@@ -67,6 +69,7 @@ class FittedSets:
         self.regression = Regression(design.residuals, design.base, error_scale=error_scale)
         self.prices = Prices.of(self.regression, decisions, design.given)
         self.library = Library(design, self.regression, self.prices)
+        self.settled: dict[Hashable, object] = {}
         self._evaluated: dict[Hashable, CandidateSet] = {}
         self._nuisance: dict[Hashable, tuple[Block, ...]] = {}
 
@@ -106,7 +109,7 @@ class FittedSets:
             self.blocks(candidates), start))
         fit = self.regression.fit(self.blocks(candidates, nuisance), start)
         bodies = {one: self.library.block(one) for c in candidates for one in c.components
-                  if issubclass(one.effect, AddedBody)}
+                  if issubclass(one.effect, AddedBody) and one.effect.has_extent}
         possible = with_possible_bodies(self.design.given, self.regression, fit, bodies)
         found = self._set(candidates, fit, nuisance)
         if possible is None:

@@ -54,8 +54,7 @@ def without_remainders(search: Search, best: CandidateSet,
         if better is kept:
             break
         kept = better
-    if (search.best is not before and search.best.cost < best.cost - LEAST_IMPROVEMENT
-            and not search.is_beyond_point):
+    if search.best is not before and search.best.cost < best.cost - LEAST_IMPROVEMENT:
         return without_remainders(search, search.best)
     if remainders:
         # What paid beside them only is not kept for their sake, and neither are shapes.

@@ -15,13 +15,11 @@ from itertools import chain
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.regression.base_columns import ReversalShape
 from pprs_dynamics.inference.regression.joint_fit import Integers
 from pprs_dynamics.inference.regression.normal_equations import Prior
+from pprs_dynamics.inference.residuals.paired_errors import BLOCKS, PairedGain
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-
-BLOCKS = 10
 
 
 @dataclass(frozen=True)
@@ -32,12 +30,24 @@ class HeldOut:
     ----------
     error : float
         Root of the mean square over samples and drives, reversals as the model has them [N].
-    losses : (BLOCKS,) array
-        Whitened squared error of each block.
+    penalties : (BLOCKS,) array
+        Of numbers that the fits to the other blocks stretch beyond what is known of them.
+    white : tuple of (n,) arrays
+        Whitened error of each block, of all drives.
     """
 
     error: float
-    losses: Array
+    penalties: Array
+    white: tuple[Array, ...]
+
+    def gain(self, other: HeldOut) -> PairedGain:
+        """Return what another set, under the same noise, takes off the error of this one."""
+        pairs = list(zip(self.white, other.white, strict=True))
+        return PairedGain(
+            # Numbers that are stretched beyond what is known of them cost their share everywhere.
+            np.array([a @ a - b @ b for a, b in pairs])
+            + (self.penalties - other.penalties) / BLOCKS,
+            np.array([(a - b) @ (a - b) for a, b in pairs]))
 
 
 def hold_out(fits: FittedSets, found: CandidateSet) -> HeldOut:
@@ -65,19 +75,17 @@ def hold_out(fits: FittedSets, found: CandidateSet) -> HeldOut:
     others = [prior.posterior(H.sum(axis=0) - H[k], b.sum(axis=0) - b[k]) for k in range(BLOCKS)]
     coefficients = np.stack([one.coefficients for one in others])
     plain = coefficients.copy()
-    plain[:, [k for k, column in enumerate(fits.design.base)
-              if isinstance(column, ReversalShape)]] = 0.0
+    plain[:, [k for k, column in enumerate(fits.design.base) if not column.in_model]] = 0.0
     plain[:, fit.index_of(chain(*found.nuisance.values()))] = 0.0
-    losses, squares, count = np.zeros(BLOCKS), 0.0, 0
+    left: list[list[Array]] = [[] for _ in range(BLOCKS)]
+    squares, count = 0.0, 0
     for d, (index, stacked, rows) in white.items():
         series = regression.series[d]
         at = np.searchsorted(series.index, edges)
         for k in range(BLOCKS):
             block = slice(at[k], at[k + 1])
-            left = stacked[-1, block] - coefficients[k, index] @ stacked[:-1, block]
-            losses[k] += float(left @ left)
+            left[k].append(stacked[-1, block] - coefficients[k, index] @ stacked[:-1, block])
             rest = rows[-1, block] - plain[k, index] @ rows[:-1, block]
             squares, count = squares + float(rest @ rest), count + len(rest)
-    # Numbers that are stretched beyond what is known of them cost their share in every block.
-    losses += np.array([one.penalty for one in others]) / BLOCKS
-    return HeldOut(float(np.sqrt(squares / max(count, 1))), losses)
+    return HeldOut(float(np.sqrt(squares / max(count, 1))),
+                   np.array([one.penalty for one in others]), tuple(map(np.concatenate, left)))

@@ -106,6 +106,8 @@ class DriveLibrary:
             if not (names and set(names) <= set(effect.scanned)):
                 continue
             at = [term.names.index(name) for name in names]
+            if not np.any(term.rows[self.d][at]):  # of a temperature that was not measured, say
+                continue
             chosen = self.series.transform(term.rows[self.d][at]) if known else None
             precision = None if chosen is None else block_diag(
                 self.regression.g_prior({self.d: chosen @ chosen.T}), np.array([[CERTAIN]]))

@@ -41,7 +41,7 @@ MOST_SHAPES = 60
 
 
 def noise_floors(fits: FittedSets, patterns: Mapping[str, Sequence[Array]] = MappingProxyType({}),
-                 blocks: Sequence[Block] = (), period: float | None = None,
+                 best: JointFit | None = None, period: float | None = None,
                  ) -> dict[str, float]:
     """Return the rms of the noise of the drives where it can be told [N].
 
@@ -51,8 +51,9 @@ def noise_floors(fits: FittedSets, patterns: Mapping[str, Sequence[Array]] = Map
     patterns : mapping of str to sequence of (k, M) arrays, optional
         Further columns by drive: what stands out, and is no noise. Those of as many samples as
         the design has take part.
-    blocks : sequence of Block, optional
-        The same, as blocks of the design: of what was found.
+    best : JointFit, optional
+        Of what was found. Its columns take part, and where its noise is, in frequency, columns have
+        to leave degrees of freedom, too: slow noise that all columns swallow leaves a fast one.
     period : float, optional
         Between the samples whose noise is told [s]; by default that of the design.
     """
@@ -60,9 +61,10 @@ def noise_floors(fits: FittedSets, patterns: Mapping[str, Sequence[Array]] = Map
     found = [regression.block({drives.index(name): rows}) for name, every in patterns.items()
              for rows in every if rows.shape[-1] == len(fits.design.residuals)
              and drives.index(name) in regression.drives]
-    every = tuple(dict.fromkeys((*catalogue_blocks(fits), *blocks, *found)))
+    every = tuple(dict.fromkeys((*catalogue_blocks(fits), *(best.blocks if best else ()), *found)))
     fit = regression.fit(every, fits.evaluate(()).fit.amplitudes)
-    told = _shares_seen(fits, fit) >= fits.decisions.noise_seen
+    told = np.all([_shares_seen(fits, fit, one.amplitudes) >= fits.decisions.noise_seen
+                   for one in (fit, best) if one is not None], axis=0)
     # Means over longer blocks have less white noise, and as much of slower noise.
     white = fit.amplitudes[:, 0] * (
         fits.design.residuals.period / (period or fits.design.residuals.period) - 1)
@@ -133,12 +135,12 @@ def _directions(fits: FittedSets, effect: type[DriveEffect], d: int) -> Array:
     return axes[:, kept].T @ rows
 
 
-def _shares_seen(fits: FittedSets, fit: JointFit) -> Array:
-    """Return the share of each drive's noise where columns leave degrees of freedom, (D,)."""
+def _shares_seen(fits: FittedSets, fit: JointFit, amplitudes: Array) -> Array:
+    """Return the share of a noise where a fit's columns leave degrees of freedom, (D,)."""
     regression = fits.regression
     leverage = NormalEquations(regression, fit.blocks).solve(fit.spectra,
                                                              regression.counts).leverage
-    power = fit.amplitudes @ regression.noise_shapes.at_bands
+    power = amplitudes @ regression.noise_shapes.at_bands
     free = np.maximum(regression.counts - leverage, 0.0)
     shares: Array = np.sum(free * power, axis=1) / np.sum(regression.counts * power, axis=1)
     return shares

@@ -58,7 +58,7 @@ def with_possible_bodies(model: ForceModel, regression: Regression, fit: JointFi
         place = fit.places[block]
         # What is changed of a body that the model has is none: all of it has to be one.
         there = [one for one in model.effects
-                 if not (component.given and type(one) is component.effect)]
+                 if not (component.given and one.name == component.effect.name)]
         before = given_body(component)
         robot = with_bodies(model.robot, there)  # type: ignore[attr-defined]
         found = nearest_possible(robot, component, before + fit.of(block),
@@ -144,7 +144,7 @@ def _margins(robot: Mechanism, component: Component, sign: float) -> Callable[[A
     assert issubclass(kind, AddedBody)
     names = [name.rpartition('.') for name in component.names]
     prefix, has_extent = ''.join(names[0][:2]), not {last for _, _, last in names} <= POINT
-    link, centre = next((link, np.array(centre)) for before, link, centre, _ in kind.places
+    link, centre = next((link, np.array(centre)) for before, link, centre, *_ in kind.places
                         if before == prefix)
     row, frame = robot.structure.links[link]
     values, axes = np.linalg.eigh(pseudo_inertia(robot.by_joint[row]))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The answer of the search: all sets by cost, the one that is kept, and what stands beside it."""
+"""The answer of the search: sets by cost, the one that is reported, and what stands beside it."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from types import MappingProxyType
 import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
-from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.design import CarriedOver, Design
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
+    Claims,
     Component,
     EffectCandidate,
-    bends,
 )
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_model import linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder, without_remainders
-from pprs_dynamics.inference.search.relinearisation import LEAST_CHANGE, around_fitted, exact_cost
+from pprs_dynamics.inference.search.relinearisation import search_around_fitted
 from pprs_dynamics.inference.search.scan import Place
 from pprs_dynamics.inference.search.search import Search, patterns_of
 from pprs_dynamics.inference.search.unknown import PatternLibrary
@@ -36,7 +36,6 @@ from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 
-SHORTLIST = 4  # sets of different claims that are ranked by exact forces
 SAME = 1e-6  # of a column's square may lie outside the span of others that do the same
 
 
@@ -69,16 +68,16 @@ class Ranking:
         Of no catalogue, around the last.
     of_first, of_last : tuple of CandidateSet
         Their sets, by cost.
-    best, kept : CandidateSet
+    map_set, reported : CandidateSet
         Of the last: that of lowest cost, and without what is within the model error of others.
     remainders : tuple of Remainder
         What is.
     without : mapping of Candidate to CandidateSet
-        The kept set without each of its candidates.
+        The reported set without each of its candidates.
     order : tuple of EffectCandidate
-        Those of the kept set, each the one that lowers most what those before it leave.
+        Those of the reported set, each the one that lowers most what those before it leave.
     path : tuple of CandidateSet
-        From the patterns of the kept set to all of it, an effect more in each in that order.
+        From the patterns of the reported set to all of it, an effect more in each in that order.
     refuted : frozenset of Place
         What took no part in the search, as held-out data did not confirm it.
     exact : mapping of claims to float
@@ -90,50 +89,51 @@ class Ranking:
     patterns: tuple[PatternLibrary, ...] = field(repr=False)
     of_first: tuple[CandidateSet, ...] = field(repr=False)
     of_last: tuple[CandidateSet, ...] = field(repr=False)
-    best: CandidateSet
-    kept: CandidateSet
+    map_set: CandidateSet
+    reported: CandidateSet
     remainders: tuple[Remainder, ...]
     without: Mapping[Candidate, CandidateSet] = field(repr=False)
     order: tuple[EffectCandidate, ...] = field(repr=False)
     path: tuple[CandidateSet, ...] = field(repr=False)
     refuted: frozenset[Place]
-    exact: Mapping[frozenset[str], float] = field(
+    exact: Mapping[Claims, float] = field(
         default_factory=lambda: MappingProxyType({}), repr=False)
 
     @classmethod
-    def of(cls, first: FittedSets, last: Search, best: CandidateSet,
+    def of(cls, first: FittedSets, last: Search, map_set: CandidateSet,
            refuted: frozenset[Place] = frozenset()) -> Ranking:
         """Return the ranking of the sets of two searches, and of what the answer needs beside."""
-        best, kept, remainders = without_remainders(last, best)
-        return cls._keeping(first, last.fits, last.patterns, best, kept, remainders, refuted)
+        map_set, reported, remainders = without_remainders(last, map_set)
+        return cls._reporting(first, last.fits, last.patterns, map_set, reported, remainders,
+                              refuted)
 
     @classmethod
-    def _keeping(cls, first: FittedSets, last: FittedSets, patterns: tuple[PatternLibrary, ...],
-                 best: CandidateSet, kept: CandidateSet, remainders: tuple[Remainder, ...],
-                 refuted: frozenset[Place]) -> Ranking:
-        without = {gone: last.evaluate(kept.without(gone)) for gone in kept.candidates}
-        order, path = _falling(last, best, kept)
-        return cls(first, last, patterns, _by_cost(first.sets), _by_cost(last.sets), best, kept,
-                   remainders, MappingProxyType(without), order, path, refuted)
+    def _reporting(cls, first: FittedSets, last: FittedSets, patterns: tuple[PatternLibrary, ...],
+                   map_set: CandidateSet, reported: CandidateSet, remainders: tuple[Remainder, ...],
+                   refuted: frozenset[Place]) -> Ranking:
+        without = {gone: last.evaluate(reported.without(gone)) for gone in reported.candidates}
+        order, path = _falling(last, map_set, reported)
+        return cls(first, last, patterns, _by_cost(first.sets), _by_cost(last.sets), map_set,
+                   reported, remainders, MappingProxyType(without), order, path, refuted)
 
     def less(self, gone: EffectCandidate) -> Ranking:
-        """Return the ranking without one of the kept effects.
+        """Return the ranking without one of the reported effects.
 
         Where that one bent the columns, everything was found around it: the search begins again.
         Else what paid only beside it goes with it.
         """
         places = {(one.effect, one.drive) for one in gone.components}
         refuted = self.refuted | places
-        if bends(gone) and not places <= self.refuted:
+        if gone.effect.bends_columns and not places <= self.refuted:
             return _searched(FittedSets(self.first.design, self.first.decisions), refuted)
-        kept = self.last.pruned(self.without[gone])
-        return replace(self._keeping(self.first, self.last, self.patterns, self.best, kept,
-                                     self.remainders, refuted), exact=self.exact)
+        reported = self.last.pruned(self.without[gone])
+        return replace(self._reporting(self.first, self.last, self.patterns, self.map_set, reported,
+                                       self.remainders, refuted), exact=self.exact)
 
     def claiming_nothing(self) -> Ranking:
-        """Return the ranking with nothing kept, under the noise that the best set leaves."""
-        return self._keeping(self.first, self.last, self.patterns, self.best,
-                             self.last.evaluate(()), (), self.refuted)
+        """Return the ranking with nothing reported, under the noise that the best set leaves."""
+        return self._reporting(self.first, self.last, self.patterns, self.map_set,
+                               self.last.evaluate(()), (), self.refuted)
 
     @cached_property
     def shares(self) -> tuple[float, ...]:
@@ -142,8 +142,8 @@ class Ranking:
         Of its root mean square over drives, each as a multiple of its noise, of the model as given.
         """
         given = self.first.design.residuals.error
-        errors = [_over_noise(self.last, self.best, given), *(
-            _over_noise(self.last, self.best, linear_residual(self.last, step))
+        errors = [_over_noise(self.last, self.map_set, given), *(
+            _over_noise(self.last, self.map_set, linear_residual(self.last, step))
             for step in self.path[1:])]
         return tuple((before - after) / errors[0]
                      for before, after in pairwise(errors)) if errors[0] > 0 else ()
@@ -157,16 +157,16 @@ class Ranking:
         """
         found = list(self.of_last)
         if self.first is not self.last:
-            found = [one for one in self.of_last if _is_bent(one)] + [
-                one for one in self.of_first if not _is_bent(one)]
-        return (self.best, *_by_cost([one for one in found
-                                      if one is not self.best and one.is_admissible]))
+            found = [one for one in self.of_last if one.is_bent] + [
+                one for one in self.of_first if not one.is_bent]
+        return (self.map_set, *_by_cost([
+            one for one in found if one is not self.map_set and one.is_admissible]))
 
     def barred(self, margin: float) -> tuple[CandidateSet, ...]:
         """Return the sets that would cost less than a margin more than the best, and may not be."""
         found = [one for one in (*self.of_last, *(
             self.of_first if self.first is not self.last else ())) if one.barred
-            and one.total < self.best.total + margin]
+            and one.total < self.map_set.total + margin]
         return tuple(sorted(found, key=lambda one: one.total))
 
     @property
@@ -188,21 +188,21 @@ class Ranking:
         return self.last if any(one is found for one in self.of_last) else self.first
 
     def best_with(self, candidate: EffectCandidate) -> CandidateSet:
-        """Return the set of lowest cost with an effect of the kept set."""
-        return min((self.kept, *(one for one in self._judged if _has(one, candidate))),
-                   key=lambda one: self.difference(one, self.best).total)
+        """Return the set of lowest cost with an effect of the reported set."""
+        return min((self.reported, *(one for one in self._judged if _has(one, candidate))),
+                   key=lambda one: self.difference(one, self.map_set).total)
 
     def best_without(self, candidate: EffectCandidate) -> CandidateSet:
-        """Return the set of lowest cost without an effect of the kept set, whatever stands in it.
+        """Return the set of lowest cost without an effect of the reported set, whatever is in it.
 
         An effect on other drives or in another shape is the same one; a body on another link is
         another.
         """
         # Of one claim that was ranked by exact forces, these stand for all its sets.
         others = [one for one in self._judged if not _has(one, candidate)
-                  and (_claims(one) not in self.exact or one in self._exact_costs)]
+                  and (one.claims not in self.exact or one in self._exact_costs)]
         return min((self.without[candidate], *others),
-                   key=lambda one: self.difference(one, self.best).total)
+                   key=lambda one: self.difference(one, self.map_set).total)
 
     def difference(self, found: CandidateSet, other: CandidateSet) -> CostTerms:
         """Return the terms of what a set costs more than another, exactly where both are known."""
@@ -215,32 +215,32 @@ class Ranking:
     @cached_property
     def _exact_costs(self) -> Mapping[CandidateSet, float]:
         """What the sets of the shortlist cost: of each claim the first."""
-        first: dict[frozenset[str], CandidateSet] = {}
+        first: dict[Claims, CandidateSet] = {}
         for one in self.sets:
-            first.setdefault(_claims(one), one)
+            first.setdefault(one.claims, one)
         return {first[claims]: cost for claims, cost in self.exact.items() if claims in first}
 
     @property
     def _judged(self) -> list[CandidateSet]:
-        """Sets without what is within the model error of others, which pays but is not kept."""
+        """Sets without what is within the model error of others, which pays but is not reported."""
         ignored = {one.candidate.name for one in self.remainders}
         return [one for one in self.sets
                 if not ignored & {candidate.name for candidate in one.candidates}]
 
     def near(self, margin: float) -> tuple[CandidateSet, ...]:
         """Return the sets of the last search within a margin of the best."""
-        return tuple(one for one in self.of_last if one.cost < self.best.cost + margin)
+        return tuple(one for one in self.of_last if one.cost < self.map_set.cost + margin)
 
     def rivals(self, margin: float) -> list[Rival]:
-        """Return sets with other effects than the kept ones so near the best, the best first.
+        """Return sets with other effects than the reported ones so near the best, the best first.
 
         To have what is within the model error of others makes no rival.
         """
-        mine = {candidate.claim: candidate.name for candidate in self.kept.effects}
+        mine = {candidate.claim: candidate.name for candidate in self.reported.effects}
         ignored = {one.candidate.name for one in self.remainders}
         rivals = []
         for other in self.sets:
-            if other.cost > self.best.cost + margin:
+            if other.cost > self.map_set.cost + margin:
                 break
             theirs = {candidate.claim: candidate.name for candidate in other.effects
                       if candidate.name not in ignored}
@@ -254,17 +254,17 @@ class Ranking:
 
     def _is_beaten(self, other: CandidateSet, margin: float) -> bool:
         """Return whether a set is no rival by the exact forces of its own model."""
-        mine, theirs = (self.exact.get(_claims(one)) for one in (self.best, other))
+        mine, theirs = (self.exact.get(one.claims) for one in (self.map_set, other))
         return mine is not None and theirs is not None and theirs > mine + margin
 
     def _at_one_load(self) -> Iterator[Rival]:
-        """Yield the kept set with friction by load for one that no load changes, or in its place.
+        """Yield the reported set with friction by load for one that no load changes, or back.
 
         However exact one of them fits: where the load hardly varies, friction that varies as
         little along its guide does the same.
         """
-        design, names = self.last.design, {one.name for one in self.kept.effects}
-        for one in self.kept.effects:
+        design, names = self.last.design, {one.name for one in self.reported.effects}
+        for one in self.reported.effects:
             other = catalogue().get(one.effect.at_one_load)
             if (other is None or other.name in names or not issubclass(other, DriveEffect)
                     or not one.drives or any(
@@ -274,7 +274,7 @@ class Ranking:
                 continue
             instead = EffectCandidate.of(
                 Component.of(other, d, {}, other.variants[0]) for d in one.drives)
-            found = self.last.evaluate((*self.kept.without(one), instead))
+            found = self.last.evaluate((*self.reported.without(one), instead))
             if found.is_admissible:
                 yield Rival(found, (one.name,), (other.name,))
 
@@ -286,13 +286,14 @@ class Ranking:
         that costs more is no other explanation. Of friction only: what else is one thing in a
         recording (a spring and a mass along one sine) is one thing on no other motion.
         """
-        for one in (one for c in self.kept.effects if c.name in missing for one in c.components):
+        for one in (one for c in self.reported.effects if c.name in missing
+                    for one in c.components):
             theirs = [other.blocks[two].rows[one.drive] for c in other.effects
                       if c.name in instead and c.effect.is_friction for two in c.components
                       if one.drive is not None and two.drive == one.drive]
             if one.drive is None or not one.effect.is_friction or not theirs:
                 return False
-            mine, columns = self.kept.blocks[one].rows[one.drive], np.concatenate(theirs)
+            mine, columns = self.reported.blocks[one].rows[one.drive], np.concatenate(theirs)
             if len(columns) <= len(mine):
                 return False
             left = mine - np.linalg.lstsq(columns.T, mine.T, rcond=None)[0].T @ columns
@@ -302,20 +303,23 @@ class Ranking:
 
     def suspects(self, margin: float) -> list[tuple[EffectCandidate, CandidateSet]]:
         """Return effects that nearly pay beside the best, with their sets: noise would do it."""
-        mine = {c.key for c in self.best.candidates}
-        names = {c.name for c in self.best.effects}
+        mine = {c.key for c in self.map_set.candidates}
+        names = {c.name for c in self.map_set.effects}
         found: dict[str, tuple[EffectCandidate, CandidateSet]] = {}
         for one in self.near(margin):
             more = [c for c in one.effects if c.key not in mine]
             if (len(more) == 1 and len(one.candidates) == len(mine) + 1
-                    and one.cost > self.best.cost and more[0].name not in names):
+                    and one.cost > self.map_set.cost and more[0].name not in names):
                 found.setdefault(more[0].name, (more[0], one))
         return list(found.values())
 
 
 def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
-           progress: Callable[[float], None] | None = None) -> Ranking:
+           progress: Callable[[float], None] | None = None,
+           carry_over: Callable[[Design], CarriedOver] | None = None) -> Ranking:
     """Return all sets of effects that were tried, around the fitted model where that matters.
+
+    `carry_over` says what a reference run knows of the recordings.
 
     Raises
     ------
@@ -324,6 +328,8 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     """
     report = progress or (lambda share: None)
     design = Design.of(model, recordings, lambda share: report(0.25 * share))
+    if carry_over is not None:
+        design = design.beside(carry_over(design))
     return _searched(FittedSets(design, decisions), frozenset(), report)
 
 
@@ -338,22 +344,14 @@ def without_search(model: ForceModel, recordings: Sequence[Recording], decisions
     """
     fits = FittedSets(Design.of(model, recordings, progress), decisions)
     nothing = fits.evaluate(())
-    return Ranking._keeping(fits, fits, (), nothing, nothing, (), frozenset())
+    return Ranking._reporting(fits, fits, (), nothing, nothing, (), frozenset())
 
 
 def _searched(first: FittedSets, refuted: frozenset[Place],
               report: Callable[[float], None] = lambda share: None) -> Ranking:
     search = Search(first, patterns_of(first), refuted, lambda share: report(0.25 + 0.35 * share))
-    last, best = around_fitted(search, search.run(), report)
-    # Rivals that bend no columns are judged where none are bent: the best of each kind.
-    seen = {_claims(best)}
-    for one in _by_cost(last.fits.sets) if last is not search else ():
-        if one.cost > best.cost + first.decisions.rival_margin:
-            break
-        if one.effects and not one.unknowns and not _is_bent(one) and _claims(one) not in seen:
-            seen.add(_claims(one))
-            first.refined(first.evaluate(one.candidates))
-    found = _by_exact_forces(Ranking.of(first, last, best, refuted), search)
+    last, best, exact = search_around_fitted(search, report)
+    found = replace(Ranking.of(first, last, best, refuted), exact=MappingProxyType(exact))
     report(1.0)
     return found
 
@@ -362,42 +360,11 @@ def _has(found: CandidateSet, candidate: EffectCandidate) -> bool:
     return any(one.claim == candidate.claim for one in found.effects)
 
 
-def _by_exact_forces(found: Ranking, first: Search) -> Ranking:
-    """Return a ranking whose best set is that of the shortlist whose exact forces cost least.
-
-    Linear costs around the model as given, and around another set's, are not those of a set
-    around itself: what is near the best by them is ranked by its own model.
-    """
-    near: dict[frozenset[str], CandidateSet] = {}
-    for one in found.sets:
-        if one.cost > found.best.cost + first.fits.decisions.rival_margin:
-            break
-        near.setdefault(_claims(one), one)
-    if len(near) == 1:
-        return found
-    exact = {claims: exact_cost(found.fits_of(one), one)
-             for claims, one in list(near.items())[:SHORTLIST]}
-    best = min(exact, key=lambda claims: exact[claims])
-    fits = found.fits_of(near[best])
-    if exact[best] < exact[_claims(found.best)] - LEAST_CHANGE:
-        found = Ranking.of(found.first, first if fits is first.fits else Search(
-            found.last, found.patterns, found.refuted), near[best], found.refuted)
-    return replace(found, exact=MappingProxyType(exact))
-
-
-def _is_bent(found: CandidateSet) -> bool:
-    return any(map(bends, found.candidates))
-
-
-def _claims(found: CandidateSet) -> frozenset[str]:
-    return frozenset(candidate.claim for candidate in found.effects)
-
-
 def _by_cost(sets: Sequence[CandidateSet]) -> tuple[CandidateSet, ...]:
     return tuple(sorted(sets, key=lambda one: one.cost))
 
 
-def _falling(fits: FittedSets, best: CandidateSet, kept: CandidateSet,
+def _falling(fits: FittedSets, map_set: CandidateSet, reported: CandidateSet,
              ) -> tuple[tuple[EffectCandidate, ...], tuple[CandidateSet, ...]]:
     """Return the effects of a set, what lowers the error most first, and the sets on the way.
 
@@ -405,18 +372,18 @@ def _falling(fits: FittedSets, best: CandidateSet, kept: CandidateSet,
     the patterns: one over a position takes most of what a weight does there.
     """
     order: list[EffectCandidate] = []
-    left = list(kept.effects)
+    left = list(reported.effects)
     while left:
         following = left[0] if len(left) == 1 else min(left, key=lambda one: _over_noise(
-            fits, best, linear_residual(fits, fits.evaluate((*order, one)))))
+            fits, map_set, linear_residual(fits, fits.evaluate((*order, one)))))
         order.append(following)
         left.remove(following)
-    path = [fits.evaluate((*order[:count], *kept.unknowns)) for count in range(len(order))]
-    return tuple(order), (*path, kept)
+    path = [fits.evaluate((*order[:count], *reported.unknowns)) for count in range(len(order))]
+    return tuple(order), (*path, reported)
 
 
-def _over_noise(fits: FittedSets, best: CandidateSet, left: Array) -> float:
+def _over_noise(fits: FittedSets, map_set: CandidateSet, left: Array) -> float:
     """Return the root of the mean square of errors (M, D), over the noise of each drive."""
     return root_mean_square([
-        root_mean_square(left[:, d]) / max(fits.regression.noise_floor(best.fit, d), 1e-12)
+        root_mean_square(left[:, d]) / max(fits.regression.noise_floor(map_set.fit, d), 1e-12)
         for d in fits.regression.drives])

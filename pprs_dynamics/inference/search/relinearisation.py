@@ -1,43 +1,35 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Gauss-Newton around the selection: the search again around a model that has what was found.
+"""Gauss-Newton over sets: each ranked by the exact forces of its own fitted model.
 
 Some effects change how others show, or hold in their linear form nearby only. Where the fitted
 model's exact forces differ from the linear prediction by more than the noise lets pass, columns
-are computed anew around the fitted model, the error is extrapolated back to the given one, and the
-search goes on from the set that was found. Costs of both searches mean the same.
+are computed anew around the fitted model, and the error is extrapolated back to the given one:
+costs around all points mean the same.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.terms import OperatingPoint, PlacedEffect
-from pprs_dynamics.inference.search.candidates import (
-    CandidateSet,
-    EffectCandidate,
-    bends,
-)
+from pprs_dynamics.inference.search.candidates import CandidateSet, Claims
 from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,
     linear_prediction,
-    linear_residual,
     model_at,
     parts_of,
     squared,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.form import beyond_lack_of_fit
+from pprs_dynamics.inference.search.neighbours import on_best_drives
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
-from pprs_dynamics.inference.search.scan import Place
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.model.force_model import ForceModel
 
@@ -45,169 +37,109 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 # after it was relinearised around, from before: less changes no cost by more than a rival's margin.
 LEAST_DIFFERENCE, LEAST_CHANGE = 4.0, 2.0
 MOST_SEARCHES, MOST_STEPS, MOST_HALVINGS = 5, 6, 4  # how often all of this is repeated
+SHORTLIST = 4  # sets of different claims of a search that are ranked by exact forces
 
 
-def around_fitted(first: Search, best: CandidateSet, report: Callable[[float], None],
-                  ) -> tuple[Search, CandidateSet]:
-    """Return the search around the fitted model where that matters, and its best set."""
-    found = _around_fitted(first, best, report, _bending_alone)
-    search, after = found
-    if ((search.is_beyond_point or _stands_out(search.fits, after))
-            and not all(map(bends, best.candidates))):
-        found = min(found, _around_fitted(first, best, report, _as_it_is, after.total),
-                    key=lambda one: _exact_total(one[0].fits, one[1]))
-    return found
+@dataclass(frozen=True)
+class ExactSet:
+    """A set around its own fitted model, on the drives and in the variants of least cost there.
 
-
-def _around_fitted(
-    first: Search, at_first: CandidateSet, report: Callable[[float], None],
-    first_step: Callable[[Search, CandidateSet], CandidateSet], rival: float = np.inf,
-) -> tuple[Search, CandidateSet]:
-    """Search again around the fitted model, until that is where columns were computed.
-
-    `first_step` returns the set around which to expand where effects bend the columns that did
-    not yet; `rival` is the cost that each search has to reach for another one. A search whose
-    set is far from where its columns hold is gone on from only if the set costs less around itself.
+    Parameters
+    ----------
+    found : CandidateSet
+    point : OperatingPoint, optional
+        Around which it is linear; None: the given model.
+    effects : tuple of PlacedEffect
+        Its effects with their coefficients.
+    cost : float
+        J_exact = J + |exact - linear|^2, whitened, by the exact forces of its fitted model.
+        However the set was come by, it costs the same. Infinite where its values are no model's.
     """
-    search, best = first, at_first
-    costs: dict[Hashable, float] = {}
-    refuted = first.refuted
 
-    def around(design: Design, number: int) -> Search:
-        fits = FittedSets(design, first.fits.decisions, first.fits.regression.error_scale)
-        return Search(fits, [one.around(fits.regression) for one in first.patterns], refuted,
-                      _share_of(report, 0.6 + 0.4 * number / MOST_SEARCHES, 0.4 / MOST_SEARCHES))
+    found: CandidateSet
+    point: OperatingPoint | None
+    effects: tuple[PlacedEffect, ...]
+    cost: float
 
+    @classmethod
+    def of(cls, fits: FittedSets, found: CandidateSet) -> ExactSet:
+        """Return a set of some fits around its own model."""
+        last, moved = fits, found
+        try:
+            for _ in range(MOST_STEPS):
+                last, moved = linearised(last, moved, alone=True)
+                before, moved = moved, on_best_drives(last, moved)
+                if moved is before:
+                    break
+            one = settled(last, moved)
+            # Widths that are not settled are columns yet, and not the model's.
+            model = fitted_model(last, moved) if one.fits is last else one.model
+            exact = exact_forces(one.fits.design, model)
+        except PprsError:
+            return cls(found, fits.design.point, parts_of(fits, found)[1], np.inf)
+        return cls(moved, last.design.point, parts_of(last, moved)[1],
+                   one.found.cost + squared(one.fits, one.found,
+                                            exact - linear_prediction(one.fits, one.found)))
+
+
+def search_around_fitted(first: Search, report: Callable[[float], None],
+                         ) -> tuple[Search, CandidateSet, Mapping[Claims, float]]:
+    """Return the search around the best set's own model, that set, and costs by exact forces.
+
+    Gauss-Newton over sets: what is cheapest around the point of a search is relinearised, each set
+    by itself; the next search is around the one that costs least so, until none costs less. Only
+    exact costs, which do not depend on where a search was, decide between sets.
+    """
+    search, exact, at = first, dict[Claims, ExactSet](), None
+    search.run(until_bent=True)
     for number in range(MOST_SEARCHES):
-        kept, _ = beyond_lack_of_fit(search.fits, best)
-        if search.is_beyond_point:
-            kept = first_step(search, best)
-        try:
-            last, moved = linearised(search.fits, kept)
-        except PprsError:
-            break  # values that no model may have: the linear form is all there is
-        if last is search.fits or (not search.is_beyond_point
-                                   and abs(moved.cost - kept.cost) < LEAST_CHANGE):
+        for one in _shortlist(search.fits, first.fits.decisions.rival_margin):
+            known = exact.get(one.claims)
+            if known is None or one.cost < known.cost - LEAST_CHANGE:
+                new = ExactSet.of(search.fits if one.is_bent else first.fits, one)
+                exact[one.claims] = new if known is None else min(known, new, key=_cost)
+        best = min(exact.values(), key=_cost)
+        if best is at or _is_where(search, best):
             break
-        starts = [one.candidates for one in dict.fromkeys((kept, best))]
+        at, point = best, best.point
         search.release()
-        design, before, accepted = last.design, search.fits.design.point, best.candidates
-        reached = moved.total
-        del search, last, moved, kept, best  # a search of minutes holds hundreds of megabytes
-        search = around(design, number)
-        best = search.run(*starts)
-        if _is_far(search.fits, best) and not _holds_around_itself(search.fits, best, reached):
-            if before is None:
-                return first, at_first
-            search = around(first.fits.design.around(before), number)  # the one before, again
-            return search, search.run(accepted)
-        refuted |= _bent_in_vain(search, best)
-        placed = frozenset((one.name, one.drives) for one in best.candidates)
-        if best.total > rival or abs(costs.get(placed, np.inf) - best.cost) < LEAST_CHANGE:
-            break  # found before: what follows would be what followed then
-        costs[placed] = best.cost
-    return search, best
+        if point is None:
+            search = first
+        else:
+            fits = FittedSets(first.fits.design.around(point), first.fits.decisions,
+                              first.fits.regression.error_scale)
+            search = Search(fits, [one.around(fits.regression) for one in first.patterns],
+                            first.refuted, _share_of(report, 0.6 + 0.4 * number / MOST_SEARCHES,
+                                                     0.4 / MOST_SEARCHES))
+        search.run(best.found.candidates)
+    return (search, search.fits.evaluate(best.found.candidates),
+            {claims: one.cost for claims, one in exact.items()})
 
 
-def _exact_total(fits: FittedSets, best: CandidateSet) -> float:
-    """Return the cost, by its exact forces, of what will be adopted of a set."""
-    kept, _ = beyond_lack_of_fit(fits, best)
-    try:
-        return _by_exact_forces(fits, kept, fitted_model(fits, kept))
-    except PprsError:
-        return np.inf
+def _cost(one: CandidateSet | ExactSet) -> float:
+    return one.cost
 
 
-def _bent_in_vain(search: Search, best: CandidateSet) -> set[Place]:
-    """Return the effects that bent the columns of a search, if its best set bends none.
+def _shortlist(fits: FittedSets, margin: float) -> list[CandidateSet]:
+    """Return the cheapest set of each claim that may be the best once costs are exact.
 
-    Where others still do, the columns change with them, and what was dropped may yet pay.
+    Within a margin; where the columns are not bent by the best set, of those that bend them any:
+    tilts, wrenches and offsets of a payload look nearly alike there.
     """
-    point = search.fits.design.point
-    if point is None or any(map(bends, best.candidates)):
-        return set()
-    return {(one.effect, one.drive) for one in point.effects if one.effect.bends_columns}
+    best, near = fits.best, dict[Claims, CandidateSet]()
+    is_beyond = not _is_bent_by(fits.design.point, parts_of(fits, best)[1])
+    for one in sorted(fits.sets, key=_cost):
+        if one.cost <= best.cost + margin or (
+                is_beyond and one.is_bent and one.is_admissible):
+            near.setdefault(one.claims, one)
+    return list(near.values())[:SHORTLIST]
 
 
-def _bending_alone(search: Search, best: CandidateSet) -> CandidateSet:
-    """Return the effects of a set that bend the columns, at its noise.
-
-    What was found beside them may only make good that columns were not bent.
-    """
-    best = _rebent(search.fits, best)
-    alone = search.rescanned(search.fits.evaluate(tuple(filter(bends, best.candidates))))
-    return search.fits.at_noise_of(best, alone.candidates)
-
-
-def _rebent(fits: FittedSets, best: CandidateSet) -> CandidateSet:
-    """Return a set with that effect on the structure which costs least around its own model.
-
-    Tilts, wrenches and offsets of a payload look nearly alike where columns are not bent by them.
-    """
-    own = [one for one in best.effects if _bends_structure(one)]
-    if len(own) != 1:
-        return best
-    rivals: dict[str, CandidateSet] = {}
-    for one in sorted(fits.sets, key=lambda one: one.cost):
-        if len(one.effects) == len(one.candidates) == 1 and _bends_structure(one.effects[0]):
-            rivals.setdefault(one.effects[0].name, one)
-    rivals.pop(own[0].name, None)
-
-    def around_itself(found: CandidateSet) -> float:
-        try:
-            return linearised(fits, found)[1].total
-        except PprsError:
-            return np.inf
-    rest = best.without(*own)
-    others = [fits.evaluate((*rest, *one.candidates)) for one in rivals.values()]
-    return min((best, *others), key=around_itself) if others else best
-
-
-def _bends_structure(candidate: EffectCandidate) -> bool:
-    return bends(candidate) and candidate.drives is None
-
-
-def _as_it_is(search: Search, best: CandidateSet) -> CandidateSet:
-    """Return the whole set: without what else is strong, effects that bend are fitted wrong."""
-    return best
-
-
-def _is_far(fits: FittedSets, best: CandidateSet) -> bool:
-    """Return whether exact forces leave a drive much more than what will be adopted promises."""
-    kept, _ = beyond_lack_of_fit(fits, best)
-    try:
-        forces = exact_forces(fits.design, fitted_model(fits, kept))
-    except PprsError:
-        return True  # values that no model may have
-    left, promised = (_rms_by_drive(fits, error) for error in (
-        fits.regression.residuals.measured - forces, linear_residual(fits, kept)))
-    return bool(np.any(left > fits.decisions.left_ratio * promised))
-
-
-def _holds_around_itself(fits: FittedSets, best: CandidateSet, cost: float) -> bool:
-    """Return whether a set costs less, and holds, where columns are computed around it."""
-    kept, _ = beyond_lack_of_fit(fits, best)
-    try:
-        last, moved = linearised(fits, kept)
-    except PprsError:
-        return False
-    return moved.total < cost and not _is_far(last, moved)
-
-
-def _rms_by_drive(fits: FittedSets, error: Array) -> Array:
-    return np.array([root_mean_square(error[:, d]) for d in fits.regression.drives])
-
-
-def _stands_out(fits: FittedSets, best: CandidateSet) -> bool:
-    """Return whether what will be adopted leaves a drive much more than its fit does.
-
-    The fit has columns for what forms leave open, which a model has not.
-    """
-    kept, _ = beyond_lack_of_fit(fits, best)
-    if kept is best:
-        return False
-    left = _rms_by_drive(fits, linear_residual(fits, kept))
-    return bool(np.any(left > fits.decisions.left_ratio * fits.regression.left(kept.fit)))
+def _is_where(search: Search, best: ExactSet) -> bool:
+    """Return whether a search was to its end around the model of a set, as nearly as matters."""
+    there = search.fits.evaluate(best.found.candidates)
+    return search.is_ended and abs(there.total - best.found.total) < LEAST_CHANGE and _is_bent_by(
+        search.fits.design.point, best.effects)
 
 
 def _share_of(report: Callable[[float], None], start: float, width: float,
@@ -335,6 +267,12 @@ def settled(fits: FittedSets, found: CandidateSet) -> SettledSet:
     ModelError
         For values that no model may have.
     """
+    if found.key not in fits.settled:
+        fits.settled[found.key] = _settled(fits, found)
+    return fits.settled[found.key]  # type: ignore[return-value]
+
+
+def _settled(fits: FittedSets, found: CandidateSet) -> SettledSet:
     before = SettledSet(fits, found, estimate_widths(fits, found))
     if not (before.widths and found.effects):
         return before
@@ -348,32 +286,3 @@ def settled(fits: FittedSets, found: CandidateSet) -> SettledSet:
         left = fits.regression.residuals.measured - exact_forces(fits.design, one.model)
         return one.found.total + squared(fits, found, left)
     return min(before, after, key=loss)
-
-
-def exact_cost(fits: FittedSets, found: CandidateSet) -> float:
-    """Return what a set costs around its own fitted model, by that model's exact forces.
-
-    J_exact = J + |exact - linear|^2, whitened. However a set was come by, it costs the same;
-    infinite where its values are those of no model.
-    """
-    try:
-        fits, found = linearised(fits, found, alone=True)
-        one = settled(fits, found)
-        # Widths that are not settled are columns yet, and not the model's.
-        model = fitted_model(fits, found) if one.fits is fits else one.model
-        return (_by_exact_forces(one.fits, one.found, model) if one.found.is_admissible
-                else np.inf)
-    except PprsError:
-        return np.inf
-
-
-def _by_exact_forces(fits: FittedSets, found: CandidateSet, model: ForceModel) -> float:
-    """Return J + |exact - linear|^2 of a set, whitened, with the exact forces of its model.
-
-    Raises
-    ------
-    PprsError
-        Where the model cannot follow the recordings.
-    """
-    return found.total + squared(
-        fits, found, exact_forces(fits.design, model) - linear_prediction(fits, found))

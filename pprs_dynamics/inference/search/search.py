@@ -11,20 +11,19 @@ noise decides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
 from pprs_dynamics.inference.search.candidates import (
-    Candidate,
     CandidateSet,
-    Component,
     EffectCandidate,
     UnknownCandidate,
 )
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
+from pprs_dynamics.inference.search.neighbours import exchanged, simplified, with_instead
 from pprs_dynamics.inference.search.scan import Place, Scan, with_fast_noise
 from pprs_dynamics.inference.search.unknown import PatternLibrary, Shared, best_patterns
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -59,38 +58,35 @@ class Search:
                  progress: Callable[[float], None] | None = None) -> None:
         self.fits, self.patterns = fits, tuple(patterns)
         self.refuted, self.scan = refuted, Scan(fits, refuted)
-        self._report, self._steps = progress or (lambda share: None), 0
+        self._report, self._steps, self.is_ended = progress or (lambda share: None), 0, False
 
     @property
     def best(self) -> CandidateSet:
         """The set of lowest cost so far."""
         return self.fits.best
 
-    def run(self, *starts: Candidates) -> CandidateSet:
-        """Return the best set that the search reaches from all starts, by effects alone at first.
+    def run(self, start: Candidates = (), until_bent: bool = False) -> CandidateSet:
+        """Return the best set that the search reaches, by effects alone at first.
 
-        A pattern of no catalogue stands only beside what effects explain. Where an effect joins
-        that bends the columns, the search ends: what would come next might only make good that
-        they are not bent.
+        A pattern of no catalogue stands only beside what effects explain. `until_bent`: where an
+        effect joins that bends the columns the search ends before its end, since what would come
+        next might only make good that they are not bent.
         """
-        self.fits.stepped = self._stepped
+        self.fits.stepped, self.is_ended = self._stepped, False
         try:
-            return self._found(starts)
+            self.fits.evaluate(())
+            if start:
+                self.rescanned(self.fits.evaluate(start))
+            self._descend(False, until_bent)
+            if not until_bent or not self.best.is_bent:
+                if self.patterns:
+                    self._descend(True, False)
+                self.is_ended = True
+            return self.best
         finally:
             # The fits hold hundreds of megabytes, and are let go of where nothing names them.
             self.fits.stepped = lambda: None
             self._report(1.0)
-
-    def _found(self, starts: Sequence[Candidates]) -> CandidateSet:
-        self.fits.evaluate(())
-        for number, start in enumerate(starts):
-            improve = self.fits.refined if number else self.rescanned
-            improve(self.fits.evaluate(start))
-        if len(starts) != 1:
-            self._descend(False)
-        if self.patterns and not self.is_beyond_point:
-            self._descend(True)
-        return self.best
 
     def release(self) -> None:
         """Let go of what only further scans and fits would need."""
@@ -98,42 +94,29 @@ class Search:
         for patterns in self.patterns:
             patterns.release()
 
-    @property
-    def is_beyond_point(self) -> bool:
-        """Whether the best set has an effect that bends columns, and these are not bent by it."""
-        point = self.fits.design.point
-        known = {(one.effect, one.drive) for one in point.effects} if point else set()
-        return any(one.effect.bends_columns and (one.effect, one.drive) not in known
-                   for one in self.best.blocks)
-
     def _stepped(self) -> None:
         """Report progress: how much is to be done nobody knows, but it never stands still."""
         self._steps += 1
         self._report(self._steps / (self._steps + USUAL_STEPS))
 
-    def _descend(self, with_patterns: bool) -> None:
+    def _descend(self, with_patterns: bool, until_bent: bool) -> None:
         """Move from the best set to better neighbours until there is none."""
         while True:
             before = self.best.cost
-            self._try(self._additions(with_patterns))
+            self._fit(self._additions(with_patterns))
             if self.best.cost > before - LEAST_IMPROVEMENT:
-                self._try(self._replacements(self.best))
-            self._simplify(self.best)
-            if self.best.cost > before - LEAST_IMPROVEMENT or self.is_beyond_point:
+                self._fit(self._replacements(self.best))
+            simplified(self.fits, self.best)
+            if self.best.cost > before - LEAST_IMPROVEMENT or (until_bent and self.best.is_bent):
                 return
 
     # Moves
 
-    def _try(self, sets: Iterable[Candidates]) -> None:
-        """Fit sets, and refine the shapes of the best few."""
-        new = []
-        for candidates in sets:
-            if not self.fits.has(candidates) and self._is_bounded(candidates):
-                new.append(self.fits.evaluate(candidates))
-        # No noise takes a constant: what lacks nothing else is judged once it has it.
-        for found in [one for one in new if self._all_but_constants(one) < self.best.cost]:
-            new += [self.fits.evaluate(more) for more in self.scan.proposals(found, 1)
-                    if self._is_bounded(more)]
+    def _fit(self, sets: Iterable[Candidates]) -> None:
+        """Fit sets, and bring those that may be the best to where they cost least."""
+        new = [self.fits.evaluate(one) for one in sets
+               if not self.fits.has(one) and self._is_bounded(one)]
+        new += self._with_constants(new)
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
         shaped = [found for found in new if any(one.effect.shape or one.centre
                                                 for one in found.blocks)]
@@ -142,8 +125,18 @@ class Search:
             if number < REFINED or len(found.candidates) == 1:
                 self.fits.refined(found)
         # A scan puts it where each drive pays by itself: beside others that is seldom right.
-        for found in [one for one in new if len(one.candidates) == len(one.effects) == 1]:
-            self._simplify(found)
+        for found in new:
+            if len(found.candidates) == len(found.effects) == 1:
+                simplified(self.fits, found)
+
+    def _with_constants(self, sets: Iterable[CandidateSet]) -> list[CandidateSet]:
+        """Return sets with one effect more, where they would be the best but for constants.
+
+        No noise takes a constant: what lacks nothing else is judged once it has it.
+        """
+        near = [one for one in sets if self._all_but_constants(one) < self.best.cost]
+        return [self.fits.evaluate(more) for found in near
+                for more in self.scan.proposals(found, 1) if self._is_bounded(more)]
 
     def _all_but_constants(self, found: CandidateSet) -> float:
         """Return the cost of a set if its drives' constants were what their noise expects."""
@@ -222,49 +215,50 @@ class Search:
         for component in candidate.components:
             for names in candidate.effect.variants:
                 if names != component.names:
-                    yield self._with(candidate, component,
-                                     self.fits.library.variant(component, names))
+                    yield with_instead(candidate, component,
+                                       self.fits.library.variant(component, names))
 
     def replaced(self, found: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
                  ) -> CandidateSet:
         """Return the best of a set and those in which something else stands for one or two."""
         before = len(self.fits.sets)
-        self._try(self._replacements(found))
+        self._fit(self._replacements(found))
         better = [one for one in self.fits.sets[before:]
                   if one.cost < found.total - LEAST_IMPROVEMENT]
         return next((one for one in sorted(better, key=lambda one: one.cost) if is_allowed(one)),
                     found)
 
-    def _replacements(self, best: CandidateSet) -> Iterable[Candidates]:
-        """Yield sets in which something else stands for one or two candidates, or for a drive's.
+    def _replacements(self, best: CandidateSet) -> Iterator[Candidates]:
+        """Yield sets in which something else stands for candidates, or for one on a drive.
 
         Under the noise of the set, so that a replacement that explains as much is seen to.
         """
-        rests: list[tuple[Candidates, int | None]] = []
-        for size in (1, 2):
-            for gone in combinations(best.candidates, size):
-                if size == 1 or any(isinstance(c, EffectCandidate) for c in gone):
-                    rests.append((best.without(*gone), None))
+        for candidate in best.candidates:
+            # Whatever stands for one effect as well is a rival: all of them are fitted.
+            yield from self._instead(best, best.without(candidate), None)
+        for pair in combinations(best.candidates, 2):
+            if any(isinstance(one, EffectCandidate) for one in pair):
+                yield from self._instead(best, best.without(*pair), REPLACEMENTS)
         for candidate in best.effects:
             for component in candidate.components if len(candidate.components) > 1 else ():
                 # On one of its drives it, or some of its coefficients, may stand for another.
-                fewer = [self.fits.library.variant(component, names)
+                fewer = [(self.fits.library.variant(component, names),)
                          for names in candidate.effect.variants
                          if set(names) < set(component.names)]
-                for kept in ([], *([one] for one in fewer)):
-                    less = self._with(candidate, component, *kept)
-                    rests.append((self._exchanged(best, candidate, less), component.drive))
-        for rest, drive in rests:
-            base = self.fits.at_noise_of(best, rest)
-            least = RECOVERED * (base.total - best.total) - REPLACED
-            # Whatever stands for one effect as well is a rival: all of them are fitted.
-            one_gone = drive is None and len(rest) == len(best.candidates) - 1
-            yield from self.scan.proposals(base, None if one_gone else REPLACEMENTS, drive, least)
-        for candidate in best.effects:
+                for kept in ((), *fewer):
+                    rest = exchanged(best, candidate, with_instead(candidate, component, *kept))
+                    yield from self._instead(best, rest, REPLACEMENTS, component.drive)
             for other in self._alternatives(candidate):
-                yield self._exchanged(best, candidate, other)
+                yield exchanged(best, candidate, other)
             if len(candidate.hypotheses) > 1:
                 yield from self._two_for(best, candidate)
+
+    def _instead(self, best: CandidateSet, rest: Candidates, count: int | None,
+                 drive: int | None = None) -> list[Candidates]:
+        """Return a part of a set with an effect that makes good most of what it lacks."""
+        base = self.fits.at_noise_of(best, rest)
+        return self.scan.proposals(base, count, drive,
+                                   RECOVERED * (base.total - best.total) - REPLACED)
 
     def _two_for(self, best: CandidateSet, gone: EffectCandidate) -> Iterable[Candidates]:
         """Yield sets in which two other effects stand for one that claims more than one thing."""
@@ -285,51 +279,6 @@ class Search:
             yield EffectCandidate.of(
                 replace(one, shape=tuple(sorted(others[number].items())))
                 for one, others in zip(candidate.components, shapes, strict=True))
-
-    def _simplify(self, found: CandidateSet) -> None:
-        """Drop candidates and drives, and try variants, as long as that lowers the cost."""
-        while True:
-            simpler = min(map(self.fits.evaluate, self._simpler(found)),
-                          key=lambda one: one.cost, default=found)
-            if not simpler.cost < found.cost - LEAST_IMPROVEMENT:  # both may be inadmissible: inf
-                return
-            found = self.fits.refined(simpler)
-
-    def _simpler(self, best: CandidateSet) -> Iterable[Candidates]:
-        for candidate in best.candidates:
-            if len(best.candidates) > 1:
-                yield best.without(candidate)
-            if not isinstance(candidate, EffectCandidate):
-                continue
-            effect = candidate.effect
-            # The drives where it matters most; fewer of them may be better though one less is not.
-            strength = {one: self.fits.drop_cost(best, one) for one in candidate.components}
-            ranked = sorted(candidate.components, key=lambda one: -strength[one])
-            most = 3 * self.fits.decisions.rival_margin
-            for count in range(1, len(ranked)):
-                if sum(strength[one] for one in ranked[count:]) < most:
-                    yield self._exchanged(best, candidate,
-                                          EffectCandidate.of(ranked[:count]))
-            if len({one.names for one in candidate.components}) > 1:
-                for names in effect.variants:
-                    yield self._exchanged(best, candidate, EffectCandidate.of(
-                        self.fits.library.variant(one, names) for one in candidate.components))
-            for component in candidate.components:
-                for names in effect.variants:
-                    # The others take part in every scan.
-                    if names != component.names and not set(names) <= set(effect.scanned):
-                        yield self._exchanged(best, candidate, self._with(
-                            candidate, component, self.fits.library.variant(component, names)))
-
-    @staticmethod
-    def _with(candidate: EffectCandidate, gone: Component, *instead: Component) -> EffectCandidate:
-        """Return the candidate with something else, or nothing, for one of its components."""
-        return EffectCandidate.of([*(one for one in candidate.components if one is not gone),
-                                   *instead])
-
-    @staticmethod
-    def _exchanged(found: CandidateSet, old: Candidate, new: Candidate) -> Candidates:
-        return tuple(new if c is old else c for c in found.candidates)
 
 
 def patterns_of(fits: FittedSets) -> list[PatternLibrary]:

@@ -22,6 +22,11 @@ from pprs_dynamics.measurement.files.bag_storage import (
     opened_bag,
     require_rosbags,
 )
+from pprs_dynamics.measurement.files.channel_topics import (
+    channel_of,
+    read_channels,
+    write_channels,
+)
 from pprs_dynamics.measurement.files.joint_state_cdr import (
     JOINT_STATE,
     JointStateBlocks,
@@ -72,34 +77,43 @@ def read_bag(
     """
     drives = recorded.joints or recorded.names
     with opened_bag(path) as (bag, findings):
-        fields = fields_of(bag, recorded)
-        if fields:
-            return _of_fields(bag, drives, fields, topic, findings)
-        connections = _chosen(bag, topic)
-        name = connections[0].topic
-        if connections[0].msgtype != JOINT_STATE:
+        samples = _read(bag, recorded, drives, topic, progress, findings)
+        stamps = samples.epoch * 10**9 + np.rint(samples.time * 1e9).astype(np.int64)
+        return replace(samples, channels={**read_channels(bag, drives, stamps),
+                                          **samples.channels})
+
+
+def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: str | None,
+          progress: Progress | None, findings: list[Defect]) -> Samples:
+    """Return motion and efforts."""
+    fields = fields_of(bag, recorded)
+    if fields:
+        return _of_fields(bag, drives, fields, topic, findings)
+    connections = _chosen(bag, topic)
+    name = connections[0].topic
+    if connections[0].msgtype != JOINT_STATE:
+        return _merged(bag, connections, drives, findings)
+    blocks = JointStateBlocks(drives)
+    total = sum(connection.msgcount for connection in connections)
+    messages, done = bag.messages(connections), 0
+    while block := list(islice(messages, BLOCK)):
+        blocks.add([data for _, _, data in block], [stamp for _, stamp, _ in block])
+        done += len(block)
+        if progress is not None:
+            progress(done, max(total, done))
+    if not done:
+        raise UnreadableFileError(bag.path, f'{name} holds no messages')
+    if not blocks.samples:
+        if set(drives) <= blocks.names:  # spread over several messages
             return _merged(bag, connections, drives, findings)
-        blocks = JointStateBlocks(drives)
-        total = sum(connection.msgcount for connection in connections)
-        messages, done = bag.messages(connections), 0
-        while block := list(islice(messages, BLOCK)):
-            blocks.add([data for _, _, data in block], [stamp for _, stamp, _ in block])
-            done += len(block)
-            if progress is not None:
-                progress(done, max(total, done))
-        if not done:
-            raise UnreadableFileError(path, f'{name} holds no messages')
-        if not blocks.samples:
-            if set(drives) <= blocks.names:  # spread over several messages
-                return _merged(bag, connections, drives, findings)
-            _tell_missing(path, name, drives, blocks)
-        stamps, received, position, velocity, effort = blocks.arrays()
-        others = [one for one in bag.connections
-                  if one.msgtype == JOINT_STATE and one.topic != name]
-        if topic is None and others and np.all(np.isnan(effort)):
-            merged = _merged(bag, [*connections, *others], drives, findings)
-            if np.any(np.isfinite(merged.effort)):
-                return merged
+        _tell_missing(bag.path, name, drives, blocks)
+    stamps, received, position, velocity, effort = blocks.arrays()
+    others = [one for one in bag.connections if one.msgtype == JOINT_STATE
+              and one.topic != name and channel_of(one.topic, one.msgtype) is None]
+    if topic is None and others and np.all(np.isnan(effort)):
+        merged = _merged(bag, [*connections, *others], drives, findings)
+        if np.any(np.isfinite(merged.effort)):
+            return merged
     if not np.any(stamps):
         findings.append(Defect(
             'receive_times', len(stamps), 'the stamps in all message headers are 0'))
@@ -144,7 +158,8 @@ def _merged(bag: Bag, connections: list[Connection], drives: tuple[str, ...],
         raise UnreadableFileError(bag.path, f'{topics} holds no positions of all of '
                                   f'{", ".join(drives)} at the same times')
     return replace(_samples(drives, merged.stamps, merged.arrays, topics,
-                            [*findings, *merged.findings]), in_amperes=merged.in_amperes)
+                            [*findings, *merged.findings]), in_amperes=merged.in_amperes,
+                   channels=merged.channels)
 
 
 def write_bag(path: Path, topics: Mapping[str, Samples],
@@ -211,6 +226,7 @@ def _write_directory(path: Path, topics: Mapping[str, Samples], texts: Mapping[s
                                   samples.effort[part])
                 for stamp, row in zip(recorded[part].tolist(), rows, strict=True):
                     writer.write(connection, stamp, row.tobytes())
+            write_channels(writer, samples, recorded)
 
 
 def _chosen(bag: Bag, topic: str | None) -> list[Connection]:
@@ -231,7 +247,8 @@ def _chosen(bag: Bag, topic: str | None) -> list[Connection]:
                 path, f'there is no sensor_msgs/JointState on {topic}'
                 + (f', but on {", ".join(topics)}' if topics else ''))
     else:
-        matching = [name for name in topics if name.endswith(TOPIC_END)]
+        matching = [name for name in topics if name.endswith(TOPIC_END)
+                    and channel_of(name, JOINT_STATE) is None]
         # Topics that were announced and stayed silent are no choice.
         filled = {item.topic for item in states if item.msgcount}
         matching = [name for name in matching if name in filled] or matching

@@ -312,6 +312,7 @@ def write_csv(path: Path, samples: Samples) -> None:
     quantities = [(name, values) for name, values in zip(
         QUANTITIES, (samples.position, samples.velocity, samples.effort), strict=True)
         if values is not None]
+    quantities += samples.channels.items()
     header = ['time', *(f'{drive}/{name}' for name, _ in quantities for drive in samples.drives)]
     write_table(path, header, [samples.time, *(values for _, values in quantities)])
 

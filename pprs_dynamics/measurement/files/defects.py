@@ -312,7 +312,8 @@ def _taken(samples: Samples, index: Indices | Mask) -> Samples:
     return replace(
         samples, time=samples.time[index], position=samples.position[index],
         velocity=None if samples.velocity is None else samples.velocity[index],
-        effort=samples.effort[index])
+        effort=samples.effort[index],
+        channels={name: values[index] for name, values in samples.channels.items()})
 
 
 def _percent(count: int, total: int) -> str:

@@ -33,6 +33,9 @@ WORDS = {
     CURRENT: ('current', 'currents', 'cur', 'curr', 'amp', 'amps', 'ampere', 'amperes', 'i', 'iq',
               'ma'),
 }
+# The same of what may be measured beside.
+CHANNEL_WORDS = {'temperature': {'temperature', 'temperatures', 'temp', 'temps'},
+                 'pressure': {'pressure', 'pressures'}}
 PLURALS = {POSITION: 'positions', VELOCITY: 'velocities', EFFORT: 'efforts', CURRENT: 'currents'}
 # Titles with one of these tell of something else than a joint's measured motion or effort.
 OTHERS = frozenset((
@@ -221,6 +224,11 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
         if {*best} & COMMANDS:
             notes.append(f'{each}: only commands are there ({" ".join(best)})')
         columns.update({(joint, each): column for joint, column in groups[best].items()})
+    for channel, telling in CHANNEL_WORDS.items() if quantity is None else ():
+        told = [key for key in groups if {*key} & telling and not {*key} & COMMANDS]
+        if told:
+            columns.update({(joint, channel): column for joint, column in groups[max(
+                told, key=lambda key: len(groups[key]))].items()})
     return columns, notes
 
 
@@ -348,8 +356,8 @@ def _slope(rate: Array, position: Array, time: Series | None, scale: float = 1.0
 
 
 def _scale(title: str, quantity: str) -> float | None:
-    return next((SCALES[quantity][word] for word in words_of(title)
-                 if word in SCALES[quantity]), None)
+    known = SCALES.get(quantity, {})
+    return next((known[word] for word in words_of(title) if word in known), None)
 
 
 def _judge_units(

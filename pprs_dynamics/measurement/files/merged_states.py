@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import RecordedDrives
+from pprs_dynamics.drives import CHANNELS, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.bag_storage import Bag
 from pprs_dynamics.measurement.files.joint_state_cdr import JOINT_STATE
@@ -58,6 +58,8 @@ class Merged(NamedTuple):
         [ns].
     arrays : list of (N, D) arrays
         Positions, velocities and efforts, NaN where unknown.
+    channels : dict of (N, D) arrays
+        What was measured beside them.
     in_amperes : tuple of D bool
         Drives whose efforts are currents.
     findings : list of Defect
@@ -65,6 +67,7 @@ class Merged(NamedTuple):
 
     stamps: Indices
     arrays: list[Array]
+    channels: dict[str, Array]
     in_amperes: tuple[bool, ...]
     findings: list[Defect]
 
@@ -76,9 +79,11 @@ def fields_of(bag: Bag, recorded: RecordedDrives) -> list[Field]:
     """
     topics = sorted({one.topic for one in bag.connections}, key=len, reverse=True)
     columns = recorded.columns.drives if recorded.columns is not None else {}
+    shared = recorded.columns.channels if recorded.columns is not None else {}
     found = []
     for joint, drive in zip(recorded.joints or recorded.names, recorded.names, strict=True):
-        for quantity, column in columns[drive].names.items() if drive in columns else ():
+        own = columns[drive].names if drive in columns else {}
+        for quantity, column in {**shared, **own}.items():
             name = str(column)
             if not name.startswith('/'):
                 continue
@@ -127,7 +132,7 @@ def read_merged(bag: Bag, connections: list[Connection], drives: tuple[str, ...]
             message = typestore.deserialize_cdr(data, connection.msgtype)
         except Exception:  # bytes that are no such message
             continue
-        stamp = _stamp(message) or received
+        stamp = stamp_of(message) or received
         states = [(one.joint, one.quantity, _value(message, one.way), False)
                   for one in fields if one.topic == connection.topic]
         states += [one for one in states_of(message, connection.msgtype) if one[:2] not in named]
@@ -155,11 +160,13 @@ def read_merged(bag: Bag, connections: list[Connection], drives: tuple[str, ...]
         findings.append(Defect(
             'commanded_efforts', int(kept.sum()), 'the efforts are what the controller commands: '
             'none were measured'))
-    return Merged(stamps[kept], [one[kept] for one in arrays],
+    channels = {name: array(name)[kept] for name in CHANNELS
+                if any((drive, name) in values for drive in drives)}
+    return Merged(stamps[kept], [one[kept] for one in arrays], channels,
                   in_amperes if any(in_amperes) else (), findings)
 
 
-def _stamp(message: Any) -> int:
+def stamp_of(message: Any) -> int:
     """Return the stamp of a message's header [ns], 0 where it has none."""
     header = getattr(message, 'header', None)
     return 0 if header is None else header.stamp.sec * 10**9 + header.stamp.nanosec

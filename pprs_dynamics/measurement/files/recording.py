@@ -6,10 +6,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,7 +44,8 @@ class Recording(Samples):
     gain : (D,) array or None
         By which recorded currents were multiplied [N m/A, N/A]; NaN for drives whose efforts were
         recorded, None where all were.
-    drives, time, position, velocity, effort, epoch, source, findings, units, effort_limits
+    drives, time, position, velocity, effort, epoch, source, findings, units
+    effort_limits, channels
         As of `Samples`.
 
     Raises
@@ -61,7 +63,7 @@ class Recording(Samples):
             raise MotionError('time', f'its shape is {self.time.shape}', 'be (N,)', 'shape')
         shape = (len(self.time), len(self.drives))
         for quantity, values in (('position', self.position), ('velocity', self.velocity),
-                                 ('effort', self.effort)):
+                                 ('effort', self.effort), *self.channels.items()):
             if values is not None and values.shape != shape:
                 raise MotionError(quantity, f'its shape is {values.shape}', f'be {shape}', 'shape')
 
@@ -69,6 +71,7 @@ class Recording(Samples):
     def from_arrays(
         cls, name: str, time: ArrayLike, position: ArrayLike, velocity: ArrayLike | None = None,
         effort: ArrayLike | None = None, drives: tuple[str, ...] = DRIVES,
+        channels: Mapping[str, ArrayLike] = MappingProxyType({}),
     ) -> Recording:
         """Judge arrays as a file's content would be.
 
@@ -80,6 +83,8 @@ class Recording(Samples):
         position, velocity, effort : (N, D) arrays
             Copied; the last two may be absent, and what is missing may be NaN, None or NA.
         drives : tuple of D str
+        channels : mapping of str to (N, D) array
+            Of `CHANNELS`, by name.
 
         Raises
         ------
@@ -90,12 +95,14 @@ class Recording(Samples):
         given = {'time': time, 'position': position, 'velocity': velocity, 'effort': effort}
         numbers = {quantity: _numbers(quantity, values) for quantity, values in given.items()
                    if values is not None}
+        beside = {name: _numbers(name, values) for name, values in channels.items()}
         time, position = numbers['time'], numbers['position']
         efforts = numbers.get('effort', np.full(position.shape, np.nan))
         velocities = numbers.get('velocity')
         # Checks the shapes before anything computes with them.
-        cls(drives, time, position, velocities, efforts, name=name)
-        recording = _judged(name, Samples(drives, time, position, velocities, efforts))
+        cls(drives, time, position, velocities, efforts, name=name, channels=beside)
+        recording = _judged(name, Samples(drives, time, position, velocities, efforts,
+                                          channels=beside))
         if not len(recording.time):
             raise MotionError('position', 'no sample is finite', 'be finite', 'finite')
         return recording
@@ -113,12 +120,15 @@ class DriveSummary:
         As recorded [m/s].
     measured : float
         Share of the samples with an effort, 0 to 1.
+    channels : mapping of str to (lowest, highest)
+        Of further quantities that were measured, by name.
     """
 
     position: tuple[float, float]
     velocity: tuple[float, float] | None
     effort: tuple[float, float] | None
     measured: float
+    channels: Mapping[str, tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -284,7 +294,9 @@ def describe(recording: Recording) -> Summary:
         assert position is not None
         ranges[drive] = DriveSummary(
             position, None if recording.velocity is None else _range(recording.velocity[:, k]),
-            _range(effort), float(np.mean(np.isfinite(effort))))
+            _range(effort), float(np.mean(np.isfinite(effort))),
+            {name: covered for name, values in recording.channels.items()
+             if (covered := _range(values[:, k])) is not None})
     return Summary(
         recording.name, recording.source, len(time), sum(part.samples for part in segments),
         recording.epoch, float(time.min()), float(time.max()),

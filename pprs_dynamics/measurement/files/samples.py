@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DriveUnits
+from pprs_dynamics.drives import CHANNELS, DriveUnits
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -137,6 +137,9 @@ class Samples:
         () where all drives push.
     effort_limits : tuple of D float
         Largest absolute efforts that the drives can apply; () where they are not known.
+    channels : mapping of str to (N, D) array
+        Of `CHANNELS` those that the file has, NaN where they were not measured: a thermometer is
+        slower than an encoder, and not in every drive.
     """
 
     drives: tuple[str, ...]
@@ -150,6 +153,7 @@ class Samples:
     in_amperes: tuple[bool, ...] = ()
     units: tuple[DriveUnits, ...] = ()
     effort_limits: tuple[float, ...] = ()
+    channels: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
     def of_columns(
@@ -164,7 +168,7 @@ class Samples:
         time : (N,) array
             Stamps [s].
         columns : dict of (N,) arrays
-            By drive and quantity: one of `QUANTITIES`, or `CURRENT`.
+            By drive and quantity: one of `QUANTITIES` or `CHANNELS`, or `CURRENT`.
         source, findings, epoch
             As of the class; `time` counts from the last.
         """
@@ -178,7 +182,8 @@ class Samples:
         return cls(drives, time - whole, of('position'),
                    None if np.all(np.isnan(velocity)) else velocity,
                    np.where(in_amperes, of(CURRENT), of('effort')), epoch + whole, source, findings,
-                   in_amperes)
+                   in_amperes, channels={name: of(name) for name in CHANNELS if any(
+                       np.isfinite(columns.get((drive, name), none)).any() for drive in drives)})
 
     def unit_of(self, drive: int, unit: str) -> str:
         """Return the unit of a drive's quantity; see `DriveUnits.of`."""

@@ -4,7 +4,8 @@
 """Recordings in tables: CSV, Parquet, MAT and NumPy files, LeRobot datasets.
 
 A table holds `time`, `<drive>/position`, and optionally `<drive>/velocity`, `<drive>/effort`, or in
-its place `<drive>/current` [A]; or what a model file's `columns` say.
+its place `<drive>/current` [A], `<drive>/temperature` or one `temperature` of all drives, and the
+same of `pressure`; or what a model file's `columns` say.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import Column, DriveColumns, RecordedColumns, RecordedDrives
+from pprs_dynamics.drives import CHANNELS, Column, DriveColumns, RecordedColumns, RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError, meant
 from pprs_dynamics.measurement.files.array_files import ArrayTable, open_arrays
 from pprs_dynamics.measurement.files.csv_files import CsvTable
@@ -98,7 +99,7 @@ def _of_one(path: Path, drives: RecordedDrives, columns: RecordedColumns, topic:
     table = _opened(path, columns)
     time = _time_column(table, columns)
     chosen, prefix = _chosen(table, drives, columns, topic)
-    wanted = [*chosen.values()] if time is None else [time, *chosen.values()]
+    wanted = list(dict.fromkeys([*([] if time is None else [time]), *chosen.values()]))
     arrays = _read(table, wanted, time, progress)
     seconds, epoch, told = _seconds(None if time is None else arrays[time], columns,
                                     len(arrays[wanted[-1]]))
@@ -108,7 +109,8 @@ def _of_one(path: Path, drives: RecordedDrives, columns: RecordedColumns, topic:
 
 
 def _opened(path: Path, columns: RecordedColumns) -> Table:
-    named = [one for of in columns.drives.values() for one in of.names.values()]
+    named = [*columns.channels.values(),
+             *(one for of in columns.drives.values() for one in of.names.values())]
     return open_table(path, columns.decimal,
                       [one for one in (columns.time, *named) if isinstance(one, str)])
 
@@ -149,15 +151,16 @@ def _chosen(table: Table, drives: RecordedDrives, columns: RecordedColumns, topi
     joints = drives.joints or drives.names
     named = {(joint, quantity): column for joint, drive in zip(joints, drives.names, strict=True)
              for quantity, column in columns.drives.get(drive, DriveColumns({})).names.items()}
-    _require(table, list(named.values()))
+    shared = _shared(table, joints, columns)
+    _require(table, [*named.values(), *shared.values()])
     ours = tuple(joint for joint in joints if (joint, 'position') not in named)
     if not ours:
-        return named, ''
+        return {**shared, **named}, ''
     found: dict[str, dict[tuple[str, str], Column]] = {}
     for name in table.names:
         joint, slash, quantity = name.rpartition('/')
         prefix, _, drive = joint.rpartition('/')
-        if slash and quantity in (*QUANTITIES, CURRENT):
+        if slash and quantity in (*QUANTITIES, CURRENT, *CHANNELS):
             of_prefix = found.setdefault(prefix, {})
             if (drive, quantity) in of_prefix:
                 raise UnreadableFileError(table.path, f'the column {name!r} stands twice')
@@ -170,7 +173,15 @@ def _chosen(table: Table, drives: RecordedDrives, columns: RecordedColumns, topi
     for joint in ours:
         if (joint, 'effort') in chosen:
             chosen.pop((joint, CURRENT), None)
-    return {**chosen, **named}, prefix
+    return {**shared, **chosen, **named}, prefix
+
+
+def _shared(table: Table, joints: tuple[str, ...], columns: RecordedColumns,
+            ) -> dict[tuple[str, str], Column]:
+    """Return the columns of what is measured once for all drives, for each of them."""
+    found = {name: columns.channels.get(name, name) for name in CHANNELS
+             if name in columns.channels or name in table.names}
+    return {(joint, name): column for joint in joints for name, column in found.items()}
 
 
 def _require(table: Table, wanted: Sequence[Column]) -> None:

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
-from typing import Any, ClassVar, Self
+from math import inf
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -16,12 +17,34 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.description import body_at
-from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+from pprs_dynamics.physics.mechanism.places import BodyPlace
 
 AXES, MOMENTS, PRODUCTS = ('x', 'y', 'z'), ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
-Place = tuple[str, str, tuple[float, float, float], float]
 OF_MOMENTS = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])  # places of MOMENTS and PRODUCTS
 KEPT = 0.05  # of a body that cannot be taken off it
+LARGEST = 1e3  # [kg]
+
+
+class Place(NamedTuple):
+    """Where a body may be: what names of its parameters begin with, and the rest of a `BodyPlace`.
+
+    Parameters
+    ----------
+    prefix : str
+    link, centre, mass, is_spread
+        See `BodyPlace`.
+    """
+
+    prefix: str
+    link: str
+    centre: tuple[float, float, float]
+    mass: float
+    is_spread: bool
+
+    @classmethod
+    def of(cls, place: BodyPlace, prefix: str = '') -> Place:
+        """Return a place in a robot."""
+        return cls(prefix, *place)
 
 
 def body_parameters(prefix: str, link: str, centre: tuple[float, ...], mass: float,
@@ -29,7 +52,7 @@ def body_parameters(prefix: str, link: str, centre: tuple[float, ...], mass: flo
     """Return the parameters of a body on a link of some mass; `prefix` is before their names."""
     return (
         Parameter(f'{prefix}mass', 'm_+', 'kg', f'mass more on {link}',
-                  -(1 - KEPT) * mass, 1e3,
+                  max(-(1 - KEPT) * mass, -LARGEST), LARGEST,
                   0.0 if prefix else None, scale=0.1),
         *(Parameter(f'{prefix}{axis}', f'c_{axis}', 'm', f'its centre along {axis} of {link}',
                     -1e2, 1e2, at, scale=0.05) for axis, at in zip(AXES, centre, strict=True)),
@@ -48,7 +71,8 @@ def body_coefficients(prefix: str, link: str, moved: float) -> tuple[Parameter, 
     moments = (Parameter(f'{prefix}moment_{axis}', f'm c_{axis}', 'kg m',
                          f'mass times its place along {axis} of {link}, from the centre',
                          -1e3, 1e3, 0.0, scale=0.05) for axis in AXES)
-    return (replace(mass, expected=(moved, moved) if moved > 0 else None), *moments, *rest[3:])
+    return (replace(mass, expected=(moved, moved) if 0 < moved < inf else None), *moments,
+            *rest[3:])
 
 
 class AddedBody(BodyEffect):
@@ -56,12 +80,13 @@ class AddedBody(BodyEffect):
 
     Class attributes
     ----------------
-    places : tuple of (prefix, link, centre, mass)
-        Of the parameters; the link; where a body is unless its parameters say otherwise; what the
-        link weighs, which nothing can take off it.
+    places : tuple of Place
+    has_extent : bool
+        Whether centres and inertias are parameters, too.
     """
 
     places: ClassVar[tuple[Place, ...]] = ()
+    has_extent: ClassVar[bool] = True
     idealised: ClassVar[bool] = False
 
     def __init__(self, values: Mapping[str, float]) -> None:
@@ -78,19 +103,23 @@ class AddedBody(BodyEffect):
         at its own centre each of them is a hypothesis of its own.
         """
         stand_ins = {name for group in alike for name in group[1:]}
-        linear = tuple(one for place in places for one in body_parameters(*place))
-        coefficients = tuple(one for prefix, link, _, _ in places
-                             for one in body_coefficients(prefix, link, moved))
+        linear: list[Parameter] = []
+        coefficients: list[Parameter] = []
         names: list[tuple[str, ...]] = []
-        for prefix, link, _, _ in places:
+        for prefix, link, centre, weight, is_spread in places:
+            count = 1 if is_spread else None
+            linear += body_parameters(prefix, link, centre, weight)[:count]
+            coefficients += body_coefficients(prefix, link, moved)[:count]
             mass, moment = f'{prefix}mass', tuple(f'{prefix}moment_{axis}' for axis in AXES)
-            names += [(mass,)] if link in stand_ins else [(mass,), (mass, *moment)]
-            if not prefix:
+            names += ([(mass,)] if link in stand_ins or is_spread else
+                      [(mass,), (mass, *moment)])
+            if not prefix and not is_spread:
                 inertia = tuple(f'{prefix}{axes}' for axes in MOMENTS)
                 names += [(mass, *moment, *inertia),
                           (mass, *moment, *inertia, *(f'{prefix}{axes}' for axes in PRODUCTS))]
         return type(cls.__name__, (cls,), {
-            'places': places, 'linear': linear, 'coefficients': coefficients,
+            'places': places, 'linear': tuple(linear), 'coefficients': tuple(coefficients),
+            'has_extent': not all(place.is_spread for place in places),
             'variants': tuple(names), 'alike': alike, '__module__': cls.__module__,
             'made_by': (cls.on, (places, alike, moved))})
 
@@ -108,7 +137,7 @@ class AddedBody(BodyEffect):
         if not cls.places:
             return super().to_coefficients(values)
         found = cls._shared(values)
-        for prefix, _, centre, _ in cls.places:
+        for prefix, _, centre, *_ in cls._bodies():
             for axis, at in zip(AXES, centre, strict=True):
                 away = values.get(f'{prefix}{axis}', at) - at
                 found[f'{prefix}moment_{axis}'] = found[f'{prefix}mass'] * away
@@ -120,7 +149,7 @@ class AddedBody(BodyEffect):
         if not cls.places:
             return super().from_coefficients(coefficients)
         found = cls._shared(coefficients)
-        for prefix, _, centre, _ in cls.places:
+        for prefix, _, centre, *_ in cls._bodies():
             mass = found[f'{prefix}mass']
             for axis, at in zip(AXES, centre, strict=True):
                 moment = coefficients.get(f'{prefix}moment_{axis}', 0.0)
@@ -130,15 +159,21 @@ class AddedBody(BodyEffect):
     @classmethod
     def _shared(cls, values: Mapping[str, float]) -> dict[str, float]:
         """Return masses and inertias, which are parameters and coefficients alike."""
-        return {name: values.get(name, 0.0) for prefix, *_ in cls.places
-                for name in (f'{prefix}{one}' for one in ('mass', *MOMENTS, *PRODUCTS))}
+        return {name: values.get(name, 0.0) for place in cls.places
+                for name in (f'{place.prefix}{one}' for one in (
+                    ('mass',) if place.is_spread else ('mass', *MOMENTS, *PRODUCTS)))}
+
+    @classmethod
+    def _bodies(cls) -> list[Place]:
+        """Return the places at which a body has a centre and an inertia of its own."""
+        return [place for place in cls.places if not place.is_spread]
 
     @classmethod
     def around(cls, rows: Mapping[int, Array], coefficients: Mapping[str, float],
                ) -> dict[int, Array]:
         """Return columns by drive, exact for the bodies of some coefficients."""
         found = dict(rows)
-        for prefix, *_ in cls.places:
+        for prefix, *_ in cls._bodies():
             if mass := coefficients.get(f'{prefix}mass', 0.0):
                 away = np.array([coefficients.get(f'{prefix}moment_{axis}', 0.0) / mass
                                  for axis in AXES])
@@ -172,9 +207,12 @@ class AddedBody(BodyEffect):
                 _turned(away, np.eye(3)[k])[OF_MOMENTS], turning, 1)
         return found
 
-    def changed(self, robot: Mechanism) -> Mechanism:
-        """Return the mechanism with the bodies."""
-        for prefix, link, centre, _ in self.places:
+    def changed(self, robot: Any) -> Any:
+        """Return the robot with the bodies."""
+        for prefix, link, centre, _, is_spread in self.places:
+            if is_spread:
+                robot = robot.heavier(link, self._linear[f'{prefix}mass'])
+                continue
             c = [self._linear[f'{prefix}{name}'] for name in (
                 'mass', *(f'moment_{axis}' for axis in AXES), *MOMENTS, *PRODUCTS)]
             if not any(c):

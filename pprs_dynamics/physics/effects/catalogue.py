@@ -14,13 +14,16 @@ from __future__ import annotations
 import inspect
 import warnings
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pprs_dynamics.physics.effects.effect import Card, CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.foreign_effects import guard
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
+from pprs_dynamics.physics.effects.laws.counterbalance import Counterbalance
+from pprs_dynamics.physics.effects.laws.coupled_drives import CoupledDrives
+from pprs_dynamics.physics.effects.laws.current_gain import CurrentGain
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
 from pprs_dynamics.physics.effects.laws.effort_filter import EffortFilter
@@ -29,24 +32,22 @@ from pprs_dynamics.physics.effects.laws.effort_offset import EffortOffset
 from pprs_dynamics.physics.effects.laws.external_wrench import ExternalWrench
 from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
 from pprs_dynamics.physics.effects.laws.friction_drift import FrictionDrift
+from pprs_dynamics.physics.effects.laws.friction_temperature import FrictionTemperature
 from pprs_dynamics.physics.effects.laws.gear_efficiency import GearEfficiency
 from pprs_dynamics.physics.effects.laws.homing_error import HomingError
 from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
 from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
+from pprs_dynamics.physics.effects.laws.joint_spring import JointSpring
 from pprs_dynamics.physics.effects.laws.link_mass import LinkMass
 from pprs_dynamics.physics.effects.laws.load_friction import LoadFriction
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.effects.laws.payload_offset import PayloadOffset
-from pprs_dynamics.physics.effects.laws.platform_drag import PlatformDrag
 from pprs_dynamics.physics.effects.laws.platform_inertia import PlatformInertia
 from pprs_dynamics.physics.effects.laws.quadratic_friction import QuadraticFriction
-from pprs_dynamics.physics.effects.laws.revolute_friction import RevoluteFriction
-from pprs_dynamics.physics.effects.laws.revolute_stiffness import RevoluteStiffness
-from pprs_dynamics.physics.effects.laws.rod_mass import RodMass
-from pprs_dynamics.physics.effects.laws.spherical_friction import SphericalFriction
 from pprs_dynamics.physics.effects.laws.stribeck_friction import StribeckFriction
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
+from pprs_dynamics.physics.effects.laws.tool_drag import ToolDrag
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 from pprs_dynamics.system.plain_text import displayed
 
@@ -64,6 +65,9 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         AsymmetricFriction,
         BaseTilt,
         CoulombFriction,
+        Counterbalance,
+        CoupledDrives,
+        CurrentGain,
         DriveInertia,
         DriveSpring,
         EffortFilter,
@@ -72,23 +76,21 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         ExternalWrench,
         ForceRipple,
         FrictionDrift,
+        FrictionTemperature,
         GearEfficiency,
         HomingError,
         Hysteresis,
         JointFrictionEffect,
+        JointSpring,
         LinkMass,
         LoadFriction,
         PayloadMass,
         PayloadOffset,
-        PlatformDrag,
         PlatformInertia,
         QuadraticFriction,
-        RevoluteFriction,
-        RevoluteStiffness,
-        RodMass,
-        SphericalFriction,
         StribeckFriction,
         TimeDelay,
+        ToolDrag,
         ViscousFriction,
     )
 }
@@ -100,6 +102,51 @@ EFFECTS: dict[str, type[CatalogueEffect]] = {**CATALOGUE, MeasuredCurve.name: Me
 REPLACED = {
     'payload_moment': 'payload_mass with the centre x, y, z: a body has no moment without a mass',
     'payload_inertia': 'payload_mass with xx ... yz: a body has no inertia without a mass'}
+
+
+class Former(NamedTuple):
+    """What an effect is today that had another name.
+
+    Parameters
+    ----------
+    effect : str
+    place : str
+        Where it is; '' for an effect that is at one place alone.
+    renamed : tuple of (str, str)
+        Parameters that have another name, too.
+    """
+
+    effect: str
+    place: str = ''
+    renamed: tuple[tuple[str, str], ...] = ()
+
+    def parameter(self, name: str) -> str:
+        """Return the name of a parameter today."""
+        own = dict(self.renamed).get(name, name)
+        return f'{self.place}.{own}' if self.place else own
+
+
+# Names from when only a 3-PPRS had these effects; files, ledgers and requests may have them.
+FORMER = {
+    'platform_drag': Former('tool_drag'),
+    'revolute_friction': Former('joint_friction', 'revolute'),
+    'revolute_stiffness': Former('joint_spring', 'revolute', (('angle', 'position'),)),
+    'rod_mass': Former('link_mass', 'rods'),
+    'spherical_friction': Former('joint_friction', 'spherical')}
+
+
+def general_name(name: str) -> str:
+    """Return the name that an effect has today; of what never had another, that."""
+    return FORMER[name].effect if isinstance(name, str) and name in FORMER else name
+
+
+def told_general_name(name: str) -> str:
+    """Return the same, and tell a name of old in a warning what it is today."""
+    if name in FORMER:
+        found = FORMER[name]
+        place = f', of {found.place}' if found.place else ''
+        warnings.warn(f'{name} is called {found.effect} now{place}', FutureWarning, stacklevel=3)
+    return general_name(name)
 
 
 def find_effect(name: str) -> type[CatalogueEffect] | None:

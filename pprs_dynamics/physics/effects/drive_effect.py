@@ -7,16 +7,17 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from dataclasses import dataclass, field
+from typing import Any, Self
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, SINGLE_AXIS, CatalogueEffect, names
-from pprs_dynamics.physics.three_pprs.robot import AXIS
-from pprs_dynamics.physics.three_pprs.state import DriveStates
+from pprs_dynamics.physics.mechanism.drive_states import DriveStates
+
+ALONE = 'drive'  # name of one whose name does not matter
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,8 @@ class DriveSamples:
     """Samples of one drive: all (N,); `time` is None where unknown, `direction` is sgn.
 
     `guide_load` is what its guide carries, without a sign; `transmitted` what its gear or screw
-    passes on to the mechanism, without friction, with the sign of the effort [N, N m].
+    passes on to the mechanism, without friction, with the sign of the effort [N, N m]; `channels`
+    has what was measured of the drive beside, as `temperature` [degC].
     """
 
     time: Array | None
@@ -35,13 +37,15 @@ class DriveSamples:
     guide_load: Array
     transmitted: Array
     memory: Any = None
+    channels: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
     def of(cls, state: DriveStates, drive: int, memory: Any = None) -> DriveSamples:
         """Return the samples of one drive of a state."""
         return cls(state.time, state.position[:, drive], state.velocity[:, drive],
                    state.acceleration[:, drive], state.direction[:, drive],
-                   state.guide_load[:, drive], state.transmitted[:, drive], memory)
+                   state.guide_load[:, drive], state.transmitted[:, drive], memory,
+                   {name: values[:, drive] for name, values in state.channels.items()})
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,10 @@ class DriveRange:
         By which the measured effort is most like the model's [s].
     turns : bool
         Whether the drive is revolute.
+    is_loaded : bool
+        Whether its guide or gear carries anything that is known.
+    channels : mapping of str to (lowest, highest)
+        What was measured beside, as `temperature` [degC].
     """
 
     duration: float
@@ -71,6 +79,8 @@ class DriveRange:
     gear_ratio: float = 1.0
     delay: float = 0.0
     turns: bool = False
+    is_loaded: bool = True
+    channels: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
 
 class DriveEffect(CatalogueEffect):
@@ -81,8 +91,6 @@ class DriveEffect(CatalogueEffect):
     """
 
     acts_in = frozenset({PLATFORM, SINGLE_AXIS, ARM})
-    # Whether it follows the load of the guide, and is not there where that is not known.
-    needs_load: ClassVar[bool] = False
 
     def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
         self.drives = {drive: dict(values) for drive, values in drives.items()}
@@ -103,6 +111,11 @@ class DriveEffect(CatalogueEffect):
         of unit prior, so that they can neither make an effect nor hide another.
         """
         return ()
+
+    @classmethod
+    def may_show(cls, covered: DriveRange) -> bool:
+        """Return whether a recording has what the effect follows; it costs no time where not."""
+        return True
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
@@ -229,15 +242,15 @@ class MeasurementEffect(DriveEffect):
         columns = []
         for unit in cls.coefficients or (None,):
             given = {c.name: float(c is unit) for c in cls.coefficients}
-            effect = cls({AXIS: {**cls.from_coefficients(given), **shape}})
-            columns.append(effect.sensed(effort[:, None], time, (AXIS,))[:, 0] - effort)
+            effect = cls({ALONE: {**cls.from_coefficients(given), **shape}})
+            columns.append(effect.sensed(effort[:, None], time, (ALONE,))[:, 0] - effort)
         return tuple(columns)
 
     @classmethod
     def shifts_positions(cls) -> bool:
         """Return whether measured positions are not the true ones: all drives feel that."""
-        unit = cls({AXIS: {p.name: p.scale for p in cls.parameters}})
-        return bool(np.any(unit.position_error((AXIS,))))
+        unit = cls({ALONE: {p.name: p.scale for p in cls.parameters}})
+        return bool(np.any(unit.position_error((ALONE,))))
 
     def position_error(self, drives: Sequence[str]) -> Array:
         """Return the errors of measured positions [m], to be subtracted, (D,)."""
@@ -247,3 +260,34 @@ class MeasurementEffect(DriveEffect):
                memory: Any = None) -> Array:
         """Return the measured effort where the drives apply `effort`, (N, D) [N]."""
         return effort
+
+    def seen(self, effort: Array, state: DriveStates, memory: Any = None) -> Array:
+        """Return the measured effort at a state; by default what `sensed` says, whatever it is."""
+        return self.sensed(effort, state.time, state.drives, memory)
+
+
+class GainEffect(MeasurementEffect):
+    """A factor between efforts and what is measured that goes with what the drive does."""
+
+    @classmethod
+    @abstractmethod
+    def shares(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return what is measured too much per coefficient, as shares of the effort, (N,) each."""
+
+    def factor(self, samples: DriveSamples, drive: str) -> Array:
+        """Return by what the efforts of one drive are multiplied, (N,)."""
+        values = self.drives[drive]
+        coefficients = self.to_coefficients(values)
+        shares = self.shares(samples, **{p.name: values[p.name] for p in self.shape})
+        factor = np.ones_like(samples.velocity)
+        for c, share in zip(self.coefficients, shares, strict=True):
+            factor += coefficients[c.name] * share
+        return factor
+
+    def seen(self, effort: Array, state: DriveStates, memory: Any = None) -> Array:
+        """Return the efforts times their factors."""
+        scaled = effort.copy()
+        for name in self.drives:
+            index = state.drives.index(name)
+            scaled[:, index] *= self.factor(DriveSamples.of(state, index), name)
+        return scaled

@@ -14,7 +14,6 @@ from typing import Any, ClassVar, Self
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 # Kinds of models.
 PLATFORM, SINGLE_AXIS, ARM = 'platform', 'axis', 'arm'
@@ -116,12 +115,12 @@ class Effect(ABC):
     is_measurement: bool = False
 
     @abstractmethod
-    def force(self, state: MechanismState, memory: Any = None) -> Array:
-        """Return the effect's drive forces [N], (N, 6).
+    def force(self, state: Any, memory: Any = None) -> Array:
+        """Return the effect's drive forces [N, N m], (N, D).
 
         Parameters
         ----------
-        state : MechanismState
+        state : MechanismState or LinkageState
         memory : object, optional
             What `initial_memory` returned, advanced in place to the last sample.
         """

@@ -23,10 +23,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import EffectError, ModelError, WorkspaceError
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, names
-from pprs_dynamics.physics.mechanism.mechanism import LinkageState, Mechanism
+from pprs_dynamics.physics.mechanism.drive_states import DriveStates
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.three_pprs.robot import Robot
-from pprs_dynamics.physics.three_pprs.state import DriveStates, MechanismState
 from pprs_dynamics.system.plain_text import displayed
 
 # Errors that an effect may raise on purpose: a file's values are wrong ...
@@ -118,7 +116,7 @@ def _columns(result: Any, effect: type[DriveEffect], _: Any, drive: DriveSamples
         raise _WrongResultError(
             f'{len(columns)} arrays, must be {len(wanted)} ({names(wanted) or "none"})')
     given = (drive.position, drive.velocity, drive.acceleration, drive.guide_load,
-             drive.transmitted)
+             drive.transmitted, *drive.channels.values())
     return tuple(_finite(_array(column, drive.velocity.shape), given) for column in columns)
 
 
@@ -185,38 +183,37 @@ def _memory(result: Any, _: Any, effect: CatalogueEffect, *__: Any) -> Any:
     return result
 
 
-def _robot(result: Any, _: Any, __: Any, robot: Robot | Mechanism) -> Robot | Mechanism:
-    if isinstance(robot, Robot) and isinstance(result, Robot):
-        _finite(result.kernel_parameters.row, (), 'a robot')
-        return result
-    if isinstance(robot, Mechanism) and isinstance(result, Mechanism):
-        for numbers in (result.inertial, result.armature, result.gravity):
-            _finite(np.asarray(numbers, dtype=float), (), 'a mechanism')
-        return result
-    raise _WrongResultError(f'{result!r:.80}, must be a {type(robot).__name__}')
+def _robot(result: Any, _: Any, __: Any, robot: Any) -> Any:
+    if type(result) is not type(robot):
+        raise _WrongResultError(f'{result!r:.80}, must be a {type(robot).__name__}')
+    _finite(np.asarray(result.numbers, dtype=float), (), 'a robot')
+    return result
 
 
-def _load(result: Any, _: Any, __: Any, state: MechanismState | LinkageState,
-          ) -> StructureLoad | None:
+def _load(result: Any, _: Any, __: Any, state: Any) -> StructureLoad | None:
     if result is None:
         return None
     samples, given = len(state.velocity), (state.velocity.sum(axis=1, keepdims=True),)
-    wrench, hinge = result
-    if isinstance(state, LinkageState) and np.any(hinge):
-        raise _WrongResultError('a hinge that is not 0, must be 0 in a robot of its own joints')
-    if not np.ndim(hinge):
-        hinge = np.full((samples, 3), hinge)
-    return StructureLoad(_finite(_array(wrench, (samples, 6), 'a wrench'), given, 'a wrench'),
-                         _finite(_array(hinge, (samples, 3), 'a hinge'), given, 'a hinge'))
+    if not isinstance(result, StructureLoad):
+        raise _WrongResultError(f'{result!r:.80}, must be a StructureLoad')
+    known = [one.name for one in state.robot.passive_joints if one.has_position]
+    torques = {}
+    for joint, torque in result.torques.items():
+        if joint not in known:
+            raise _WrongResultError(f'a torque in {joint}, must be in a passive joint that has a '
+                                    f'position: {", ".join(known) or "there is none"}')
+        position = state.joint_position(joint)
+        torques[joint] = _finite(_array(torque, position.shape, f'a torque in {joint}'),
+                                 (position,), f'a torque in {joint}')
+    return StructureLoad(
+        _finite(_array(result.wrench, (samples, 6), 'a wrench'), given, 'a wrench'), torques)
 
 
-def _state(result: Any, _: Any, __: Any, state: MechanismState | LinkageState,
-           ) -> MechanismState | LinkageState:
-    for kind in (MechanismState, LinkageState):
-        if isinstance(state, kind) and isinstance(result, kind):
-            _finite(result.rigid_force, (state.rigid_force,), 'a state')
-            return result
-    raise _WrongResultError(f'{result!r:.80}, must be a {type(state).__name__}')
+def _state(result: Any, _: Any, __: Any, state: Any) -> Any:
+    if type(result) is not type(state):
+        raise _WrongResultError(f'{result!r:.80}, must be a {type(state).__name__}')
+    _finite(result.rigid_force, (state.rigid_force,), 'a state')
+    return result
 
 
 def _built(result: Any, effect: type[CatalogueEffect], *_: Any) -> CatalogueEffect:
@@ -235,7 +232,8 @@ CHECKS: dict[str, Callable[..., Any]] = {
     '__init__': _any, 'from_file': _built, 'to_file': _block,
     'to_coefficients': _coefficients, 'from_coefficients': _parameters,
     'drive_memory': _any, 'begin': _any, 'initial_memory': _memory, 'continued_memory': _memory,
-    'columns': _columns, 'force': _force, 'sensed': _sensed, 'sensor_columns': _sensor_columns,
+    'columns': _columns, 'shares': _columns, 'force': _force, 'sensed': _sensed,
+    'sensor_columns': _sensor_columns,
     'position_error': _position_error, 'shifts_positions': _any,
     'changed': _robot, 'load': _load, 'apply': _state,
     'trials': _shapes, 'alternatives': _shapes, 'averaged': _averaged}

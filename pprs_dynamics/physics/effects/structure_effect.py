@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Effects on the platform, in the rods and in the passive joints: one set of parameters each."""
+"""Effects on the tool, on links and in passive joints: one set of parameters each."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from typing import Any, Self
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 
 class StructureEffect(CatalogueEffect):
@@ -51,7 +50,7 @@ class BodyEffect(StructureEffect):
     """
 
     def changed(self, robot: Any) -> Any:
-        """Return the robot, a `Robot` or an `Arm`, with the effect; by default as it was."""
+        """Return the robot, a `Robot` or a `Mechanism`, with the effect; by default as it was."""
         return robot
 
     def load(self, state: Any) -> StructureLoad | None:
@@ -80,5 +79,5 @@ class PassiveJointEffect(StructureEffect):
     """Friction in the passive joints: a force on top of the rigid body's."""
 
     @abstractmethod
-    def force(self, state: MechanismState, memory: Any = None) -> Array:
-        """Return the effect's drive forces [N], (N, 6)."""
+    def force(self, state: Any, memory: Any = None) -> Array:
+        """Return the effect's drive forces [N, N m], (N, D)."""

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +32,23 @@ WIDEST = 1.0  # [rad, m] that a drive moves from home at most
 HALVINGS = 6  # of that, until all states are within reach
 KEPT = 16  # of mechanisms: a model is built many times with other numbers
 SAME = 1e-7  # of a column's size that may lie outside the other's space: rounding
+
+
+def alike_links(robot: Any) -> tuple[tuple[str, ...], ...]:
+    """Return groups of links on which an added body does the same, that of the tool first."""
+    if robot.structure is None:
+        return ()
+    names = robot.body_names
+    return tuple(tuple(names[k] for k in sorted(group, key=lambda k: k != robot.carrier))
+                 for group in alike_bodies(robot))
+
+
+def alike_joints(robot: Any) -> tuple[tuple[str, ...], ...]:
+    """Return groups of joints that do the same, a drive first."""
+    if robot.structure is None:
+        return ()
+    return tuple(tuple(sorted(group, key=lambda name: name not in robot.structure.drives))
+                 for group in proportional_joints(robot.structure) if len(group) > 1)
 
 
 def alike_bodies(robot: Mechanism) -> tuple[tuple[int, ...], ...]:

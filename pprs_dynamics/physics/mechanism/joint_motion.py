@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
@@ -26,12 +27,15 @@ class JointMotion:
         [m, m/s, m/s^2], and of revolute joints [rad, rad/s, rad/s^2].
     time : (N,) array, optional
         [s]
+    channels : mapping of str to (N, D) array
+        What was measured of the drives beside it, as `temperature` [degC].
     """
 
     position: Array
     velocity: Array
     acceleration: Array
     time: Array | None = None
+    channels: Mapping[str, Array] = field(default_factory=dict, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.position)
@@ -40,11 +44,16 @@ class JointMotion:
         """Return the samples that a slice, a mask or indices select."""
         return replace(self, position=self.position[samples], velocity=self.velocity[samples],
                        acceleration=self.acceleration[samples],
-                       time=None if self.time is None else self.time[samples])
+                       time=None if self.time is None else self.time[samples],
+                       channels={name: each[samples] for name, each in self.channels.items()})
 
     def with_time(self, time: ArrayLike) -> Self:
         """Return the motion at given times."""
         return replace(self, time=checked_times(time, len(self)))
+
+    def with_channels(self, channels: Mapping[str, Array]) -> Self:
+        """Return the motion with what was measured beside it."""
+        return replace(self, channels=channels)
 
     @classmethod
     def checked(cls, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike,
@@ -65,7 +74,7 @@ class JointMotion:
         """Return the last position, at rest, at time 0."""
         rest = np.zeros_like(self.position[-1:])
         return replace(self, position=self.position[-1:], velocity=rest, acceleration=rest,
-                       time=np.zeros(1))
+                       time=np.zeros(1), channels={})
 
 
 def position_spline_derivatives(time: Array, position: Array) -> tuple[Array, Array]:

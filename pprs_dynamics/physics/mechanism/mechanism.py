@@ -35,6 +35,8 @@ from pprs_dynamics.physics.mechanism.linkage_equations import (
     Loads,
     Motion,
 )
+from pprs_dynamics.physics.mechanism.passive_joints import friction_table, passive_joints
+from pprs_dynamics.physics.mechanism.places import BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
@@ -62,6 +64,10 @@ class Mechanism:
         In the base's frame [m/s^2].
     radii : mapping of str to float
         At which loads of joints rub [m], where known.
+    motors : mapping of str to (D,) sequence
+        Turns of motors per turn of each drive, of motors that move more than one.
+    load_is_known : bool
+        Whether what rubs in the drives is what they carry, and no preload.
     """
 
     structure: Structure
@@ -70,6 +76,8 @@ class Mechanism:
     armature: Array
     gravity: tuple[float, float, float]
     radii: Mapping[str, float] = field(default_factory=dict)
+    motors: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    load_is_known: bool = True
 
     @property
     def masses(self) -> Array:
@@ -100,6 +108,44 @@ class Mechanism:
         table = np.zeros((len(self.structure.tables.parent), PARAMETERS))
         table[self.bodies] = self.inertial
         return table
+
+    @property
+    def numbers(self) -> Array:
+        """All that efforts follow from beside the structure, in one row."""
+        return np.concatenate((self.inertial.ravel(), self.armature, self.gravity))
+
+    @cached_property
+    def passive_joints(self) -> tuple[PassiveJoint, ...]:
+        """Joints and rotating loops without a drive."""
+        return passive_joints(self.structure, self.radii)
+
+    @property
+    def tool_place(self) -> BodyPlace:
+        """Where a payload is: at the origin of the tool."""
+        carried = float(self.masses[self.carrier]) if self.carrier >= 0 else 0.0
+        return BodyPlace(self.structure.tool, (0.0, 0.0, 0.0), carried)
+
+    @property
+    def link_places(self) -> tuple[BodyPlace, ...]:
+        """The links with mass but that of the tool, each with its centre of mass."""
+        found = []
+        for k, name in enumerate(self.body_names):
+            if k != self.carrier:
+                _, frame = self.structure.links[name]
+                x, y, z = frame.inverse.of_point(self.inertial[k, 1:4] / self.inertial[k, 0])
+                found.append(BodyPlace(name, (round(float(x), 6), round(float(y), 6),
+                                              round(float(z), 6)), float(self.masses[k])))
+        return tuple(found)
+
+    @property
+    def moved_mass(self) -> float:
+        """Mass of all bodies [kg]."""
+        return float(self.masses.sum())
+
+    def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
+                       ) -> JointFriction:
+        """Return friction of joints as `LinkageState.against_friction` takes it."""
+        return friction_table(self.structure, blocks, reversal)
 
     def with_body(self, link: str, parameters: Array) -> Mechanism:
         """Return the mechanism with a body more on a link.
@@ -241,18 +287,25 @@ class Linkage:
         efforts: Array = self.loads(mechanism).efforts
         return efforts
 
-    def at_tool(self, wrench: Array) -> dict[int, tuple[Array, Array]]:
-        """Return wrenches that the tool applies as those of its joint; see `press`.
-
-        Parameters
-        ----------
-        wrench : (N, 6) array
-            Force [N] and moment about the tool's origin [N m], in the base's axes.
-        """
+    def wrenches_of(self, load: StructureLoad) -> dict[int, tuple[Array, Array]]:
+        """Return a load as wrenches that links apply, by the joints that move them; see `press`."""
+        t, m = self.structure.tables, self.motion
         row, _ = self.structure.links[self.structure.tool]
-        arm = self.frame_of(self.structure.tool).p - self.motion.p[:, row]
-        force, moment = wrench[:, :3], wrench[:, 3:] + np.cross(arm, wrench[:, :3])
-        return {row: (force, moment)}
+        arm = self.frame_of(self.structure.tool).p - m.p[:, row]
+        force, moment = load.wrench[:, :3], load.wrench[:, 3:]
+        found = {row: (force, moment + np.cross(arm, force))}
+        for name, torque in load.torques.items():
+            row = self.structure.rows[name]
+            along = torque[:, None] * m.z[:, row]
+            none = np.zeros_like(along)
+            # What the link of a joint applies, the one that it hangs on takes back.
+            for one, sign in ((row, 1.0), (int(t.parent[row]), -1.0)):
+                arm = m.p[:, row] - m.p[:, one]
+                force, moment = (none, sign * along) if t.turns[row] else (
+                    sign * along, sign * np.cross(arm, along))
+                before = found.get(one, (none, none))
+                found[one] = (before[0] + force, before[1] + moment)
+        return found
 
     def regressor(self, mechanism: Mechanism) -> Array:
         """Return the derivatives of the efforts by the bodies' parameters, (N, D, 10 B)."""
@@ -338,15 +391,42 @@ class LinkageState(JointMotion):
 
     @lazy
     def guide_load(self) -> Array:
-        """What a drive's gear carries [N m, N]: the size of what it passes on."""
-        load: Array = np.abs(self.transmitted)
+        """What a drive's gear carries [N m, N]: the size of what it passes on; 0 if not known."""
+        load: Array = np.abs(self.transmitted) * self.robot.load_is_known
         return load
 
     @lazy
     def reactions(self) -> Loads:
         """What joints and closures transmit without friction."""
-        wrenches = None if self.load is None else self.linkage.at_tool(self.load.wrench)
+        wrenches = None if self.load is None else self.linkage.wrenches_of(self.load)
         return self.linkage.loads(self.robot, with_reactions=True, wrenches=wrenches)
+
+    @property
+    def tool_velocity(self) -> Array:
+        """Linear velocity of the tool's origin and angular velocity, in `base`, (N, 6)."""
+        linkage = self.linkage
+        row, _ = linkage.structure.links[linkage.structure.tool]
+        m = linkage.motion
+        arm = linkage.frame_of(linkage.structure.tool).p - m.p[:, row]
+        return np.concatenate((m.u[:, row] + np.cross(m.w[:, row], arm), m.w[:, row]), axis=1)
+
+    def joint_position(self, joint: str) -> Array:
+        """Return where a passive joint of the tree is, (N,) [rad, m]."""
+        t, row = self.linkage.structure.tables, self.linkage.structure.rows[joint]
+        position: Array = (t.ratio[row] * self.linkage.motion.q[:, t.coordinate[row]]
+                           + t.offset[row])
+        return position
+
+    @property
+    def position_step(self) -> float:
+        """By which a drive is moved for derivatives [rad, m]."""
+        return 1e-4
+
+    def moved(self, drive: int, step: float) -> LinkageState:
+        """Return the state with a drive at other positions, which moves as it did."""
+        position = self.position.copy()
+        position[:, drive] += step
+        return replace(self, position=position, known=None)
 
     def against_friction(self, friction: JointFriction) -> Array:
         """Return the drives' efforts against friction of joints, (N, D)."""

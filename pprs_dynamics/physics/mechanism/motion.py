@@ -5,8 +5,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,8 @@ class PlatformMotion:
     ----------
     rows : (N, 19) array
         All of it but the times, in the order of the parameters: what kernels take.
+    channels : mapping of str to (N, 6) array
+        What was measured of the drives beside it, as `temperature` [degC].
 
     Raises
     ------
@@ -65,6 +68,7 @@ class PlatformMotion:
 
     rows: Array
     time: Array | None
+    channels: Mapping[str, Array]
 
     def __init__(
         self, position: ArrayLike, orientation: ArrayLike, linear_velocity: ArrayLike,
@@ -78,13 +82,16 @@ class PlatformMotion:
             rows = _checked(columns)
         self.__dict__['rows'] = rows
         self.__dict__['time'] = None if time is None else checked_times(time, len(rows))
+        self.__dict__['channels'] = {}
 
     @classmethod
-    def _of(cls, rows: Array, time: ArrayLike | None) -> PlatformMotion:
+    def _of(cls, rows: Array, time: ArrayLike | None,
+            channels: Mapping[str, Array] = MappingProxyType({})) -> PlatformMotion:
         """Return the motion of rows that are known to be right."""
         motion = object.__new__(cls)
         motion.__dict__['rows'] = rows
         motion.__dict__['time'] = None if time is None else checked_times(time, len(rows))
+        motion.__dict__['channels'] = channels
         return motion
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -102,7 +109,9 @@ class PlatformMotion:
         if not len(rows):
             raise MotionError('position', f'its shape is {(0, 3)}',
                               'be (N, 3) with N of at least 1', 'shape')
-        return PlatformMotion._of(rows, None if self.time is None else self.time[index])
+        return PlatformMotion._of(
+            rows, None if self.time is None else self.time[index],
+            {name: values[index] for name, values in self.channels.items()})
 
     @cached_property
     def position(self) -> Array:
@@ -143,7 +152,11 @@ class PlatformMotion:
 
     def with_time(self, time: ArrayLike) -> PlatformMotion:
         """Return the motion with other times [s]."""
-        return PlatformMotion._of(self.rows, time)
+        return PlatformMotion._of(self.rows, time, self.channels)
+
+    def with_channels(self, channels: Mapping[str, Array]) -> PlatformMotion:
+        """Return the motion with what was measured of the drives beside it, (N, 6) each."""
+        return PlatformMotion._of(self.rows, self.time, channels)
 
     def resampled(self, rate: float) -> PlatformMotion:
         """Return the motion at a constant rate.

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from pprs_dynamics.arrays import Array
@@ -16,20 +17,22 @@ class StructureLoad(NamedTuple):
     Parameters
     ----------
     wrench : (N, 6) array
-        Force [N] and moment [N m] that the platform, or the tool of a mechanism, applies at its
-        origin, in `base`.
-    hinge : (N, 3) array or 0
-        Of a 3-PPRS: moment about n_i that resists growing u_i in C_i [N m]. No other mechanism
-        has these joints.
+        Force [N] and moment [N m] that the tool applies at its origin, in `base`.
+    torques : mapping of str to (N,) or (N, 3) array
+        By passive joint, what resists a growing position [N m, N]; a column for each of several
+        joints of one name.
     """
 
     wrench: Array
-    hinge: Array | float = 0.0
+    torques: Mapping[str, Array] = {}
 
     def __add__(self, other: StructureLoad) -> StructureLoad:  # type: ignore[override]
-        return StructureLoad(self.wrench + other.wrench, self.hinge + other.hinge)
+        torques = dict(self.torques)
+        for name, torque in other.torques.items():
+            torques[name] = torques[name] + torque if name in torques else torque
+        return StructureLoad(self.wrench + other.wrench, torques)
 
     def at(self, samples: Any) -> StructureLoad:
         """Return the loads at samples that a slice, a mask or indices select."""
-        return StructureLoad(self.wrench[samples], self.hinge if isinstance(self.hinge, float)
-                             else self.hinge[samples])
+        return StructureLoad(self.wrench[samples], {
+            name: torque[samples] for name, torque in self.torques.items()})

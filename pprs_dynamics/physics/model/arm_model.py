@@ -1,10 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Model of a mechanism from its description: a serial arm, or a robot with loops.
+"""Model of a mechanism: a single axis, a serial arm, or a robot with loops.
 
 tau = T' RNEA(q, q_dot, q_ddot) + armature q_ddot + F_v q_dot + F_c sgn(q_dot) + offset + effects,
 per drive, positive along its positive direction; T, rates of all joints per rate of the drives.
+Arms and robots with loops come from a description; of an axis the file says all: M (q_ddot - g).
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import MISSING, ModelError
-from pprs_dynamics.physics.effects.effect import ARM, CatalogueEffect
+from pprs_dynamics.physics.effects.effect import ARM, SINGLE_AXIS, CatalogueEffect
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.description import REVOLUTE
@@ -33,13 +34,23 @@ from pprs_dynamics.physics.mechanism.tool_pose import ToolPose
 from pprs_dynamics.physics.model.effects_block import added_effects
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.keys import ARM as ARM_BLOCK
-from pprs_dynamics.physics.model.keys import GAIN, Key, drives_key, keys_of, mechanism_block
+from pprs_dynamics.physics.model.keys import AXIS as AXIS_BLOCK
+from pprs_dynamics.physics.model.keys import (
+    GAIN,
+    Key,
+    drives_key,
+    is_axis,
+    keys_of,
+    mechanism_block,
+)
 from pprs_dynamics.physics.model.limits import JointLimits
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
 from pprs_dynamics.physics.model.recorded_names import CURRENT, gravity_in_efforts
 from pprs_dynamics.physics.model.robot_block import (
+    axis_mechanism,
     described_values,
     joint_radii,
+    motor_map,
     passive_friction,
     read_structure,
 )
@@ -63,10 +74,20 @@ class ArmModel(ForceModel):
         See `ForceModel`; friction and offset are the first effects.
     """
 
-    kind: ClassVar[str] = ARM
     motions: ClassVar[tuple[type, ...]] = (JointMotion, PlatformMotion)
+    takes_long: ClassVar[bool] = True
 
     robot: Mechanism
+
+    @property
+    def kind(self) -> str:
+        """'axis', or 'arm' for what has a description."""
+        return ARM if self.is_described else SINGLE_AXIS
+
+    @property
+    def is_described(self) -> bool:
+        """Whether bodies and joints are those of a description; not of an axis."""
+        return self.block != AXIS_BLOCK
 
     @property
     def drives(self) -> tuple[str, ...]:
@@ -79,9 +100,19 @@ class ArmModel(ForceModel):
         return self.robot
 
     @property
+    def friction(self) -> AxisFriction:
+        """The friction of its drives."""
+        return next(one for one in self.effects if isinstance(one, AxisFriction))
+
+    @property
+    def offset(self) -> AxisOffset:
+        """The constant efforts of its drives."""
+        return next(one for one in self.effects if isinstance(one, AxisOffset))
+
+    @property
     def block(self) -> str:
-        """Block of its file: `arm` or `robot`."""
-        return mechanism_block(self.values)
+        """Block of its file: `arm`, `robot` or `axis`."""
+        return mechanism_block(self.values) or AXIS_BLOCK
 
     @cached_property
     def keys(self) -> dict[str, Key]:
@@ -99,15 +130,14 @@ class ArmModel(ForceModel):
         return self.robot.structure.description.digest
 
     @property
-    def gain(self) -> tuple[float, ...]:
-        """Torque, or force, per ampere of each drive [N m/A, N/A]."""
-        gain: tuple[float, ...] = self.values[self.block + GAIN]
-        return gain
+    def gain(self) -> tuple[float, ...] | None:
+        """Torque, or force, per ampere of each drive [N m/A, N/A]; None of an axis."""
+        return self.values.get(self.block + GAIN)
 
     @property
     def gear_ratios(self) -> tuple[float, ...]:
         """Turns of the motor per turn of each drive."""
-        ratios: tuple[float, ...] = self.values[f'{self.block}.gear_ratio']
+        ratios: tuple[float, ...] = self.values.get(f'{self.block}.gear_ratio', super().gear_ratios)
         return ratios
 
     @property
@@ -118,28 +148,27 @@ class ArmModel(ForceModel):
     @property
     def faults(self) -> tuple[str, ...]:
         """Sentences on bodies that cannot be, unless the file has other inertia than the URDF."""
-        return () if self.values['links.inertia'] else self.robot.structure.description.faults
+        return () if self.values.get('links.inertia') else self.robot.structure.description.faults
 
     @property
     def efforts_in_amperes(self) -> bool:
         """Whether efforts of recordings are currents."""
         return (self.effort_kind == CURRENT
-                or bool(self.values[f'{self.block}.effort_unit'] == 'A'))
+                or self.values.get(f'{self.block}.effort_unit') == 'A')
 
     @property
     def rest_speed(self) -> float:
         """Speed [rad/s, m/s] below which a joint stands, and its gear holds any torque.
 
         The file's own, not that of a fit: which samples count must not change with the widths
-        that are fitted to them.
+        that are fitted to them. An axis on a bench has no such gear: its efforts at rest count.
         """
-        speed: float = self.values['friction.reversal_velocity']
-        return speed
+        return float(self.values['friction.reversal_velocity']) if self.is_described else 0.0
 
     @property
     def blocks_per_period(self) -> float:
         """Means of efforts that are compared in a period of the motion."""
-        return BLOCKS_PER_PERIOD
+        return BLOCKS_PER_PERIOD if self.is_described else 0.0
 
     @cached_property
     def limits(self) -> JointLimits:
@@ -155,9 +184,11 @@ class ArmModel(ForceModel):
         """Build the model from flat keys and values; see `ForceModel.from_parameters`."""
         with source_of_errors(source):
             block = mechanism_block(parameters)
+            if not block and is_axis(parameters):
+                return cls._axis(parameters, source)
             if not block:
-                raise ModelError('arm.urdf', MISSING, 'be given: this needs a serial arm, or a '
-                                 'robot with loops')
+                raise ModelError('arm.urdf', MISSING, 'be given: this needs a serial arm, a '
+                                 'robot with loops or a single axis')
             listed = drives_key(block)
             if listed in parameters and not parameters[listed]:
                 raise ModelError(listed, parameters[listed], 'name at least one joint')
@@ -167,7 +198,8 @@ class ArmModel(ForceModel):
             robot = _mechanism(structure, values)
             effects = (AxisFriction(values['friction.viscous'], values['friction.coulomb']),
                        AxisOffset(values['friction.offset']), *passive_friction(structure, values),
-                       *added_effects(parameters, cls, structure.drives, robot))
+                       *added_effects(parameters, ARM, structure.drives, robot,
+                                      structure.turning))
             loaded = robot
             for effect in effects:
                 if isinstance(effect, BodyEffect):
@@ -179,6 +211,18 @@ class ArmModel(ForceModel):
                        reversal=Reversal(width, values.get('friction.reversal_rate', common),
                                          values.get('friction.reversal_slide', common)),
                        values=values, source=source)
+
+    @classmethod
+    def _axis(cls, parameters: Mapping[str, Any], source: str) -> ArmModel:
+        """Build the model of an axis."""
+        values = checked_values(parameters)
+        robot = axis_mechanism(values['axis.mass'], gravity_in_efforts(values, 'axis.gravity'))
+        drives = robot.structure.drives
+        effects = (AxisFriction(values['axis.viscous'], values['axis.coulomb']),
+                   AxisOffset(values['axis.offset']),
+                   *added_effects(parameters, SINGLE_AXIS, drives, robot))
+        return cls(robot=robot, effects=effects, values=values, source=source,
+                   reversal=Reversal(values['friction.reversal_velocity']))
 
     @cached_property
     def tool_pose(self) -> ToolPose:
@@ -197,11 +241,16 @@ class ArmModel(ForceModel):
         if isinstance(motion, PlatformMotion):
             motion, known = self.tool_pose.linkage(motion)
         return LinkageState(motion.position, motion.velocity, motion.acceleration, motion.time,
-                            robot=self.robot, reversal=self.reversal, known=known)
+                            channels=motion.channels, robot=self.robot, reversal=self.reversal,
+                            known=known)
+
+    def at_drives(self, state: LinkageState) -> LinkageState:
+        """Return the state in which the links follow drives that move as in another."""
+        return self.mechanism(state)
 
     def variables(self, state: LinkageState) -> dict[str, Array]:
-        """Return the loads of the gears."""
-        return {'load': state.guide_load}
+        """Return the loads of the gears, where they are known."""
+        return {'load': state.guide_load} if self.robot.load_is_known else {}
 
 
 def inertial_values(inertial: Array) -> dict[str, tuple[float, ...]]:
@@ -234,7 +283,8 @@ def _mechanism(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
             name = next(name for name, at in structure.rows.items() if at == row)
             raise ModelError('links.mass', float(mass), f'be greater than 0 for what {name} moves')
     robot = Mechanism(structure, bodies, inertial, np.array(values[f'{block}.armature']),
-                      gravity_in_efforts(values, f'{block}.gravity'), joint_radii(values))
+                      gravity_in_efforts(values, f'{block}.gravity'), joint_radii(values),
+                      motor_map(structure, values))
     if block != ARM_BLOCK:
         _require_driven_bodies(robot)
     return robot

@@ -16,25 +16,27 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import PLATFORM, Effect
-from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
-from pprs_dynamics.physics.effects.laws.passive_friction import (
-    IndependentChainsFriction,
-    JointCoefficients,
-    PassiveFriction,
-    WholeMechanismFriction,
-)
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.effects_block import added_effects
 from pprs_dynamics.physics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
+from pprs_dynamics.physics.model.former_names import with_general_names
 from pprs_dynamics.physics.model.keys import KEYS, is_axis, is_mechanism, title_of
 from pprs_dynamics.physics.model.limits import Limits
 from pprs_dynamics.physics.model.one_pass import OnePass
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
 from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
+from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
+from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
+from pprs_dynamics.physics.three_pprs.passive_friction import (
+    IndependentChainsFriction,
+    JointCoefficients,
+    PassiveFriction,
+    WholeMechanismFriction,
+)
 from pprs_dynamics.physics.three_pprs.robot import Geometry, Masses, Robot
 from pprs_dynamics.physics.three_pprs.state import MechanismState, solve_mechanism
 
@@ -94,6 +96,11 @@ class DriveModel(ForceModel):
     equations: str = 'corrected'
 
     @property
+    def mechanism_of_effects(self) -> Robot:
+        """The robot as described."""
+        return self.robot
+
+    @property
     def effort_limits(self) -> Array:
         """Largest absolute effort that each drive can apply [N], (6,)."""
         return self.limits.efforts
@@ -108,6 +115,7 @@ class DriveModel(ForceModel):
                 raise ModelError(other, parameters[other], 'not be given: this needs a 3-PPRS, and '
                                  f'{title_of(parameters)} is for pprs compare, diagnose, adopt, '
                                  'fit and history')
+            parameters = with_general_names(parameters)
             values = checked_values(parameters)
             for stroke in ('limits.slide_stroke', 'limits.lift_stroke'):
                 if not values[stroke][0] < values[stroke][1]:
@@ -115,11 +123,13 @@ class DriveModel(ForceModel):
                                      'be a lower and a higher position [m]')
             robot = Robot(Geometry(**_group(values, 'geometry.')),
                           Masses(**_group(values, 'masses.')),
-                          gravity_in_efforts(values, 'gravity'))
+                          gravity_in_efforts(values, 'gravity'),
+                          (values['friction.revolute.diameter'] / 2,
+                           values['friction.spherical.diameter'] / 2))
             limits = Limits.of(values)
             effects = (ActiveFriction(**_group(values, 'friction.drives.')),
                        _passive_friction(values, limits),
-                       *added_effects(parameters, cls, cls.drives))
+                       *added_effects(parameters, cls.kind, cls.drives, robot))
             _require_bodies(robot, effects)
             reversal = Reversal(_reversal_velocity(values), values['friction.reversal_rate'])
             return cls(robot=robot, effects=effects, limits=limits, reversal=reversal,
@@ -141,6 +151,13 @@ class DriveModel(ForceModel):
             return solve_mechanism(
                 self.robot, motion, reversal=self.reversal, printed=self.equations == 'printed',
                 minimum_sine=self.limits.rod_sine, condition_limit=self.limits.condition_number)
+
+    def at_drives(self, state: MechanismState) -> MechanismState:
+        """Return the state in which the platform follows drives that move as in another."""
+        found = solve_forward_motion(self.robot.geometry, state.position, state.velocity,
+                                     state.acceleration, state.motion[:1]).motion.with_channels(
+                                         state.channels)
+        return self.mechanism(found if state.time is None else found.with_time(state.time))
 
     def drive_forces(
         self, motion: PlatformMotion, state: ModelState | None = None,

@@ -9,10 +9,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.effects.catalogue import REPLACED, catalogue, find_effect
+from pprs_dynamics.physics.effects.catalogue import FORMER, REPLACED, catalogue, find_effect
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.keys import Key, title_of
 
 # Keys of the block `effects` that are no effect.
@@ -20,12 +19,13 @@ LISTS = ('effects.active', 'effects.measured')
 
 
 def added_effects(
-    parameters: Mapping[str, Any], kind: type[ForceModel], drives: tuple[str, ...],
-    robot: Any = None,
+    parameters: Mapping[str, Any], kind: str, drives: tuple[str, ...],
+    robot: Any = None, turning: tuple[str, ...] = (),
 ) -> Iterator[CatalogueEffect]:
     """Yield the effects that are active in a model of a kind with drives, all blocks checked.
 
-    Parameters of some are those that they have on the `robot`.
+    Parameters of some are those that they have on the `robot`; of drives that are `turning` bounds
+    are others.
     """
     active = parameters.get('effects.active', [])
     if not isinstance(active, (list, tuple)) or not all(isinstance(n, str) for n in active):
@@ -46,7 +46,7 @@ def added_effects(
         found = found.bound(robot)
         # A block that is not active is checked all the same, but may still be incomplete.
         if issubclass(found, DriveEffect):
-            found.check_bounds(block, [] if robot is None else robot.structure.turning)
+            found.check_bounds(block, turning)
         effect = found.from_file(block, complete=name in active)
         if name in active:
             if name in of_sensors:
@@ -58,13 +58,14 @@ def added_effects(
 
 
 def _unknown(name: str, place: str) -> UnknownNameError:
-    return UnknownNameError('effect', name, catalogue(), place, instead=REPLACED.get(name, ''))
+    instead = FORMER[name].effect if name in FORMER else REPLACED.get(name, '')
+    return UnknownNameError('effect', name, catalogue(), place, instead=instead)
 
 
-def _check_place(name: str, block: Any, effect: type[CatalogueEffect], kind: type[ForceModel],
+def _check_place(name: str, block: Any, effect: type[CatalogueEffect], kind: str,
                  drives: tuple[str, ...], title: str) -> None:
     """Raise ModelError where an effect is not one of this kind of model, or on another drive."""
-    if not kind.offers(effect):
+    if kind not in effect.acts_in:
         raise ModelError(f'effects.{name}', block, 'be an effect that acts in ' + title)
     if issubclass(effect, DriveEffect) and isinstance(block, Mapping):
         for drive in block:

@@ -27,14 +27,16 @@ from pprs_dynamics.errors import EffectError, MotionError
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.drive_states import DriveStates
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.keys import FILES, Key, title_of
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.physics.model.recorded_names import effort_kind, joint_names, recorded_columns
-from pprs_dynamics.physics.three_pprs.state import DriveStates
 
 RIGID_BODY = 'rigid_body'
+# The model's own friction, in its drives and in its passive joints.
+ACTIVE_FRICTION, PASSIVE_FRICTION = 'active_friction', 'passive_friction'
 
 
 def total_force(parts: tuple[Any, ...]) -> Any:
@@ -131,23 +133,25 @@ class ForceModel(ABC):
 
     Class attributes
     ----------------
-    kind : {'platform', 'axis', 'arm'}
-        Effects say in which kinds they act.
     motions : tuple of type
         Kinds of motion that it has forces for.
+    takes_long : bool
+        Whether forces take so long that several are evaluated in threads.
     default_file : str
         Model file that is read without another one; empty where there is none.
 
     Attributes
     ----------
+    kind : {'platform', 'axis', 'arm'}
+        Effects say in which kinds they act.
     drives : tuple of D str
     keys : dict of str to Key
         Of its files.
     """
 
-    kind: ClassVar[str]
     motions: ClassVar[tuple[type, ...]]
     default_file: ClassVar[str] = ''
+    takes_long: ClassVar[bool] = False
 
     effects: tuple[Effect, ...]
     reversal: Reversal
@@ -185,6 +189,11 @@ class ForceModel(ABC):
             For a key that is unknown, missing, of the wrong type or impossible, and for those of
             another kind of model.
         """
+
+    @property
+    @abstractmethod
+    def kind(self) -> str:
+        """One of 'platform', 'axis', 'arm'."""
 
     @property
     @abstractmethod
@@ -233,6 +242,11 @@ class ForceModel(ABC):
             values.update({key: self.content for key in FILES if values.get(key)})
         text = json.dumps(values, sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
+
+    @property
+    def is_described(self) -> bool:
+        """Whether its bodies and joints are those of a description, as of a URDF."""
+        return False
 
     @property
     def gain(self) -> tuple[float, ...] | None:
@@ -294,10 +308,9 @@ class ForceModel(ABC):
         """Means of efforts that are compared in a period of the motion; 0 for means of 10 ms."""
         return 0.0
 
-    @classmethod
-    def offers(cls, effect: type[CatalogueEffect]) -> bool:
+    def offers(self, effect: type[CatalogueEffect]) -> bool:
         """Return whether an effect of the catalogue can act in what this is a model of."""
-        return cls.kind in effect.acts_in
+        return self.kind in effect.acts_in
 
     @property
     def mechanism_of_effects(self) -> Any:
@@ -311,6 +324,10 @@ class ForceModel(ABC):
     @abstractmethod
     def mechanism(self, motion: Any) -> Any:
         """Return what effects take of a motion of this kind; see `drive_forces`."""
+
+    @abstractmethod
+    def at_drives(self, state: Any) -> Any:
+        """Return what effects take where drives move as in a state of a model of this kind."""
 
     def drive_forces(self, motion: Any, state: ModelState | None = None) -> Forces:
         """Return the forces that the drives must apply for a motion of this kind.
@@ -454,7 +471,7 @@ class ForceModel(ABC):
         state = self.initial_state() if state is None else state
         for effect in sensors:
             memory = state.memories[effect.name]
-            after = (effect.sensed(total, mechanism.time, mechanism.drives, memory)
+            after = (effect.seen(total, mechanism, memory)
                      if isinstance(effect, MeasurementEffect)
                      else total + effect.force(mechanism, memory))
             parts[effect.name], total = after - total, after

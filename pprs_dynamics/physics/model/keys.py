@@ -193,7 +193,7 @@ AXIS_KEYS: dict[str, Key] = {key.name: key for key in (
 EFFORT_UNITS = ('N m', 'N', 'A')
 # Blocks of mechanisms: a serial arm, and a robot that may have loops. What the first names joints
 # the second names drives.
-ARM, ROBOT = 'arm', 'robot'
+ARM, ROBOT, AXIS = 'arm', 'robot', 'axis'
 GAIN = '.gain'
 FILES = ('arm.urdf', 'robot.urdf', 'robot.mjcf')  # keys that hold paths
 LOOPS = ('spherical', 'revolute', 'universal', 'cylindrical', 'prismatic', 'fixed')
@@ -288,18 +288,22 @@ OF_JOINT = {
     'coulomb': Key('', 'dry friction over the load across the axis', '', lower=0, default=0.0),
     'radius': Key('', 'radius at which it acts; of a slide 1', 'm', lower=0, default=0.0)}
 POSE = '_pose'
+MOTORS = 'friction.motors.'
 NAMED_BLOCKS: dict[str, dict[str, Key]] = {
-    'robot.loops.': OF_LOOP, 'friction.joints.': OF_JOINT, 'robot.home.': {}}
+    'robot.loops.': OF_LOOP, 'friction.joints.': OF_JOINT, 'robot.home.': {}, MOTORS: {}}
 
 
-def named_keys(parameters: Mapping[str, Any]) -> dict[str, Key]:
-    """Return the keys of a robot below names that its file gives."""
+def named_keys(parameters: Iterable[str]) -> dict[str, Key]:
+    """Return the keys of a robot below names that its file gives, out of those of the file."""
     found = {}
     for name in parameters:
         if name.startswith('robot.home.'):
             found[name] = (Key(name, 'x y z qx qy qz qw in the base near which the loops close',
                                'm', size=7) if name.endswith(POSE) else
                            Key(name, 'position near which the loops close', 'rad, m'))
+        if name.startswith(MOTORS):
+            found[name] = Key(name, 'turns of a motor per turn of a joint, of motors that move '
+                              'several', '')
     for prefix, keys in NAMED_BLOCKS.items():
         of_blocks = (name.removeprefix(prefix).partition('.')
                      for name in parameters if name.startswith(prefix))
@@ -311,7 +315,7 @@ def named_keys(parameters: Mapping[str, Any]) -> dict[str, Key]:
 
 # Blocks whose keys are not listed one by one.
 ADDED = ('effects.', 'uncertainties.', 'tolerances.', 'history.', 'joint_map.', 'joint_prefix',
-         'columns.', 'effort_kind')
+         'columns.', 'effort_kind', 'reference')
 
 
 def is_axis(names: Iterable[str]) -> bool:
@@ -342,7 +346,8 @@ def keys_of(parameters: Mapping[str, Any]) -> dict[str, Key]:
         drives = parameters.get(drives_key(block), ())
         count = len(drives) if isinstance(drives, (list, tuple)) and drives else 1
         keys = mechanism_keys(block, count)
-        return keys if block == ARM else {**keys, **named_keys(parameters)}
+        return {**keys, **named_keys(parameters if block == ROBOT else [
+            name for name in parameters if name.startswith(MOTORS)])}
     return AXIS_KEYS if is_axis(parameters) else KEYS
 
 

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.laws.passive_friction import IndependentChainsFriction
 from pprs_dynamics.physics.mechanism.mechanism import WORST_CONDITION
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
+from pprs_dynamics.physics.three_pprs.passive_friction import IndependentChainsFriction
 from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 # Of a long trajectory that many samples are looked at for their condition number, evenly spread:

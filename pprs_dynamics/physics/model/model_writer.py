@@ -45,6 +45,7 @@ from pprs_dynamics.physics.model.parameter_file import (
     parse_parameters,
     read_parameters,
 )
+from pprs_dynamics.physics.model.reference_keys import moved
 from pprs_dynamics.physics.model.uncertainties import UNCERTAINTIES
 from pprs_dynamics.system.bounded_yaml import check_bounds, check_size
 from pprs_dynamics.system.output_files import write_text
@@ -85,6 +86,7 @@ def write_model(path: str | PathLike[str], values: Mapping[str, Any],
             # Files say where the URDF is from where they are.
             urdf = located(values[key], Path(base or path).absolute().parent)
             values = {**values, key: os.path.relpath(urdf, folder)}
+    values = moved(values, Path(base or path).absolute().parent, folder)
     if base is None:
         text = format_model(values, str(path))
     else:

@@ -14,14 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array, Sample, Value
-from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction, drive_friction
-from pprs_dynamics.physics.effects.laws.passive_friction import (
-    JointResistance,
-    Joints,
-    WholeMechanismFriction,
-    friction_forces,
-    joint_resistances,
-)
 from pprs_dynamics.physics.mechanism.evaluation import evaluate
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_sample import motion_sample
@@ -29,6 +21,7 @@ from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.vectors import Vector
 from pprs_dynamics.physics.model.force_model import total_force
 from pprs_dynamics.physics.model.limits import Limits
+from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction, drive_friction
 from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
 from pprs_dynamics.physics.three_pprs.closure import (
     Wrench,
@@ -44,7 +37,13 @@ from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
     chain_motions,
 )
 from pprs_dynamics.physics.three_pprs.joint_rates import turnover
-from pprs_dynamics.physics.three_pprs.kernel_parameters import RobotParameters
+from pprs_dynamics.physics.three_pprs.kernel_parameters import Joints, RobotParameters
+from pprs_dynamics.physics.three_pprs.passive_friction import WholeMechanismFriction
+from pprs_dynamics.physics.three_pprs.passive_joints import (
+    JointResistance,
+    friction_forces,
+    joint_resistances,
+)
 from pprs_dynamics.physics.three_pprs.rigid_body import ThreeForces, body_forces
 from pprs_dynamics.physics.three_pprs.robot import Robot
 from pprs_dynamics.physics.three_pprs.state import MechanismKinematics, MechanismState

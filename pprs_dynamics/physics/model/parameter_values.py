@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -13,6 +13,7 @@ from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.model.effects_block import check_tolerances
 from pprs_dynamics.physics.model.keys import (
     ADDED,
+    MOTORS,
     NAMED_BLOCKS,
     NAMES,
     NODE_KEYS,
@@ -21,6 +22,7 @@ from pprs_dynamics.physics.model.keys import (
     keys_of,
     mechanism_block,
 )
+from pprs_dynamics.physics.model.reference_keys import check_reference
 from pprs_dynamics.physics.model.uncertainties import check_uncertainties
 
 
@@ -48,13 +50,15 @@ def checked_values(parameters: Mapping[str, Any]) -> dict[str, Any]:
             values[name] = key.default
     check_tolerances(parameters, keys)
     check_uncertainties(parameters)
+    check_reference(parameters)
     return {**values, **{name: value for name, value in parameters.items()
                          if name.startswith(ADDED)}}
 
 
 def _require_known(parameters: Mapping[str, Any]) -> None:
     keys = keys_of(parameters)
-    named = NAMED_BLOCKS if mechanism_block(parameters) == ROBOT else ()
+    block = mechanism_block(parameters)
+    named: Iterable[str] = NAMED_BLOCKS if block == ROBOT else (MOTORS,) if block else ()
     blocks = {prefix for key in (*keys, *ADDED, *named) for prefix in _prefixes(key)}
     for name, value in parameters.items():
         if name in keys or _is_for_others(name):

@@ -5,8 +5,9 @@
 
 A model file may hold `joint_prefix`, `joint_map: {DRIVE: JOINT}` and `columns: {time: COLUMN,
 time_scale: NUMBER, rate: NUMBER, decimal: ",", files: {position: FILE, …}, DRIVE: {position:
-COLUMN, velocity: COLUMN, effort: COLUMN or current: COLUMN, scale: NUMBER, position_scale: NUMBER,
-velocity_scale: NUMBER}}`, and `effort_kind`: what efforts are.
+COLUMN, velocity: COLUMN, effort: COLUMN or current: COLUMN, temperature: COLUMN, pressure: COLUMN,
+scale: NUMBER, position_scale: NUMBER, velocity_scale: NUMBER}}`, a `temperature: COLUMN` or
+`pressure: COLUMN` of the whole machine there, and `effort_kind`: what efforts are.
 """
 
 from __future__ import annotations
@@ -15,15 +16,15 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pprs_dynamics.drives import Column, DriveColumns, RecordedColumns
+from pprs_dynamics.drives import CHANNELS, Column, DriveColumns, RecordedColumns
 from pprs_dynamics.errors import ModelError, UnknownNameError
 from pprs_dynamics.physics.model.keys import is_gain
 
 PREFIX, MAP, COLUMNS = 'joint_prefix', 'joint_map.', 'columns.'
 TIME, FILES = 'time', 'files.'
-QUANTITIES = ('position', 'velocity', 'effort', 'current')
+QUANTITIES = ('position', 'velocity', 'effort', 'current', *CHANNELS)
 SCALES = ('scale', 'position_scale', 'velocity_scale')
-OF_TABLE = (TIME, 'time_scale', 'rate', 'decimal')
+OF_TABLE = (TIME, 'time_scale', 'rate', 'decimal', *CHANNELS)
 OF_FILES = (TIME, *QUANTITIES)
 EFFORT_KIND = 'effort_kind'
 MEASURED, CURRENT, COMMANDED, WITHOUT_GRAVITY = EFFORT_KINDS = (
@@ -127,7 +128,8 @@ def recorded_columns(values: Mapping[str, Any], drives: Sequence[str]) -> Record
     return RecordedColumns(
         _column(TIME, given[TIME]) if TIME in given else None, found,
         _factor('time_scale', given['time_scale']) if 'time_scale' in given else None, rate,
-        given.get('decimal', '.'), files)
+        given.get('decimal', '.'), files,
+        {name: _column(name, given[name]) for name in CHANNELS if name in given})
 
 
 def _require_known(key: str, drives: Sequence[str]) -> None:

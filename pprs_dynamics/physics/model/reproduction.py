@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.laws.active_friction import ActiveFriction
-from pprs_dynamics.physics.effects.laws.passive_friction import (
+from pprs_dynamics.physics.mechanism.paths import HelicalPath
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
+from pprs_dynamics.physics.three_pprs.passive_friction import (
     IndependentChainsFriction,
     PassiveFriction,
     WholeMechanismFriction,
 )
-from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 # Of the paper's path; fine enough that rms figures no longer change in four digits.

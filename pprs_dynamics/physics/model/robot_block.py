@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -13,18 +14,25 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction, friction_rows
+from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
 from pprs_dynamics.physics.mechanism.description import (
+    PARAMETERS,
+    PRISMATIC,
     Description,
     Frame,
+    Joint,
     Loop,
     Transmission,
+    body_at,
 )
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
-from pprs_dynamics.physics.model.keys import ARM, POSE, drives_key, mechanism_block
+from pprs_dynamics.physics.model.keys import ARM, MOTORS, POSE, drives_key, mechanism_block
 from pprs_dynamics.system.package_files import located
 
+AXIS = 'axis'  # the joint, and drive, of a single axis
 # Joints whose motors do not move one joint each.
 COUPLED = ('differential', 'fourbar')
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] where no description has it
@@ -52,11 +60,41 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
         description = read_mjcf(values[given[0]])
     else:
         description = read_urdf(values[given[0]])
-        _require_one_motor_each(description, values[drives_key(block)], block)
+        _require_motors(description, values, block)
     own = tuple((key, value) for key, value in values.items()
                 if key.startswith((f'{block}.home.', f'{block}.loops.')))
     return _structure(description, block, values[f'{block}.base'], values[f'{block}.tool'],
                       values[drives_key(block)], own)
+
+
+def axis_mechanism(mass: float, gravity: float) -> Mechanism:
+    """Return a carriage on a slide, at the slope at which gravity along it is what is given.
+
+    Parameters
+    ----------
+    mass : float
+        [kg]
+    gravity : float
+        Along the positive direction [m/s^2]. Without any, what rubs is preload and the weight on
+        the guide, constant and unknown.
+    """
+    g = max(abs(gravity), -STANDARD_GRAVITY[2])
+    structure = _slide(gravity / g)
+    rows = np.array([structure.rows[AXIS]])
+    carriage = body_at(mass, (0.0, 0.0, 0.0), np.zeros((3, 3)))[None]
+    return Mechanism(structure, rows, carriage, np.zeros(1), (0.0, 0.0, -g),
+                     load_is_known=gravity != 0)
+
+
+@lru_cache(maxsize=64)
+def _slide(down: float) -> Structure:
+    """Return the structure of an axis; `down`, the sine of its slope."""
+    carriage = body_at(1.0, (0.0, 0.0, 0.0), np.zeros((3, 3)))
+    joint = Joint(AXIS, PRISMATIC, 'base', 'carriage', Frame(),
+                  np.array([math.sqrt(1 - down * down), 0.0, -down]))
+    return build_structure(
+        Description('', {'base': np.zeros(PARAMETERS), 'carriage': carriage}, {AXIS: joint}, ''),
+        'base', 'carriage', (AXIS,))
 
 
 @lru_cache(maxsize=64)
@@ -94,12 +132,19 @@ def _structure(description: Description, block: str, base: str, tool: str,
                            lock_others=block == ARM)
 
 
-def _require_one_motor_each(description: Description, drives: tuple[str, ...], block: str) -> None:
+def _require_motors(description: Description, values: Mapping[str, Any], block: str) -> None:
+    """Raise ModelError where joints share a transmission, and the file does not say how."""
+    drives = set(values[drives_key(block)])
+    mapped = {key.removeprefix(MOTORS).partition('.')[2] for key in values
+              if key.startswith(MOTORS)}
     for each in coupled(description):
-        if set(each.joints) & set(drives):
+        shared = [name for name in each.joints if name in drives]
+        if set(shared) - mapped:
+            turns = ', '.join(f'{name}: 1.0' for name in shared)
             raise ModelError(
                 drives_key(block), list(each.joints), 'have a motor each, but share a transmission '
-                f'{each.kind.lower()} in the URDF: coupled joints are not covered')
+                f'{each.kind.lower()} in the URDF: write friction: {{motors: {{MOTOR: {{{turns}}}'
+                '}}, turns of each motor per turn of its joints')
 
 
 def coupled(description: Description) -> list[Transmission]:
@@ -130,10 +175,10 @@ def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[st
         if joint.spring is not None:
             stiffness, relaxed = joint.spring
             block_of_effect = f'{name}: {{stiffness: {stiffness:g}, position: {relaxed:g}}}'
-            way = ('take its stiffness off, and write effects: {active: [drive_spring], '
-                   f'drive_spring: {{{block_of_effect}}}}}'
-                   if name in structure.drives else 'springs of passive joints are not covered')
-            raise ModelError(f'{block}.mjcf', name, f'have no spring ({stiffness:g}): {way}')
+            effect = 'drive_spring' if name in structure.drives else 'joint_spring'
+            raise ModelError(f'{block}.mjcf', name, f'have no spring ({stiffness:g}): take its '
+                             f'stiffness off, and write effects: {{active: [{effect}], '
+                             f'{effect}: {{{block_of_effect}}}}}')
         if name in structure.drives:
             continue
         if joint.armature:
@@ -165,6 +210,29 @@ def joint_radii(values: Mapping[str, Any]) -> dict[str, float]:
             if key.startswith('friction.joints.') and key.endswith('.radius') and value}
 
 
+def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
+    """Return the turns of motors per turn of each drive, of those that the file names.
+
+    Raises
+    ------
+    ModelError
+        For a joint that is no drive, and a motor that moves fewer than two.
+    """
+    rows: dict[str, dict[str, float]] = {}
+    for key, value in values.items():
+        if key.startswith(MOTORS):
+            motor, _, joint = key.removeprefix(MOTORS).partition('.')
+            if joint not in structure.drives:
+                raise UnknownNameError('drive', joint, structure.drives, f'{MOTORS}{motor}')
+            rows.setdefault(motor, {})[joint] = value
+    for motor, ratios in rows.items():
+        if sum(value != 0 for value in ratios.values()) < 2:
+            raise ModelError(f'{MOTORS}{motor}', ratios, 'move two joints or more: one that moves '
+                             'one has its friction in friction.viscous and friction.coulomb')
+    return {motor: tuple(ratios.get(drive, 0.0) for drive in structure.drives)
+            for motor, ratios in rows.items()}
+
+
 def passive_friction(structure: Structure, values: Mapping[str, Any]) -> Iterator[LinkageFriction]:
     """Yield the model's own friction in passive joints and loops, if it has any."""
     blocks: dict[str, dict[str, float]] = {}
@@ -182,4 +250,4 @@ def passive_friction(structure: Structure, values: Mapping[str, Any]) -> Iterato
             raise ModelError(f'friction.joints.{name}.radius', blocks[name]['radius'],
                              'be greater than 0 beside coulomb: the load rubs at it [m]')
     if blocks:
-        yield LinkageFriction(structure, blocks)
+        yield LinkageFriction(blocks)

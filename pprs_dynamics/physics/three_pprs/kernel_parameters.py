@@ -5,10 +5,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from pprs_dynamics.arrays import Value
 from pprs_dynamics.physics.mechanism.vectors import Vector
+
+REVOLUTE, SPHERICAL = 'revolute', 'spherical'  # names of the joints C_i and A_i
 
 
 class Chain(NamedTuple):
@@ -62,3 +65,31 @@ class RobotParameters(NamedTuple):
     platform: PlatformBody
     masses: tuple[ChainMasses, ChainMasses, ChainMasses]
     gravity: Vector
+
+
+class Joints(NamedTuple):
+    """Friction of C_i and of A_i: c [N m s/rad], M [N m] at any load, mu [1] and d [m]."""
+
+    c_r: Value = 0.0
+    M_r: Value = 0.0
+    mu_r: Value = 0.0
+    d_r: Value = 0.0
+    c_s: Value = 0.0
+    M_s: Value = 0.0
+    mu_s: Value = 0.0
+    d_s: Value = 0.0
+
+    @classmethod
+    def of(cls, blocks: Mapping[str, Mapping[str, float]]) -> Joints:
+        """Return the friction of blocks `revolute` and `spherical`; 0 for what is left out.
+
+        Parameters
+        ----------
+        blocks : mapping of str to mapping
+            `viscous`, `torque`, `coulomb` and `radius`.
+        """
+        return cls(*(
+            factor * block.get(key, 0.0)
+            for block in (blocks.get(REVOLUTE, {}), blocks.get(SPHERICAL, {}))
+            for key, factor in (('viscous', 1.0), ('torque', 1.0), ('coulomb', 1.0),
+                                ('radius', 2.0))))

@@ -52,6 +52,7 @@ from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
     rod_normal,
 )
 from pprs_dynamics.physics.three_pprs.kernel_parameters import (
+    REVOLUTE,
     ChainMasses,
     PlatformBody,
     RobotParameters,
@@ -278,8 +279,10 @@ def solve_bodies(
     samples = len(motion)
     force, guide_load = np.empty((samples, 6)), np.empty((samples, 6))
     reactions = np.empty((samples, 18))
-    loads = (np.zeros((samples, 9)) if load is None
-             else np.concatenate((load.wrench, np.broadcast_to(load.hinge, (samples, 3))), axis=1))
+    loads = np.zeros((samples, 9))
+    if load is not None:
+        loads[:, :6] = load.wrench
+        loads[:, 6:] = load.torques.get(REVOLUTE, 0.0)
     parameters = robot.kernel_parameters.extended(BodyParameters, printed)
     evaluate(body_kernel, parameters, motion.rows, chains, inverse, loads, force, guide_load,
              reactions)

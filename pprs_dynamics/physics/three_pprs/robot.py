@@ -5,25 +5,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from math import inf
+from typing import Any, ClassVar
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.evaluation import KernelParameters
+from pprs_dynamics.physics.mechanism.places import BodyPlace, PassiveJoint
+from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.vectors import ChainVector, Vector, in_base
 from pprs_dynamics.physics.three_pprs.kernel_parameters import (
+    REVOLUTE,
+    SPHERICAL,
     Chain,
     ChainMasses,
     GeometryParameters,
+    Joints,
     PlatformBody,
     RobotParameters,
 )
 
-AXIS = 'axis'  # the drive of a single axis
+RODS = 'rods'
 ELBOWS = ('up', 'down')
 
 
@@ -177,11 +185,71 @@ class Robot:
     masses : Masses
     gravity : 3 floats
         Gravity acceleration in `base` [m/s^2].
+    radii : 2 floats
+        At which loads of C_i and A_i rub [m], where known.
     """
 
     geometry: Geometry
     masses: Masses
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    radii: tuple[float, float] = (0.0, 0.0)
+
+    # Its bodies and passive joints are three of a kind each, which no two of them are alike to.
+    structure: ClassVar[None] = None
+    motors: ClassVar[Mapping[str, tuple[float, ...]]] = {}
+
+    @property
+    def passive_joints(self) -> tuple[PassiveJoint, ...]:
+        """The joints C_i, and the joints A_i."""
+        revolute, spherical = self.radii
+        return (PassiveJoint(REVOLUTE, revolute),
+                PassiveJoint(SPHERICAL, spherical, has_position=False))
+
+    @property
+    def tool_place(self) -> BodyPlace:
+        """Where a payload is: at the centre of mass of platform and payload."""
+        return BodyPlace('platform', (0.0, 0.0, 0.0), inf, is_spread=True)
+
+    @property
+    def link_places(self) -> tuple[BodyPlace, ...]:
+        """The rods, all three alike."""
+        return (BodyPlace(RODS, (0.0, 0.0, 0.0), inf, is_spread=True),)
+
+    @property
+    def moved_mass(self) -> float:
+        """Mass of all bodies [kg]: left open."""
+        return inf
+
+    @property
+    def numbers(self) -> Array:
+        """All that forces follow from, in one row."""
+        return self.kernel_parameters.row
+
+    def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
+                       ) -> Joints:
+        """Return friction of joints as `MechanismState.against_friction` takes it."""
+        return Joints.of(blocks)
+
+    def heavier(self, link: str, mass: float) -> Robot:
+        """Return the robot with a payload, or with rods, that weigh more [kg].
+
+        They are not held to what a real body can have: see `with_masses`.
+        """
+        if link == RODS:
+            return self.with_masses(rods=tuple(m_b + mass for m_b in self.masses.rods))
+        return self.with_masses(payload=self.masses.payload + mass)
+
+    def with_masses(self, **masses: Any) -> Robot:
+        """Return the robot with some fields of `Masses` changed.
+
+        They are not held to what a real body can have: a fit looks at one coefficient at a time,
+        and an inertia about one axis alone belongs to no body. Who asks for the masses of a real
+        robot makes `Masses` of them again, which checks.
+        """
+        altered = copy.copy(self.masses)
+        for name, value in masses.items():
+            object.__setattr__(altered, name, value)
+        return replace(self, masses=altered)
 
     @cached_property
     def kernel_parameters(self) -> KernelParameters[RobotParameters]:

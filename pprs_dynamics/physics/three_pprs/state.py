@@ -5,10 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -17,47 +17,16 @@ from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.three_pprs.forward_motion import platform_rates
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import ChainKinematics, chain_table
 from pprs_dynamics.physics.three_pprs.jacobians import Jacobians, inverse_table
 from pprs_dynamics.physics.three_pprs.joint_rates import turnover_table
+from pprs_dynamics.physics.three_pprs.kernel_parameters import REVOLUTE, Joints
+from pprs_dynamics.physics.three_pprs.passive_joints import resistance_table, transferred
 from pprs_dynamics.physics.three_pprs.rigid_body import RigidBody, solve_bodies
 from pprs_dynamics.physics.three_pprs.robot import Geometry, Robot
 
-
-class DriveStates(Protocol):
-    """Protocol of N samples of D drives, whatever they move, as effects on drives take them."""
-
-    @property
-    def drives(self) -> tuple[str, ...]:
-        """Names of the drives."""
-
-    @property
-    def time(self) -> Array | None:
-        """[s], (N,), where known."""
-
-    @property
-    def position(self) -> Array:
-        """[m], (N, D)."""
-
-    @property
-    def velocity(self) -> Array:
-        """[m/s], (N, D)."""
-
-    @property
-    def acceleration(self) -> Array:
-        """[m/s^2], (N, D)."""
-
-    @property
-    def direction(self) -> Array:
-        """Sign of the velocities, sgn, (N, D)."""
-
-    @property
-    def guide_load(self) -> Array:
-        """[N], (N, D)."""
-
-    @property
-    def transmitted(self) -> Array:
-        """What gears or screws pass on to the mechanism, without friction [N], (N, D)."""
+POSITION_STEP = 3e-5  # of a rod's length, for derivatives by a drive's position
 
 
 class MechanismKinematics:
@@ -166,6 +135,11 @@ class MechanismState:
         return self.motion.time
 
     @property
+    def channels(self) -> Mapping[str, Array]:
+        """What was measured of the drives beside their motion."""
+        return self.motion.channels
+
+    @property
     def position(self) -> Array:
         """Drive positions q [m]."""
         return self.kinematics.drive_motion[0]
@@ -194,6 +168,58 @@ class MechanismState:
     def direction(self) -> Array:
         """Sign of the drive velocities, sgn, turning over within the reversal velocity."""
         return self.kinematics.direction(self.reversal.velocity)
+
+    def __getitem__(self, samples: Any) -> MechanismState:
+        """Return the samples that a slice, a mask or indices select, with their load."""
+        return replace(self._along(self.motion[samples]),
+                       load=None if self.load is None else self.load.at(samples))
+
+    def _along(self, motion: PlatformMotion) -> MechanismState:
+        """Return a state of the same robot along another motion."""
+        kinematics = self.kinematics
+        return replace(self, motion=motion, kinematics=MechanismKinematics(
+            kinematics.geometry, motion, kinematics.minimum_sine, kinematics.condition_limit))
+
+    @property
+    def position_step(self) -> float:
+        """By which a drive is moved for derivatives [m]."""
+        return POSITION_STEP * self.robot.geometry.rod_length
+
+    def moved(self, drive: int, step: float) -> MechanismState:
+        """Return the state with a drive at other positions, to first order; all move as before."""
+        from scipy.spatial.transform import Rotation  # here: commands start without it
+
+        move = step * self.jacobians.J[:, :, drive]
+        turned = Rotation.from_quat(self.motion.orientation)
+        rates = platform_rates(self.robot.geometry, PlatformMotion.at_rest(
+            self.motion.position + move[:, :3],
+            (Rotation.from_rotvec(move[:, 3:]) * turned).as_quat()),
+            self.velocity, self.acceleration).with_channels(self.channels)
+        return self._along(rates if self.time is None else rates.with_time(self.time))
+
+    @property
+    def tool_velocity(self) -> Array:
+        """Velocity of o and angular velocity of the platform, in `base`, (N, 6)."""
+        return np.concatenate((self.motion.linear_velocity, self.motion.angular_velocity), axis=1)
+
+    def joint_position(self, joint: str) -> Array:
+        """Return the angles u_i of the joints C_i, (N, 3) [rad]."""
+        assert joint == REVOLUTE
+        angle: Array = np.arctan2(self.chains.sin_u, self.chains.cos_u)
+        return angle
+
+    def resistances(self, joints: Joints) -> Array:
+        """Return k_ri and k_si at the frictionless reactions, (N, 6) [N m s/rad], Eq. (9)."""
+        return resistance_table(joints, self.rigid_body.reaction_table,
+                                self.kinematics.turnover(self.reversal.rate))
+
+    def against_friction(self, joints: Joints, printed: bool = False) -> Array:
+        """Return the drive forces against friction of passive joints, (N, 6) [N].
+
+        By virtual power: a virtual motion of a drive moves every passive joint, Eq. (12).
+        """
+        return transferred(self.robot.geometry.kernel_parameters, self.kinematics.chain_table,
+                           self.kinematics.inverse_table, self.resistances(joints), printed)
 
     def turning_over(self, reversal: Reversal) -> MechanismState:
         """Return the state with a sgn of other widths; all else is computed once for both."""

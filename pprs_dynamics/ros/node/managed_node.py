@@ -1,36 +1,115 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A managed node that knows its state and refuses impossible transitions."""
+"""Managed nodes: their states, the topics that come and go with them, and how they start."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
+from pprs_dynamics.ros.messages.status_codes import Code
+from pprs_dynamics.ros.node.parameters import own_parameter
 from pprs_dynamics.ros.node.rclpy_internals import destroy_state_machine
+from pprs_dynamics.ros.node.status import StatusReporter
 
 CHANGE_STATE = '/change_state'
+AUTOSTART = own_parameter('autostart', True, 'true: active at once; false: a supervisor configures '
+                          'and activates the node', stays=True)
 
 
 class ManagedNode(LifecycleNode):
-    """A managed node.
+    """A managed node that knows its state and refuses impossible transitions.
+
+    A node calls `begin` at the end of its making, when `_status` is there.
 
     Attributes
     ----------
     state : str
-        Label of the state that the last transition led to, which rclpy shows in no public way;
-        to be set in every transition.
+        Label of the state that the last transition led to, which rclpy shows in no public way.
     """
+
+    _status: StatusReporter
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
         self.state = 'unconfigured'
+        self._failure: Exception | None = None
         for service in self.services:
             if service.srv_name.endswith(CHANGE_STATE):
                 service.callback = self._refusing(service.callback)
+
+    @abstractmethod
+    def _create_topics(self) -> None:
+        """Create what there is between configuration and cleanup."""
+
+    @abstractmethod
+    def _destroy_topics(self) -> None:
+        """Take away whatever of it is there."""
+
+    def _last_word(self) -> None:
+        """Do what must be done before nothing is answered any more."""
+
+    def begin(self, autostart: bool) -> None:
+        """Wait for a supervisor, or go through its transitions.
+
+        Raises
+        ------
+        Exception
+            What a transition failed of.
+        """
+        self._enter('unconfigured', 'UNCONFIGURED', 'waiting to be configured')
+        for trigger in (self.trigger_configure, self.trigger_activate) if autostart else ():
+            if trigger() != TransitionCallbackReturn.SUCCESS:
+                raise self._failure or RuntimeError(f'{trigger.__name__} failed')
+
+    def _enter(self, state: str, code: Code, message: str) -> None:
+        self.state = state
+        self._status.report('OK', code, message)
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Create topics; messages that arrive from now on are dropped until activation."""
+        try:
+            self._create_topics()
+        except Exception as error:
+            # rclpy would swallow it; a supervisor gets the transition's failure and this line.
+            self._failure = error
+            self.get_logger().error(f'cannot be configured: {error}')
+            self._destroy_topics()
+            return TransitionCallbackReturn.FAILURE
+        self._enter('inactive', 'INACTIVE', 'waiting to be activated')
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Answer messages from now on."""
+        self._enter('active', 'WAITING', 'waiting for the first message')
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Answer nothing any more."""
+        self._last_word()
+        self._enter('inactive', 'INACTIVE', 'waiting to be activated')
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Take the topics away."""
+        self._destroy_topics()
+        self._enter('unconfigured', 'UNCONFIGURED', 'waiting to be configured')
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """End for good; the process goes on telling so until it is stopped."""
+        self._last_word()
+        self._destroy_topics()
+        self._enter('finalized', 'FINALIZED', 'shut down')
+        return super().on_shutdown(state)
+
+    def finish(self) -> None:
+        """Do what must be done before the process ends."""
+        self._last_word()
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Go where rclpy goes after a transition that failed."""

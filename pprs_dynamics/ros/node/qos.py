@@ -12,7 +12,7 @@ from typing import Any
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
 
 from pprs_dynamics.errors import ModelError
@@ -24,6 +24,8 @@ EVERY_MESSAGE = QoSProfile(depth=100)
 # The same for measurements that wait for a node that has work to do on them: a machine that is
 # busy with other things for a second loses no sample at 1 kHz.
 MEASURED = QoSProfile(depth=1000)
+# The same of a publisher that offers no more than best effort.
+OFFERED = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 # Of setpoints the latest count: after a standstill those that waited would be executed in one
 # burst, seconds late. A hiccup of 20 ms at 500 Hz loses none.
 SETPOINTS = QoSProfile(depth=10)

@@ -24,6 +24,9 @@ except ImportError:
     DiagnosticArray = None
 
 WINDOW = 1000  # durations that are summed up
+# On /diagnostics STALE is the word of an aggregator that hears nothing: a stream that broke off is
+# an error that the node tells.
+TOLD_AS = {'STALE': 'ERROR'}
 
 
 class StatusReporter:
@@ -87,7 +90,8 @@ class StatusReporter:
         self._publisher.publish(String(data=json.dumps(content)))
         if self._diagnostics is not None:
             status = DiagnosticStatus(
-                level=bytes([LEVELS.index(level)]), name=self._node.get_fully_qualified_name(),
+                level=bytes([LEVELS.index(TOLD_AS.get(level, level))]),
+                name=self._node.get_fully_qualified_name(),
                 message=f'{code}: {message}', hardware_id=self._hardware,
                 values=[KeyValue(key=key, value=str(value))
                         for key, value in {**self._counters, **self.facts}.items()

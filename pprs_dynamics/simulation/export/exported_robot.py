@@ -37,13 +37,10 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.physics.mechanism.linkage import survey
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.structure import build_structure
-from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.model.axis_model import AxisModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.three_pprs.robot import AXIS, Robot
+from pprs_dynamics.physics.three_pprs.robot import Robot
 from pprs_dynamics.simulation.export.expressed import (
-    STANDARD_GRAVITY,
     URDF,
     Expressed,
     express,
@@ -144,10 +141,8 @@ def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
     if isinstance(model, DriveModel):
         robot = with_bodies(model.robot, model.effects)
         name, mechanism = 'three_pprs', _platform(robot, model, kind)
-    elif isinstance(model, ArmModel):
-        name, mechanism = model.block, with_bodies(model.robot, model.effects)
     else:
-        name, mechanism = 'single_axis', _axis(model)
+        name, mechanism = model.block, with_bodies(model.robot, model.effects)
     return ExportedRobot(name, mechanism, expressed.joints, tuple(_bodies(mechanism)))
 
 
@@ -191,20 +186,6 @@ def _inertia(name: str, parameters: Array) -> tuple[float, Array, Array, Array]:
     # What rounding left of the triangle's rule, which simulators take to the letter.
     moments[2] = min(moments[2], moments[0] + moments[1])
     return mass, centre, moments, axes
-
-
-def _axis(model: AxisModel) -> Mechanism:
-    """Return the axis, on the slope where gravity along it is what the model says."""
-    g = max(abs(model.gravity), -STANDARD_GRAVITY[2])
-    up = -model.gravity / g
-    direction = np.array([math.sqrt(1 - up * up), 0.0, up])
-    carriage = body_at(model.mass, (0.0, 0.0, 0.0), np.zeros((3, 3)))
-    joint = Joint(AXIS, PRISMATIC, 'base', 'carriage', Frame(), direction)
-    description = Description('', {'base': np.zeros(PARAMETERS), 'carriage': carriage},
-                              {AXIS: joint}, '')
-    structure = build_structure(description, 'base', 'carriage', (AXIS,))
-    rows = np.array([structure.rows[AXIS]])
-    return Mechanism(structure, rows, structure.inertial[rows], np.zeros(1), (0.0, 0.0, -g))
 
 
 def _platform(robot: Robot, model: DriveModel, kind: str) -> Mechanism:

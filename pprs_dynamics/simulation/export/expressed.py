@@ -21,17 +21,15 @@ from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
 from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
-from pprs_dynamics.physics.effects.laws.passive_friction import WholeMechanismFriction
-from pprs_dynamics.physics.effects.laws.revolute_friction import RevoluteFriction
-from pprs_dynamics.physics.effects.laws.revolute_stiffness import RevoluteStiffness
+from pprs_dynamics.physics.effects.laws.joint_spring import JointSpring
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.arm_model import ArmModel
-from pprs_dynamics.physics.model.axis_model import AxisModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import Model, build_model
+from pprs_dynamics.physics.three_pprs.passive_friction import WholeMechanismFriction
 
 MJCF, URDF = 'mjcf', 'urdf'
 FORMATS = (URDF, MJCF)
@@ -50,11 +48,8 @@ OF_DRIVES: Mapping[type[Effect], Mapping[str, str]] = {
     DriveInertia: {'mass': ARMATURE},
     DriveSpring: {'stiffness': STIFFNESS, 'position': SPRINGREF},
 }
-OF_PASSIVE = {'viscous': DAMPING, 'torque': FRICTION}
-OF_HINGES: Mapping[type[Effect], Mapping[str, str]] = {
-    RevoluteFriction: {'viscous': DAMPING, 'torque': FRICTION},
-    RevoluteStiffness: {'stiffness': STIFFNESS, 'angle': SPRINGREF},
-}
+OF_PASSIVE = {'viscous': DAMPING, 'torque': FRICTION, 'stiffness': STIFFNESS,
+              'position': SPRINGREF}
 
 
 @dataclass(frozen=True)
@@ -84,6 +79,10 @@ class _Sorting:
         self.model, self.kind, self.held = model, kind, HELD[kind]
         self.loops = [loop.name for loop in model.robot.structure.loops] if isinstance(
             model, ArmModel) else []
+        # Joints of a format that passive joints of the model are; those without do not turn alone.
+        self.passive = {
+            one.name: HINGES if isinstance(model, DriveModel) else (one.name,)
+            for one in model.robot.passive_joints if one.has_position}  # type: ignore[attr-defined]
         self.joints: dict[str, dict[str, float]] = {}
         self.left: list[str] = []
         self.values = dict(model.values)
@@ -135,13 +134,8 @@ class _Sorting:
             names = OF_DRIVES[type(effect)]
             return self.take({drive: {names[key]: value for key, value in values.items()}
                               for drive, values in effect.drives.items()})
-        if type(effect) in OF_HINGES:
-            values = effect.values  # type: ignore[attr-defined]
-            names = OF_HINGES[type(effect)]
-            return self.take({hinge: {names[key]: value for key, value in values.items()}
-                              for hinge in HINGES})
-        if isinstance(effect, JointFrictionEffect):
-            return self._holds_friction(effect.values)
+        if isinstance(effect, (JointFrictionEffect, JointSpring)):
+            return self._holds_in_joints(effect.values)
         # A change of bodies and no force beside them; in URDF, which has none, not of gravity.
         return isinstance(effect, BodyEffect) and (
             type(effect).load is BodyEffect.load and type(effect).apply is BodyEffect.apply) and (
@@ -152,15 +146,15 @@ class _Sorting:
         robot = self.model.robot
         return bool(np.any(np.subtract(effect.changed(robot).gravity, robot.gravity)))
 
-    def _holds_friction(self, values: Mapping[str, float]) -> bool:
-        """Sort friction of passive joints, by `<joint>.<parameter>`: all of it or none."""
+    def _holds_in_joints(self, values: Mapping[str, float]) -> bool:
+        """Sort what is in passive joints, by `<joint>.<parameter>`: all of it or none."""
         joints: dict[str, dict[str, float]] = {}
         for key, value in values.items():
             joint, _, parameter = key.rpartition('.')
-            if value and (joint in self.loops or parameter not in OF_PASSIVE):
+            if value and (joint not in self.passive or parameter not in OF_PASSIVE):
                 return False
-            if value:
-                joints.setdefault(joint, {})[OF_PASSIVE[parameter]] = value
+            for one in self.passive.get(joint, ()) if value else ():
+                joints.setdefault(one, {})[OF_PASSIVE[parameter]] = value
         return self.take(joints)
 
 
@@ -177,8 +171,6 @@ def express(model: ForceModel, kind: str) -> Expressed:
         _sort_platform(model, sorting)
     elif isinstance(model, ArmModel):
         _sort_arm(model, sorting)
-    else:
-        _sort_drive_friction(model, sorting, 'axis')
     for effect in model.effects:
         if effect.name in model.values.get(ACTIVE, ()):
             sorting.add(effect)
@@ -205,16 +197,14 @@ def _sort_platform(model: DriveModel, sorting: _Sorting) -> None:
     sorting.exchange('equations', 'corrected')
 
 
-def _sort_drive_friction(model: ForceModel, sorting: _Sorting, block: str) -> None:
-    sorting.keep(f'{block}.viscous', model.drives, DAMPING)
-    sorting.keep(f'{block}.coulomb', model.drives, FRICTION)
-    sorting.drop(f'{block}.offset')
-
-
 def _sort_arm(model: ArmModel, sorting: _Sorting) -> None:
     """Sort rotors and friction, also of passive joints; of these no loads."""
-    _sort_drive_friction(model, sorting, 'friction')
-    sorting.keep(f'{model.block}.armature', model.drives, ARMATURE)
+    friction = 'friction' if model.is_described else model.block
+    sorting.keep(f'{friction}.viscous', model.drives, DAMPING)
+    sorting.keep(f'{friction}.coulomb', model.drives, FRICTION)
+    sorting.drop(f'{friction}.offset')
+    if model.is_described:
+        sorting.keep(f'{model.block}.armature', model.drives, ARMATURE)
     for key in model.values:
         name, _, parameter = key.removeprefix('friction.joints.').rpartition('.')
         if not key.startswith('friction.joints.') or parameter == 'radius':
@@ -227,11 +217,11 @@ def _sort_arm(model: ArmModel, sorting: _Sorting) -> None:
 
 def _under_standard_gravity(model: ForceModel, sorting: _Sorting) -> None:
     """Take the gravity that is assumed where a file has none."""
-    if isinstance(model, AxisModel):
-        # The axis is put at a slope that gives its share of it.
-        most = -STANDARD_GRAVITY[2]
-        sorting.exchange('axis.gravity', min(max(model.gravity, -most), most))
-    elif isinstance(model, ArmModel):
+    if isinstance(model, ArmModel) and model.is_described:
         sorting.exchange(f'{model.block}.gravity', STANDARD_GRAVITY)
+    elif isinstance(model, ArmModel):
+        # The axis is put at a slope that gives its share of it.
+        most, along = -STANDARD_GRAVITY[2], model.values['axis.gravity']
+        sorting.exchange('axis.gravity', min(max(along, -most), most))
     else:
         sorting.exchange('gravity', STANDARD_GRAVITY)

@@ -34,7 +34,6 @@ from pprs_dynamics.simulation.export.writers import closures
 
 # The motion where no recording is given: rests, reverses every drive, and takes seconds.
 DURATION, RATE = 8.0, 100.0  # [s, Hz]
-AXIS_STROKE, AXIS_PERIODS = 0.05, 4  # [m], of a single axis
 
 
 class Replay:
@@ -185,12 +184,8 @@ def _excitation(model: ForceModel) -> Any:
     time = np.arange(0.0, DURATION, 1 / RATE)
     if isinstance(model, DriveModel):
         return Excitation(duration=DURATION).motion(time)
-    if isinstance(model, ArmModel):
-        return draw_motion(model, DURATION, 0)
-    rate = 2 * np.pi * AXIS_PERIODS / DURATION
-    position = AXIS_STROKE * np.sin(rate * time)[:, None]
-    velocity = AXIS_STROKE * rate * np.cos(rate * time)[:, None]
-    return JointMotion(position, velocity, -rate ** 2 * position, time)
+    assert isinstance(model, ArmModel)
+    return draw_motion(model, DURATION, 0)
 
 
 def _close(mujoco: Any, spec: Any, robot: ExportedRobot) -> None:

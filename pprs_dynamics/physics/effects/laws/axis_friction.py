@@ -12,7 +12,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import Effect
-from pprs_dynamics.physics.three_pprs.state import DriveStates
+from pprs_dynamics.physics.mechanism.drive_states import DriveStates
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import cos, sin
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.mechanism import Mechanism
-from pprs_dynamics.physics.three_pprs.robot import Robot
 
 
 class BaseTilt(BodyEffect):
@@ -50,7 +48,7 @@ class BaseTilt(BodyEffect):
         'effort at rest must change with the angle',
         'Khalil, Dombre, Modeling, Identification and Control of Robots, 2002')
 
-    def changed(self, robot: Robot | Mechanism) -> Robot | Mechanism:
+    def changed(self, robot: Any) -> Any:
         """Return the robot under the turned gravity."""
         g_x, g_y, g_z = robot.gravity
         x, y = self.values['x'], self.values['y']

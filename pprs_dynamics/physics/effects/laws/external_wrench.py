@@ -10,15 +10,13 @@ L.-W. Tsai, Robot Analysis, 1999, on statics by virtual work.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.mechanism import LinkageState
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 FORCES = tuple(f'force_{axis}' for axis in 'xyz')
 MOMENTS = tuple(f'moment_{axis}' for axis in 'xyz')
@@ -58,7 +56,7 @@ class ExternalWrench(BodyEffect):
         'tell a downward force from a payload',
         'Tsai, Robot Analysis, 1999')
 
-    def load(self, state: MechanismState | LinkageState) -> StructureLoad:
+    def load(self, state: Any) -> StructureLoad:
         """Return the wrench, the same for every sample."""
         wrench = np.array([self.values[p.name] for p in self.parameters])
         return StructureLoad(np.tile(wrench, (len(state.velocity), 1)))

@@ -18,70 +18,40 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any, ClassVar, Self
 
-import numpy as np
-
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.added_body import flattened, nested
-from pprs_dynamics.physics.effects.effect import ARM, Card, Effect, Parameter
+from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
-from pprs_dynamics.physics.mechanism.alike import proportional_joints
-from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
-from pprs_dynamics.physics.mechanism.mechanism import LinkageState, Mechanism
+from pprs_dynamics.physics.mechanism.alike import alike_joints
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.mechanism.structure import Structure
 
 RADIUS = 0.01  # [m] at which a load rubs where the model does not say
-ROTATING = ('spherical', 'revolute', 'universal')
-
-
-def friction_rows(structure: Structure) -> dict[str, tuple[int, int]]:
-    """Return joints that move and rotating loops by name: joint of the tables or -1, loop or -1."""
-    held = set(structure.mobility.held.tolist())
-    joints = {name: (row, -1) for name, row in structure.rows.items()
-              if int(structure.tables.coordinate[row]) not in held}
-    return joints | {loop.name: (-1, k) for k, loop in enumerate(structure.loops)
-                     if loop.kind in ROTATING}
-
-
-def friction_table(structure: Structure, blocks: Mapping[str, Mapping[str, float]],
-                   reversal: Reversal) -> JointFriction:
-    """Return the table of some joints' friction.
-
-    Parameters
-    ----------
-    structure : Structure
-    blocks : mapping of str to mapping
-        `viscous`, `torque`, `coulomb` and `radius` by joint; 0 where one is left out, but the
-        radius of a slide, which is 1.
-    reversal : Reversal
-        In drives by their velocity, in all others by their rate, or that of slides.
-    """
-    widths = dict(zip(structure.drives, reversal.widths(len(structure.drives)).tolist(),
-                      strict=True))
-    rows = friction_rows(structure)
-    joint, loop = (np.array([rows[name][side] for name in blocks], dtype=np.int64)
-                   for side in (0, 1))
-    viscous, torque, coulomb = (
-        np.array([float(block.get(key, 0.0)) for block in blocks.values()])
-        for key in ('viscous', 'torque', 'coulomb'))
-    slides = [row >= 0 and not structure.tables.turns[row] for row in joint]
-    radius = np.array([1.0 if slide else float(block.get('radius', 0.0))
-                       for slide, block in zip(slides, blocks.values(), strict=True)])
-    return JointFriction(joint, loop, viscous, torque, coulomb * radius,
-                         np.array([widths.get(name, reversal.slide if slide else reversal.rate)
-                                   for name, slide in zip(blocks, slides, strict=True)]))
 
 
 class JointFrictionEffect(PassiveJointEffect):
-    """Friction of passive joints beyond the model's."""
+    """Friction of passive joints beyond the model's.
+
+    On a 3-PPRS that of its revolute joints C_i, or of its ball joints A_i, alike in all chains. It
+    goes to the drives by virtual power of the whole mechanism, whatever friction.approach is.
+    """
 
     name: ClassVar[str] = 'joint_friction'
-    acts_in = frozenset({ARM})
+    acts_in = frozenset({PLATFORM, ARM})
     is_friction: ClassVar[bool] = True
     is_of_one_place: ClassVar[bool] = True
     linear = ()
     radii: ClassVar[Mapping[str, float]] = {}
     card = Card(
+        'moment (c |w| + T + mu r F) against the motion in C_i, w = u_dot_i, or in A_i, '
+        'w = omega_n,i',
+        'errors on all six drives at once that turn over where a rod reverses its swing (C_i), or '
+        'the platform turns back against a rod (A_i), not where a drive reverses',
+        'dry, dirty or overtightened bearings at the feet of the rods, preloaded ball joints under '
+        'the platform, stiff seals and boots, cold grease',
+        'uncouple a rod from the platform, swing it by hand and turn its ball; grease the joint '
+        'and repeat; run the robot warm and compare',
+        'Itul, Pisla, 2007, Eq. (9) and (12)')
+    arm_card = Card(
         'tau -> tau + T\' (c w + (T + mu r F) sgn(w)), of one passive joint',
         'errors of several drives at once, in the proportions in which they move the joint, with '
         'the sign of its rate or growing with it',
@@ -93,14 +63,10 @@ class JointFrictionEffect(PassiveJointEffect):
 
     @classmethod
     def bound(cls, robot: Any) -> Any:
-        """Return the effect in the passive joints of a mechanism."""
-        if not isinstance(robot, Mechanism):
-            return cls
-        joints = [name for name in friction_rows(robot.structure)
-                  if name not in robot.structure.drives]
-        groups = tuple(tuple(sorted(group, key=lambda name: name not in robot.structure.drives))
-                       for group in proportional_joints(robot.structure) if len(group) > 1)
-        return _in_joints(tuple((name, robot.radii.get(name, RADIUS)) for name in joints), groups)
+        """Return the effect in the passive joints of a robot."""
+        return cls if robot is None else _in_joints(
+            tuple((one.name, one.radius or RADIUS) for one in robot.passive_joints),
+            alike_joints(robot))
 
     @classmethod
     def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
@@ -113,13 +79,12 @@ class JointFrictionEffect(PassiveJointEffect):
 
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
-        assert isinstance(state, LinkageState)
         blocks: dict[str, dict[str, float]] = nested(
             {name: value for name, value in self.values.items() if value})
         for name, block in blocks.items():
             block['radius'] = self.radii[name]
-        table = friction_table(state.robot.structure, blocks, state.reversal)
-        return state.against_friction(table)
+        force: Array = state.against_friction(state.robot.friction_table(blocks, state.reversal))
+        return force
 
 
 @cache
@@ -152,28 +117,27 @@ def _in_joints(joints: tuple[tuple[str, float], ...], alike: tuple[tuple[str, ..
 
 
 class LinkageFriction(Effect):
-    """The model's own friction in passive joints.
+    """The friction that a mechanism has in passive joints by its model file.
 
     Parameters
     ----------
-    structure : Structure
     blocks : mapping of str to mapping
-        See `friction_table`.
+        `viscous`, `torque`, `coulomb` and `radius` by joint.
     """
 
     name: ClassVar[str] = 'passive_friction'
 
-    def __init__(self, structure: Structure, blocks: Mapping[str, Mapping[str, float]]) -> None:
-        self.structure, self.blocks = structure, {name: dict(one) for name, one in blocks.items()}
-        self._tables: dict[Reversal, JointFriction] = {}
+    def __init__(self, blocks: Mapping[str, Mapping[str, float]]) -> None:
+        self.blocks = {name: dict(one) for name, one in blocks.items()}
+        self._tables: dict[Reversal, Any] = {}
 
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
-        assert isinstance(state, LinkageState)
-        return state.against_friction(self.table(state.reversal))
+        force: Array = state.against_friction(self.table(state.robot, state.reversal))
+        return force
 
-    def table(self, reversal: Reversal) -> JointFriction:
-        """Return the table of its friction; computed once for each way to turn over."""
+    def table(self, robot: Any, reversal: Reversal) -> Any:
+        """Return its friction as states of a robot take it, once for each way to turn over."""
         if reversal not in self._tables:
-            self._tables[reversal] = friction_table(self.structure, self.blocks, reversal)
+            self._tables[reversal] = robot.friction_table(self.blocks, reversal)
         return self._tables[reversal]

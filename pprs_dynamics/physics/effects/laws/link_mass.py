@@ -14,22 +14,30 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from pprs_dynamics.physics.effects.added_body import AddedBody, Place
-from pprs_dynamics.physics.effects.effect import ARM, Card
-from pprs_dynamics.physics.mechanism.alike import alike_bodies
-from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card
+from pprs_dynamics.physics.mechanism.alike import alike_links
 
 
 class LinkMass(AddedBody):
     """A body more on a link, by default where the link's centre of mass is.
 
-    The link that carries the tool is left to the payload.
+    On the rods of a 3-PPRS, all three alike, it is mass spread evenly over their length. The link
+    that carries the tool is left to the payload.
     """
 
     name: ClassVar[str] = 'link_mass'
-    acts_in = frozenset({ARM})
+    acts_in = frozenset({PLATFORM, ARM})
     is_of_one_place: ClassVar[bool] = True
     linear = ()
     card = Card(
+        'm_b -> m_b + m_+, uniform along each rod',
+        'an offset of the lifts by the weight of one rod each, errors of the slides that follow '
+        'their own accelerations, and a share that changes with the angle of each rod',
+        'joints, bolts or sensors on the rods that were not counted, tubes taken as solid or '
+        'the other way round',
+        'weigh a rod with all that swings with it',
+        'Khalil, Dombre, Modeling, Identification and Control of Robots, 2002')
+    arm_card = Card(
         'tau -> tau + what moves a body on the link: m_+ at c, with [I] about c, in its axes',
         'errors of this joint and of those that carry it, as large as the weight of the link '
         'times its distance from each axis, and in the same proportion to their accelerations; '
@@ -42,18 +50,7 @@ class LinkMass(AddedBody):
 
     @classmethod
     def bound(cls, robot: Any) -> Any:
-        """Return the effect on the links of a mechanism that have mass."""
-        if not isinstance(robot, Mechanism):
-            return cls
-        places: list[Place] = []
-        for k, name in enumerate(robot.body_names):
-            if k == robot.carrier:
-                continue
-            _, frame = robot.structure.links[name]
-            centre = frame.inverse.of_point(robot.inertial[k, 1:4] / robot.inertial[k, 0])
-            x, y, z = (round(float(each), 6) for each in centre)
-            places.append((f'{name}.', name, (x, y, z), float(robot.masses[k])))
-        # What the link that carries the tool does as well is a payload.
-        groups = tuple(tuple(robot.body_names[k] for k in sorted(
-            group, key=lambda k: k != robot.carrier)) for group in alike_bodies(robot))
-        return cls.on(tuple(places), groups, float(robot.masses.sum()))
+        """Return the effect on the links of a robot that have mass."""
+        return cls if robot is None else cls.on(
+            tuple(Place.of(one, f'{one.link}.') for one in robot.link_places),
+            alike_links(robot), robot.moved_mass)

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
@@ -23,7 +23,6 @@ class LoadFriction(DriveEffect):
     name: ClassVar[str] = 'load_friction'
     is_friction: ClassVar[bool] = True
     at_one_load: ClassVar[str] = 'coulomb_friction'
-    needs_load: ClassVar[bool] = True
     linear = (Parameter('coefficient', 'dmu', '1', "friction coefficient beyond the model's",
                         -100.0, 100.0, scale=0.02),)
     unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}
@@ -52,6 +51,11 @@ class LoadFriction(DriveEffect):
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
         """Return (N sgn q_dot,)."""
         return (drive.guide_load * drive.direction,)
+
+    @classmethod
+    def may_show(cls, covered: DriveRange) -> bool:
+        """Return whether the guide carries anything that is known."""
+        return covered.is_loaded
 
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:

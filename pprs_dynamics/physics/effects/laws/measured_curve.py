@@ -21,7 +21,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.physics.effects.effect import Card
-from pprs_dynamics.physics.three_pprs.state import DriveStates
+from pprs_dynamics.physics.mechanism.drive_states import DriveStates
 
 OWN = ('position', 'velocity', 'acceleration', 'load')  # of the drive itself
 OF = ('position', 'velocity')  # of another drive: 'position of lift_1'

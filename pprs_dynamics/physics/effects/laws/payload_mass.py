@@ -11,24 +11,20 @@ IEEE Control Systems Magazine 27 (2007), on payload identification.
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any, ClassVar
 
-from pprs_dynamics.physics.effects.added_body import AddedBody
-from pprs_dynamics.physics.effects.altered_masses import with_masses
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.mechanism import Mechanism
-from pprs_dynamics.physics.three_pprs.robot import Robot
+from pprs_dynamics.physics.effects.added_body import AddedBody, Place, body_parameters
+from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card
 
 
-class PayloadMass(BodyEffect):
-    """Mass more as a point: at the platform's centre of mass, at the origin of an arm's tool."""
+class PayloadMass(AddedBody):
+    """A body more at the tool: at the centre of mass of a 3-PPRS' platform, as a point."""
 
     name: ClassVar[str] = 'payload_mass'
     acts_in = frozenset({PLATFORM, ARM})
-    idealised: ClassVar[bool] = False
-    linear = (Parameter('mass', 'm_+', 'kg', 'mass beyond masses.payload', -1e3, 1e3,
-                        scale=0.1),)
+    places = (Place('', 'the tool', (0.0, 0.0, 0.0), inf, is_spread=True),)
+    linear = body_parameters('', 'the tool', (0.0, 0.0, 0.0), inf)[:1]
     card = Card(
         'M + m -> M + m + m_+, at the centre of mass',
         'an offset of all three lifts with the sign of the mass, about a third of its weight '
@@ -51,22 +47,5 @@ class PayloadMass(BodyEffect):
 
     @classmethod
     def bound(cls, robot: Any) -> Any:
-        """Return the body at the tool of a mechanism."""
-        if not isinstance(robot, Mechanism):
-            return cls
-        carried = float(robot.masses[robot.carrier]) if robot.carrier >= 0 else 0.0
-        return _ToolBody.on((('', robot.structure.tool, (0.0, 0.0, 0.0), carried),), (),
-                            float(robot.masses.sum()))
-
-    def changed(self, robot: Robot) -> Robot:
-        """Return the robot with the other payload."""
-        return with_masses(robot, payload=robot.masses.payload + self.values['mass'])
-
-
-class _ToolBody(AddedBody):
-    """A body at the tool of a mechanism, by default at its origin."""
-
-    name: ClassVar[str] = PayloadMass.name
-    acts_in = frozenset({ARM})
-    card = PayloadMass.card
-    arm_card = PayloadMass.arm_card
+        """Return the body at the tool of a robot."""
+        return cls if robot is None else cls.on((Place.of(robot.tool_place),), (), robot.moved_mass)

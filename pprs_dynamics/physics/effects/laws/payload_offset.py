@@ -11,12 +11,10 @@ IEEE Control Systems Magazine 27 (2007), on payload identification.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from pprs_dynamics.physics.effects.altered_masses import with_masses
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.three_pprs.robot import Robot
 
 
 class PayloadOffset(BodyEffect):
@@ -43,8 +41,8 @@ class PayloadOffset(BodyEffect):
         'their sign',
         'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
 
-    def changed(self, robot: Robot) -> Robot:
+    def changed(self, robot: Any) -> Any:
         """Return the robot with the other centre of mass."""
         x, y, z = robot.masses.centre
         d_x, d_y, d_z = (self.values[axis] for axis in 'xyz')
-        return with_masses(robot, centre=(x + d_x, y + d_y, z + d_z))
+        return robot.with_masses(centre=(x + d_x, y + d_y, z + d_z))

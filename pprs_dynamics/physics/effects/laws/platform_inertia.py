@@ -11,12 +11,10 @@ IEEE Control Systems Magazine 27 (2007), on payload identification.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from pprs_dynamics.physics.effects.altered_masses import with_masses
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.three_pprs.robot import Robot
 
 MOMENTS, PRODUCTS = ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
 
@@ -42,8 +40,8 @@ class PlatformInertia(BodyEffect):
         'grow with the square of the frequency',
         'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
 
-    def changed(self, robot: Robot) -> Robot:
+    def changed(self, robot: Any) -> Any:
         """Return the robot with the other inertia."""
         inertia = tuple(moment + self.values[p.name] for moment, p in zip(
             robot.masses.inertia, self.parameters, strict=True))
-        return with_masses(robot, inertia=inertia)
+        return robot.with_masses(inertia=inertia)

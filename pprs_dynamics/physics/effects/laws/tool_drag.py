@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Drag on the platform: a force in proportion to its velocity.
+"""Drag on the tool, as on a platform: a force in proportion to its velocity.
 
 References
 ----------
@@ -10,25 +10,25 @@ F. M. White, Fluid Mechanics, on creeping flow.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.three_pprs.state import MechanismState
 
 
-class PlatformDrag(BodyEffect):
-    """Force c v against the velocity of o, and moment c_r omega against the turning."""
+class ToolDrag(BodyEffect):
+    """Force c v against the velocity of the tool's origin, moment c_r omega against its turning."""
 
-    name: ClassVar[str] = 'platform_drag'
+    name: ClassVar[str] = 'tool_drag'
+    acts_in = frozenset({PLATFORM, ARM})
     is_friction: ClassVar[bool] = True
     linear = (
-        Parameter('coefficient', 'c', 'N s/m', 'force per velocity of the platform', -1e6, 1e6,
+        Parameter('coefficient', 'c', 'N s/m', 'force per velocity of the tool', -1e6, 1e6,
                   scale=1.0),
-        Parameter('rotational', 'c_r', 'N m s/rad', 'moment per angular velocity of the platform',
+        Parameter('rotational', 'c_r', 'N m s/rad', 'moment per angular velocity of the tool',
                   -1e6, 1e6, 0.0, scale=0.01))
     variants = (('coefficient',), ('coefficient', 'rotational'))
     unphysical_below: ClassVar[dict[str, float]] = {'coefficient': 0.0, 'rotational': 0.0}
@@ -41,10 +41,13 @@ class PlatformDrag(BodyEffect):
         'repeat with the tool out of the medium; repeat at half the speed: the error must halve, '
         'where dry friction would stay',
         'White, Fluid Mechanics')
+    arm_card = Card(
+        'tau = J^T (c v, c_r omega)',
+        'errors on several drives that follow the velocity of the tool, in the proportions of its '
+        'Jacobian, and not that of one drive',
+        card.causes, card.confirm, card.reference)
 
-    def load(self, state: MechanismState) -> StructureLoad:
+    def load(self, state: Any) -> StructureLoad:
         """Return (c v, c_r omega)."""
-        motion = state.motion
-        wrench = np.concatenate((self.values['coefficient'] * motion.linear_velocity,
-                                 self.values['rotational'] * motion.angular_velocity), axis=1)
-        return StructureLoad(wrench)
+        c = [self.values['coefficient']] * 3 + [self.values['rotational']] * 3
+        return StructureLoad(np.array(c) * state.tool_velocity)

@@ -1,0 +1,572 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+r"""What a reference run says of another recording: its forces known in part, and how well.
+
+.. math::
+
+    y_r = X_r \theta + \delta(s_r) + n_r, \qquad
+    y_l = X_l \theta + \rho\,\delta(s_l) + \sqrt{1 - \rho^2}\,\delta'(s_l) + n_l
+
+y are the errors of the model, theta the numbers of its base, and delta what no number of it
+explains but repeats: in each drive the sum of two Gaussian processes, one over the states of all
+drives, s = (q / l_q, tanh(v / v_0) / l_v), and one over its own, which other paths meet again, of
+standard deviations sigma of the drive's own. delta' is drawn anew for every run. Given y_r,
+X_l theta + delta(s_l) is Gaussian: its mean is carried over, and the principal directions of its
+covariance are columns of unit prior. Near the states of the reference the errors of the base
+cancel; far from them what is known is what the prior says.
+
+The process is a finite sum, Phi(s) w, over states of the reference that a pivoted Cholesky factor
+of the kernel chooses. States of the recording that they do not reach get features of their own,
+of which the reference says nothing.
+
+References
+----------
+M. C. Kennedy, A. O'Hagan, Bayesian calibration of computer models, J. R. Stat. Soc. B 63 (2001).
+S. Fine, K. Scheinberg, Efficient SVM training using low-rank kernel representations, J. Mach.
+Learn. Res. 2 (2001) (pivoted Cholesky factor).
+"""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.fit.arm_fit import (
+    OF_JOINT,
+    ArmColumns,
+    base_prior,
+    numbers_at,
+    own_spread,
+)
+from pprs_dynamics.inference.regression.base_columns import BaseColumn, ReferenceDirection
+from pprs_dynamics.inference.regression.design import CarriedOver, Design
+from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.residuals.measuring import MOTION, join_tables, treated_table
+from pprs_dynamics.inference.residuals.reconstruction import Reconstruction, reconstruct
+from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.explained_effort import little_explained
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.reference_keys import DIRECTIONS, RESIDUAL
+from pprs_dynamics.system.plain_text import displayed
+
+Integers = np.typing.NDArray[np.int_]
+
+# States that a process is told by, over all drives and over one, and of a recording beyond them.
+MOST_STATES, MOST_OWN, MOST_NEW = 100, 40, 50
+LEAST_VARIANCE = 0.05  # of the kernel, that a further state must bring
+SLOW = 0.3  # of the rms speed of a drive: within it direction turns over
+# Tried: in standard deviations of the positions, and in turns of the directions.
+LENGTHS = tuple((position, speed) for position in (0.5, 1.5) for speed in (0.7, 2.0))
+OWN_LENGTHS = (0.3, 1.0)  # of what is of one drive's own state
+ROUNDS = 3  # of the size of the process
+LEAST_INFORMATION = 0.1  # of a direction of the base, in units of its prior's
+LEAST_LENGTH = 200  # samples after treatment: a few seconds
+LEAST_REPEATS = 0.1  # of the process in two runs, below which nothing of it is carried over
+BLOCKS = 4  # of a single reference, each predicted from the others
+MOST_KEPT = 400  # means of a reference that a model file keeps
+MOST_DIRECTIONS = 48  # that become columns
+
+
+class ReferenceRunError(PprsError, ValueError):
+    """A reference that says nothing of a model or a recording."""
+
+
+@dataclass(frozen=True)
+class States:
+    """Where drives are and which way they move, in lengths over which forces are alike.
+
+    Parameters
+    ----------
+    centre, spread, speed : (D,) array
+        [rad, m], [rad/s, m/s].
+    lengths : tuple of float
+        Of positions in spreads, and of directions.
+    """
+
+    centre: Array
+    spread: Array
+    speed: Array
+    lengths: tuple[float, float] = (1.0, 1.0)
+
+    @classmethod
+    def of(cls, residuals: Residuals) -> States:
+        """Return the scales of a recording."""
+        q, v = _motion(residuals)
+        return cls(q.mean(axis=0), np.maximum(q.std(axis=0), 1e-9),
+                   np.maximum(SLOW * np.sqrt((v ** 2).mean(axis=0)), 1e-9))
+
+    def at(self, residuals: Residuals, drive: int | None = None) -> Array:
+        """Return the states of all drives in a recording, or of one, (M, k)."""
+        q, v = _motion(residuals)
+        position, direction = (q - self.centre) / self.spread, np.tanh(v / self.speed)
+        if drive is None:
+            return np.concatenate((position / self.lengths[0], direction / self.lengths[1]), axis=1)
+        return np.stack((position[:, drive] / OWN_LENGTHS[0],
+                         direction[:, drive] / OWN_LENGTHS[1]), axis=1)
+
+
+def _motion(residuals: Residuals) -> tuple[Array, Array]:
+    return residuals.variables['position'], residuals.variables['velocity']
+
+
+def kernel(a: Array, b: Array) -> Array:
+    """Return the correlation of forces at states (n, k) and (m, k), (n, m).
+
+    Matern's of order 3/2: continuous forces with kinks that are no steps.
+    """
+    squares = (a ** 2).sum(axis=1)[:, None] + (b ** 2).sum(axis=1) - 2 * a @ b.T
+    r = np.sqrt(3 * np.maximum(squares, 0.0))
+    correlation: Array = (1 + r) * np.exp(-r)
+    return correlation
+
+
+def factor_of(states: Array, most: int, known: Array | None = None) -> tuple[Integers, Array]:
+    """Return rows and factor (M, R) of a pivoted Cholesky factorisation of the kernel.
+
+    Parameters
+    ----------
+    states : (M, k) array
+    most : int
+    known : (M, r) array, optional
+        Factor of what is known of it already.
+    """
+    before = np.zeros((len(states), 0)) if known is None else known
+    left = 1 - (before ** 2).sum(axis=1)
+    factor = np.zeros((len(states), most))
+    chosen: list[int] = []
+    while len(chosen) < most and left.max() > LEAST_VARIANCE:
+        k, row = len(chosen), int(np.argmax(left))
+        column = (kernel(states, states[row:row + 1])[:, 0] - before @ before[row]
+                  - factor[:, :k] @ factor[row, :k])
+        factor[:, k] = column / np.sqrt(column[row])
+        left = left - factor[:, k] ** 2
+        chosen.append(row)
+    return np.array(chosen, dtype=int), factor[:, :len(chosen)]
+
+
+@dataclass(frozen=True)
+class Process:
+    """A process of unit size, told by some states.
+
+    Parameters
+    ----------
+    drive : int or None
+        Over whose state; None: over those of all.
+    states : States
+    chosen : (R, k) array
+        States that it is told by.
+    root : (R, R) array
+        Lower factor of their kernel.
+    """
+
+    drive: int | None
+    states: States
+    chosen: Array
+    root: Array
+
+    @classmethod
+    def of(cls, residuals: Residuals, states: States, drive: int | None = None,
+           ) -> tuple[Process, Array]:
+        """Return that of a recording, and its features there, (M, R)."""
+        at = states.at(residuals, drive)
+        rows, factor = factor_of(at, MOST_STATES if drive is None else MOST_OWN)
+        return cls(drive, states, at[rows], factor[rows]), factor
+
+    def features(self, residuals: Residuals) -> tuple[Array, Array]:
+        """Return features of another recording: known ones (M, R), and those of new states."""
+        from scipy.linalg import solve_triangular  # here: commands start without it
+
+        at = self.states.at(residuals, self.drive)
+        known: Array = solve_triangular(self.root, kernel(self.chosen, at), lower=True).T
+        return known, factor_of(at, MOST_NEW, known)[1]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A reference run, fitted: the numbers of the base and the process, given its errors.
+
+    Parameters
+    ----------
+    model : ForceModel
+    recordings : tuple of Recording
+    processes : tuple of Process
+        That over all drives, then those of each.
+    size : (D, 2) array
+        Standard deviations of a drive's two [N].
+    repeats : (D,) array
+        Correlation of the process in two runs.
+    base : (14 n, P) array
+        Directions of unit variance of the base's numbers, those that the reference tells first.
+    coefficients, root : (Q,) and (Q, Q) arrays
+        Of told directions, then of both processes of every drive; of their covariance.
+    regression, fit : Regression, JointFit
+    names : tuple of str
+        Of the recordings, as they were given.
+    """
+
+    model: ForceModel
+    recordings: tuple[Recording, ...]
+    processes: tuple[Process, ...]
+    size: Array
+    repeats: Array
+    base: Array
+    coefficients: Array
+    root: Array
+    regression: Regression
+    fit: JointFit
+    names: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, model: ForceModel, recordings: Sequence[Recording], kept: str = '') -> Reference:
+        """Return the fit of recordings.
+
+        Parameters
+        ----------
+        model : ForceModel
+        recordings : sequence of Recording
+        kept : str, optional
+            What other recordings, to which the model was fitted, left of its numbers' uncertainty;
+            see `directions`.
+
+        Raises
+        ------
+        ReferenceRunError
+            Where they are too short, or of another robot.
+        PprsError
+            As `measure_residuals`.
+        """
+        found = [reconstruct(model, one) for one in recordings]
+        residuals = join_tables(model, [treated_table(model, one) for one in found])
+        numbers = (np.concatenate([_numbers(model, one) for one in found])
+                   if model.is_described else None)
+        return cls._fitted(model, residuals, numbers, kept, tuple(one.name for one in recordings),
+                           tuple(recordings))
+
+    @classmethod
+    def of_residual(cls, model: ForceModel, text: str, kept: str = '') -> Reference:
+        """Return the fit of what a model file keeps of its reference runs; errors as `of`."""
+        count = len(model.drives)
+        content = _as_array(text, RESIDUAL).T
+        if content.shape[1] != 5 * count + 2:
+            raise ReferenceRunError(f'{RESIDUAL}: it is of {(content.shape[1] - 2) // 5} drives, '
+                                    f'must be of {count}: fit the model again')
+        time, record = np.cumsum(content[:, 0]), np.rint(content[:, 1]).astype(int)
+        motion = dict(zip(MOTION, np.split(content[:, 2:2 + 3 * count], 3, axis=1), strict=True))
+        error, measured = np.split(content[:, 2 + 3 * count:], 2, axis=1)
+        residuals = Residuals(model.drives, time, record, measured, measured - error, {}, motion,
+                              float(np.median(content[1:, 0])), model.units)
+        numbers = numbers_at(
+            model, motion['position'], motion['velocity'], motion['acceleration'],
+            model.reversal.widths(count)) if (
+                isinstance(model, ArmModel) and model.is_described) else None
+        return cls._fitted(model, residuals, numbers, kept, (displayed(model.source),), ())
+
+    @classmethod
+    def _fitted(cls, model: ForceModel, residuals: Residuals, numbers: Array | None, kept: str,
+                named: tuple[str, ...], recordings: tuple[Recording, ...]) -> Reference:
+        names = ', '.join(named)
+        if len(residuals) < LEAST_LENGTH:
+            raise ReferenceRunError(
+                f'{names}: too short for a reference, {len(residuals)} samples after treatment, '
+                f'must be at least {LEAST_LENGTH}: record a longer run')
+        columns, base, told = _base(model, numbers, residuals, kept)
+        plain, drives = States.of(residuals), range(len(residuals.drives))
+        own = [Process.of(residuals, plain, d) for d in drives]
+        best = min((_fitted(residuals, columns, own, replace(plain, lengths=lengths))
+                    for lengths in LENGTHS), key=lambda one: one.deviance)
+        regression = Regression(residuals, (*_base_columns(columns), *(
+            column for d in drives
+            for column in _columns_of(d, (best.shared[1], own[d][1]), best.size[d]))))
+        fit = regression.at((), best.amplitudes)
+        _require_same_robot(model, residuals, columns, fit, names)
+        values, axes = np.linalg.eigh(fit.covariance)
+        parts = _parts(residuals)
+        return cls(model, recordings, (best.shared[0], *(one for one, _ in own)), best.size,
+                   _repeats(regression, fit, told, parts), base, fit.coefficients,
+                   axes * np.sqrt(np.maximum(values, 0.0)), regression, fit, named)
+
+    @property
+    def told(self) -> int:
+        """How many directions of the base's numbers it tells."""
+        shared, *own = (len(one.chosen) for one in self.processes)
+        return len(self.coefficients) - len(own) * shared - sum(own)
+
+    @property
+    def directions(self) -> str:
+        """The principal directions of the base's numbers that the recordings told, as a text.
+
+        Each of unit variance, half a precision a number: (14 n, P); '' for none.
+        """
+        told = self.told
+        if not told:
+            return ''
+        values, axes = np.linalg.eigh(self.fit.covariance[:told, :told])
+        return _as_text(self.base[:, :told] @ (axes * np.sqrt(np.maximum(values, 0.0))))
+
+    @property
+    def residual(self) -> str:
+        """Motion, errors and efforts of the recordings, means over many samples, as a text."""
+        residuals = self.regression.residuals
+        known = np.isfinite(residuals.measured).all(axis=1)
+        size = -(-int(known.sum()) // MOST_KEPT)
+        blocks = np.concatenate([
+            np.flatnonzero(known & (residuals.record == one))[
+                :int(np.sum(known & (residuals.record == one))) // size * size].reshape(-1, size)
+            for one in np.unique(residuals.record)])
+        content = np.concatenate((
+            *(residuals.variables[name] for name in MOTION), residuals.error,
+            residuals.measured), axis=1)[blocks].mean(axis=1)
+        time = residuals.time[blocks].mean(axis=1)
+        return _as_text(np.concatenate((
+            np.diff(time, prepend=time[:1])[:, None], residuals.record[blocks[:, :1]],
+            content), axis=1).T)
+
+    @property
+    def note(self) -> str:
+        """What must be known of it: whether its errors repeat; '' for nothing."""
+        if np.max(self.repeats) < LEAST_REPEATS:
+            return (f'the error of {", ".join(self.names)} does not repeat: of the reference only '
+                    'the numbers of the base are used')
+        return ''
+
+    def carried_over(self, design: Design) -> CarriedOver:
+        """Return what it says of recordings."""
+        residuals, drives, told = design.residuals, range(len(self.size)), self.told
+        samples = len(residuals)
+        shared, *own = (one.features(residuals) for one in self.processes)
+        numbers = (np.concatenate([_numbers(self.model, one) for one in design.reconstructions])
+                   @ self.base if self.base.size else np.zeros((samples, len(drives), 0)))
+        mean, together, apart, at = np.zeros((samples, len(drives))), [], [], told
+        for d in drives:
+            known = np.concatenate((shared[0], own[d][0]), axis=1)
+            new = np.concatenate([size * one[1] for size, one in zip(
+                self.size[d], (shared, own[d]), strict=True)], axis=1)
+            sizes = _sizes(self.size[d], (shared[0], own[d][0]))
+            place, repeats = slice(at, at + len(sizes)), self.repeats[d]
+            at = place.stop
+            rows = repeats * known
+            mean[:, d] = (numbers[:, d, :told] @ self.coefficients[:told]
+                          + rows @ self.coefficients[place])
+            together.append(np.concatenate((
+                numbers[:, d, :told] @ self.root[:told] + rows @ self.root[place],
+                numbers[:, d, told:]), axis=1))
+            apart.append(np.concatenate((
+                np.sqrt(1 - repeats ** 2) * sizes * known, new), axis=1))
+        return CarriedOver(mean, self._directions(replace(
+            residuals, measured=residuals.measured - mean), together, apart), float(np.mean(
+                (shared[0] ** 2).sum(axis=1) > DECISIONS.reference_known)))
+
+    def _directions(self, residuals: Residuals, together: Sequence[Array],
+                    apart: Sequence[Array]) -> tuple[ReferenceDirection, ...]:
+        """Return the principal directions of rows that noise does not hide.
+
+        Noise is that of the reference, or of the recording where that is less.
+
+        Parameters
+        ----------
+        residuals : Residuals
+        together, apart : sequence of (M, k) array
+            Of every drive; columns of unit variance, the first ones shared by all drives.
+        """
+        regression = Regression(residuals)
+        spectra = regression.fit(()).spectra
+        of_all, of_each = [], {}
+        for k, d in enumerate(regression.drives):
+            series = regression.series[d]
+            if d in self.regression.drives:
+                of_reference = np.interp(
+                    regression.bands.frequency, self.regression.bands.frequency,
+                    self.fit.spectra[self.regression.drives.index(d)])
+                spectra[k] = np.minimum(spectra[k], of_reference)
+            white = series.spread(np.sqrt(1 / spectra[k]))
+            of_all.append(series.transform(together[d][series.index].T) * white)
+            # What is of one drive alone has few directions.
+            values, axes = _principal(series.transform(apart[d][series.index].T) * white)
+            of_each[d] = [(value, apart[d] @ axis) for value, axis in zip(
+                values, axes.T, strict=True)]
+        values, axes = _principal(np.concatenate(of_all, axis=1))
+        found = [(value, {d: one @ axis for d, one in enumerate(together)})
+                 for value, axis in zip(values, axes.T, strict=True)]
+        found += [(value, {d: row}) for d, each in of_each.items() for value, row in each]
+        found.sort(key=lambda one: -one[0])
+        return tuple(ReferenceDirection(rows, 1.0) for _, rows in found[:MOST_DIRECTIONS])
+
+
+def _principal(rows: Array) -> tuple[Array, Array]:
+    """Return squares and axes of whitened rows (k, n) that count, the largest first."""
+    values, axes = np.linalg.eigh(rows @ rows.T)
+    count = int(np.sum(values > DECISIONS.reference_direction))
+    return values[::-1][:count], axes[:, ::-1][:, :count]
+
+
+def _sizes(size: Array, features: Sequence[Array]) -> Array:
+    """Return the size of each feature of a drive."""
+    return np.repeat(size, [one.shape[1] for one in features])
+
+
+def _require_same_robot(model: ForceModel, residuals: Residuals, columns: Array, fit: JointFit,
+                        names: str) -> None:
+    """Raise ReferenceRunError where a model, as far as it may be otherwise, explains little."""
+    explained = residuals.model + columns @ fit.coefficients[:columns.shape[2]]
+    little = little_explained(model, replace(residuals, model=explained))
+    if little:
+        shares = ', '.join(f'{share:.0%} of the effort of {drive}'
+                           for drive, share in little.items())
+        raise ReferenceRunError(
+            f'{names}: the model explains {shares}, must explain half of it: a reference is a run '
+            'of this robot on a day on which its model was right')
+
+
+def _as_text(array: Array) -> str:
+    scale = np.maximum(np.abs(array).max(axis=1), 1e-30).astype('<f4')
+    content = (array / scale[:, None]).astype('<f2')
+    return base64.b64encode(zlib.compress(
+        np.array(array.shape, dtype='<u4').tobytes() + scale.tobytes() + content.tobytes(), 9)
+    ).decode()
+
+
+def _as_array(text: str, key: str) -> Array:
+    try:
+        content = zlib.decompress(base64.b64decode(text, validate=True))
+        rows, columns = np.frombuffer(content, '<u4', 2)
+        scale = np.frombuffer(content, '<f4', rows, 8).astype(float)
+        share = np.frombuffer(content, '<f2', rows * columns, 8 + 4 * rows).astype(float)
+        found: Array = scale[:, None] * share.reshape(rows, columns)
+        return found
+    except (ValueError, zlib.error):
+        raise ReferenceRunError(f'{key}: it is no text that pprs fit wrote, must be taken out, or '
+                                'fit the model again') from None
+
+
+def _base(model: ForceModel, numbers: Array | None, residuals: Residuals, kept: str,
+          ) -> tuple[Array, Array, int]:
+    """Return columns (M, D, P) of told directions of the base, all directions, and P."""
+    if numbers is None:
+        return np.zeros((len(residuals), len(residuals.drives), 0)), np.zeros((0, 0)), 0
+    assert isinstance(model, ArmModel)
+    count = len(model.drives)
+    joints = numbers[..., -OF_JOINT * count:].reshape(len(numbers), count, count, OF_JOINT)
+    prior = base_prior(model, own_spread(
+        residuals.measured, joints[:, np.arange(count), np.arange(count)]))
+    if kept:
+        told_before = _as_array(kept, DIRECTIONS)
+        if len(told_before) != len(prior):
+            raise ReferenceRunError(f'{DIRECTIONS}: they are of {len(told_before)} numbers, must '
+                                    f'be of {len(prior)}: fit the model again')
+        # What it did not tell is as it was.
+        axes = np.linalg.qr(np.linalg.solve(prior, told_before), mode='complete')[0]
+        prior = np.concatenate((told_before, prior @ axes[:, told_before.shape[1]:]), axis=1)
+    columns = numbers @ prior
+    noise = np.nanmean(residuals.error ** 2, axis=0)
+    values, axes = np.linalg.eigh(np.einsum('mdp,mdq,d->pq', columns, columns, 1 / noise,
+                                            optimize=True))
+    axes, told = axes[:, ::-1], int(np.sum(values > LEAST_INFORMATION))
+    return columns @ axes[:, :told], prior @ axes, told
+
+
+def _numbers(model: ForceModel, found: Reconstruction) -> Array:
+    """Return the columns of a base's numbers on a recording, (M, n, 14 n)."""
+    assert isinstance(model, ArmModel)
+    return ArmColumns.of_motion(model, found).numbers(model.reversal.widths(len(model.drives)))
+
+
+def _base_columns(columns: Array, drives: Sequence[int] | None = None) -> list[BaseColumn]:
+    every = range(columns.shape[1]) if drives is None else drives
+    return [BaseColumn({d: columns[:, d, p] for d in every}, 1.0)
+            for p in range(columns.shape[2])]
+
+
+def _columns_of(d: int, features: Sequence[Array], size: Array) -> list[BaseColumn]:
+    return [BaseColumn({d: column}, float(one) ** -2) for column, one in zip(
+        np.concatenate(features, axis=1).T, _sizes(size, features), strict=True)]
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Processes of given lengths, their sizes by evidence."""
+
+    shared: tuple[Process, Array]
+    size: Array
+    amplitudes: Array
+    deviance: float
+
+
+def _fitted(residuals: Residuals, columns: Array, own: Sequence[tuple[Process, Array]],
+            states: States) -> _Fit:
+    shared, count = Process.of(residuals, states), columns.shape[2]
+    size = np.sqrt(np.nanmean(residuals.error ** 2, axis=0))[:, None] * np.array([0.4, 0.4])
+    amplitudes, deviance = [], 0.0
+    for d in range(len(size)):
+        features = (shared[1], own[d][1])
+        edges = count + np.cumsum([0, *(one.shape[1] for one in features)])
+        regression = Regression(residuals, (*_base_columns(columns, [d]),
+                                            *_columns_of(d, features, size[d])), drives=[d])
+        start = None
+        for _ in range(ROUNDS):
+            fit = regression.fit((), start)
+            start = fit.amplitudes
+            # Expectation of the squares given the errors: evidence rises.
+            squares = fit.coefficients ** 2 + np.diag(fit.covariance)
+            size[d] = [max(np.sqrt(np.mean(squares[a:b])), 1e-9) if b > a else 1e-9
+                       for a, b in pairwise(edges)]
+            precision = _sizes(size[d], features) ** -2.0
+            regression.columns = (*regression.columns[:count], *(
+                replace(column, precision=float(one)) for column, one in zip(
+                    regression.columns[count:], precision, strict=True)))
+        amplitudes.append(fit.amplitudes[0])
+        deviance += fit.deviance
+    return _Fit(shared, size, np.stack(amplitudes), deviance)
+
+
+def _parts(residuals: Residuals) -> Integers:
+    """Return which run each sample is of; of a single one, which block of it."""
+    if residuals.record[-1]:
+        return residuals.record
+    return np.minimum(np.arange(len(residuals)) * BLOCKS // len(residuals), BLOCKS - 1)
+
+
+def _repeats(regression: Regression, fit: JointFit, told: int, parts: Integers) -> Array:
+    """Return the correlation of the process in two runs of each drive, (D,).
+
+    Each part is predicted from the others: by how much of what they predict its errors are.
+    """
+    size, count = len(fit.coefficients), int(parts.max()) + 1
+    H, b = np.zeros((count, size, size)), np.zeros((count, size))
+    white = {}
+    for d in regression.drives:
+        series = regression.series[d]
+        index, _ = regression.local(fit, d)
+        root = series.spread(np.sqrt(regression.weights(fit, d)))
+        rows = series.inverse(regression.base[d] * root)
+        white[d] = index, rows
+        for k in range(count):
+            part = rows[:, parts[series.index] == k]
+            H[k][np.ix_(index, index)] += part[:-1] @ part[:-1].T
+            b[k, index] += part[:-1] @ part[-1]
+    prior = np.diag([column.precision for column in regression.columns])
+    found = np.full(len(regression.residuals.drives), DECISIONS.run_repeats)
+    others = [np.linalg.solve(H.sum(axis=0) - H[k] + prior, b.sum(axis=0) - b[k])
+              for k in range(count)]
+    for d, (index, rows) in white.items():
+        at = parts[regression.series[d].index]
+        known = DECISIONS.run_repeats_spread ** -2
+        pull = known * DECISIONS.run_repeats
+        for k, c in enumerate(others):
+            part = rows[:, at == k]
+            process = c[index[told:]] @ part[told:-1]
+            left = part[-1] - c[index[:told]] @ part[:told]
+            known += float(process @ process)
+            pull += float(process @ left)
+        found[d] = np.clip(pull / known, 0.0, 1.0)
+    return found

@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Reference runs by their files, those that a model file names among them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.inference.fit.reference import Reference, ReferenceRunError
+from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
+from pprs_dynamics.measurement.files.recording import Recording, read_recording
+from pprs_dynamics.measurement.files.repeats import find_repeat
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.reference_keys import (
+    DIRECTIONS,
+    HASHES,
+    RESIDUAL,
+    ReferenceFile,
+    reference_files,
+    with_reference,
+)
+from pprs_dynamics.system.plain_text import displayed
+
+RunFile = str | PathLike[str] | Recording
+OTHER = 'a reference must be another run than what is diagnosed'
+
+
+def read_reference(model: ForceModel, files: Sequence[RunFile] = (),
+                   diagnosed: Sequence[Recording] = ()) -> Reference:
+    """Return the fit of reference runs; without any, of those that the model's file names.
+
+    Parameters
+    ----------
+    model : ForceModel
+    files : sequence of path or Recording, optional
+    diagnosed : sequence of Recording, optional
+        Which none of them may be.
+
+    Raises
+    ------
+    ReferenceRunError
+        Where there is none, or it says nothing of this robot.
+    UnreadableFileError
+        Where one is not there, is not what the model was fitted to any more, or is diagnosed.
+    PprsError
+        As `read_recording` and `measure_residuals`.
+    """
+    kept_run = str(model.values.get(RESIDUAL, ''))
+    if not files and kept_run:
+        return Reference.of_residual(model, kept_run)
+    given = files or [one.path for one in _own(model)]
+    runs = [one if isinstance(one, Recording) else read_recording(one, model.recorded)
+            for one in given]
+    repeat = find_repeat(runs, diagnosed)
+    if repeat is not None:
+        raise UnreadableFileError(runs[repeat[0]].name, f'{repeat[1]}, but {OTHER}')
+    fitted_to = model.values.get(HASHES, ())
+    hashes = [samples_fingerprint(one) if isinstance(one, Recording) else fingerprint(one)
+              for one in given]
+    # What the model was fitted to already is no second evidence of its numbers.
+    kept = '' if set(hashes) & set(fitted_to) else str(model.values.get(DIRECTIONS, ''))
+    return Reference.of(model, runs, kept)
+
+
+def _own(model: ForceModel) -> tuple[ReferenceFile, ...]:
+    name = displayed(model.source or 'the model')
+    found = reference_files(model.values, model.source)
+    if not found:
+        raise ReferenceRunError(
+            f'{name} names no reference run, must be given: --reference FREE_RUN; `pprs fit '
+            'FREE_RUN --model … --output base.yaml` writes it into a model file')
+    for one in found:
+        if not one.path.exists():
+            raise UnreadableFileError(one.path, f'the reference that {name} names is not there: '
+                                      'put it back, or give it with --reference FILE')
+        if fingerprint(one.path) != one.sha256:
+            raise UnreadableFileError(
+                one.path, f'it is not what {name} was fitted to (its SHA-256 is another): fit the '
+                'model again, or take it as it is with --reference FILE')
+    return found
+
+
+def with_own_reference(model: ForceModel, recordings: Sequence[Recording],
+                       paths: Sequence[Path], keep_residual: bool = False) -> ForceModel:
+    """Return a model that names the files it was fitted to, with what they left uncertain.
+
+    Where they are no reference, as they are too short, the model as it is. With `keep_residual`
+    their errors stand in it, too: it needs no files then.
+    """
+    try:
+        reference = Reference.of(model, recordings)
+    except ReferenceRunError:
+        return model
+    files = [ReferenceFile(path.absolute(), fingerprint(path)) for path in paths]
+    return build_model(with_reference(
+        model.values, files, reference.directions, reference.residual if keep_residual else ''),
+        model.source)

@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Sets that differ by little from a set: a candidate, a drive or a coefficient less, or more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+
+from pprs_dynamics.inference.search.candidates import (
+    Candidate,
+    CandidateSet,
+    Component,
+    EffectCandidate,
+)
+from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
+from pprs_dynamics.inference.search.library import placed
+
+
+def with_instead(candidate: EffectCandidate, gone: Component, *instead: Component,
+                 ) -> EffectCandidate:
+    """Return the candidate with something else, or nothing, for one of its components."""
+    return EffectCandidate.of([*(one for one in candidate.components if one is not gone),
+                               *instead])
+
+
+def exchanged(found: CandidateSet, old: Candidate, new: Candidate) -> Candidates:
+    """Return the candidates of a set with another one for one of them."""
+    return tuple(new if c is old else c for c in found.candidates)
+
+
+def simplified(fits: FittedSets, found: CandidateSet) -> CandidateSet:
+    """Return a set without candidates and drives, and in variants, as long as that costs less."""
+    return _descended(fits, found, lambda one: [*_with_fewer(one), *_otherwise(fits, one)])
+
+
+def on_best_drives(fits: FittedSets, found: CandidateSet) -> CandidateSet:
+    """Return a set with its effects on the drives, and in the variants, in which it costs least."""
+    return _descended(fits, found, lambda one: [*_otherwise(fits, one),
+                                                *_on_more_drives(fits, one)])
+
+
+def _descended(fits: FittedSets, found: CandidateSet,
+               neighbours: Callable[[CandidateSet], Iterable[Candidates]]) -> CandidateSet:
+    while True:
+        best = min(map(fits.evaluate, neighbours(found)), key=lambda one: one.cost, default=found)
+        if not best.cost < found.cost - LEAST_IMPROVEMENT:  # both may be inadmissible: inf
+            return found
+        found = fits.refined(best)
+
+
+def _on_more_drives(fits: FittedSets, found: CandidateSet) -> Iterator[Candidates]:
+    """Yield a set with one of its effects on another drive more, as it is where it is strongest."""
+    for candidate in found.effects:
+        if candidate.drives is None:
+            continue
+        strongest = max(candidate.components, key=lambda one: fits.drop_cost(found, one))
+        for d in fits.regression.drives:
+            if d not in candidate.drives and fits.design.acts_on(candidate.effect, d):
+                yield exchanged(found, candidate, EffectCandidate.of([
+                    *candidate.components, placed(fits.design, candidate.effect, d,
+                                                  strongest.parameters, strongest.names)]))
+
+
+def _with_fewer(best: CandidateSet) -> Iterator[Candidates]:
+    for candidate in best.candidates if len(best.candidates) > 1 else ():
+        yield best.without(candidate)
+
+
+def _otherwise(fits: FittedSets, best: CandidateSet) -> Iterator[Candidates]:
+    """Yield a set with one of its effects on fewer drives, or with other coefficients."""
+    for candidate in best.effects:
+        effect = candidate.effect
+        # The drives where it matters most; fewer of them may be better though one less is not.
+        strength = {one: fits.drop_cost(best, one) for one in candidate.components}
+        ranked = sorted(candidate.components, key=lambda one: -strength[one])
+        most = 3 * fits.decisions.rival_margin
+        for count in range(1, len(ranked)):
+            if sum(strength[one] for one in ranked[count:]) < most:
+                yield exchanged(best, candidate, EffectCandidate.of(ranked[:count]))
+        if len({one.names for one in candidate.components}) > 1:
+            for names in effect.variants:
+                yield exchanged(best, candidate, EffectCandidate.of(
+                    fits.library.variant(one, names) for one in candidate.components))
+        for component in candidate.components:
+            for names in effect.variants:
+                # The others take part in every scan.
+                if names != component.names and not set(names) <= set(effect.scanned):
+                    yield exchanged(best, candidate, with_instead(
+                        candidate, component, fits.library.variant(component, names)))

@@ -1,0 +1,90 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Friction of motors that turn with several joints: A' (c m_dot + F sgn(m_dot)), m_dot = A q_dot.
+
+Differentials, wrists with motors in the forearm, parallelogram drives: a motor turns with a sum of
+joints, and what rubs at it is felt in all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.added_body import flattened, nested
+from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter
+from pprs_dynamics.physics.effects.structure_effect import StructureEffect
+from pprs_dynamics.physics.mechanism.reversal import smooth_sign
+
+
+class CoupledDrives(StructureEffect):
+    """Friction of a motor that moves more than one joint, by the map of the model file."""
+
+    name: ClassVar[str] = 'coupled_drives'
+    acts_in = frozenset({ARM})
+    is_friction: ClassVar[bool] = True
+    is_of_one_place: ClassVar[bool] = True
+    linear = ()
+    card = Card(
+        "tau -> tau + A' (c m_dot + F sgn(m_dot)), m_dot = A q_dot of one motor",
+        'a step in the efforts of several joints at once, in the proportions of the map, where a '
+        'sum of their velocities turns over; as long as one joint stands it looks like friction '
+        'of the other, and like masses where both move',
+        'differentials, wrists whose motors sit in the forearm, parallelogram drives: gear, '
+        'bearings and seals of a motor rub with its own speed, not with that of a joint',
+        'move both joints so that the motor stands (the sum of its map stays), then so that it '
+        'turns twice as fast: the friction must vanish in both, and come back in both',
+        'Gautier, Janot, Vandanjon, A new closed-loop output error method for parameter '
+        'identification of robot dynamics, IEEE Trans. Control Systems Technology 21, 2013')
+    maps: ClassVar[Mapping[str, tuple[float, ...]]] = {}
+
+    @classmethod
+    def bound(cls, robot: Any) -> Any:
+        """Return the effect in the motors of a mechanism that move more than one joint."""
+        return cls if robot is None else _in_motors(tuple(
+            (name, ratios) for name, ratios in robot.motors.items()
+            if np.count_nonzero(ratios) > 1))
+
+    @classmethod
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
+        """Build the effect from blocks by motor."""
+        return cls(cls._checked(f'effects.{cls.name}', flattened(values), complete))
+
+    def to_file(self) -> dict[str, Any]:
+        """Return blocks of the motors that it is in."""
+        return nested({name: value for name, value in self.values.items() if value})
+
+    def force(self, state: Any, memory: Any = None) -> Array:
+        """Return the drives' efforts [N m, N], (N, D)."""
+        force: Array = np.zeros_like(state.velocity)
+        widths = state.reversal.widths(state.velocity.shape[1])
+        for motor, ratios in self.maps.items():
+            row = np.array(ratios)
+            speed = state.velocity @ row
+            friction = (self.values[f'{motor}.viscous'] * speed + self.values[f'{motor}.coulomb']
+                        * smooth_sign(speed, np.asarray(np.abs(row) @ widths)))
+            force += np.outer(friction, row)
+        return force
+
+
+@cache
+def _in_motors(motors: tuple[tuple[str, tuple[float, ...]], ...]) -> type[CoupledDrives]:
+    """Return the effect in motors with their maps, the turns per turn of each drive."""
+    linear: list[Parameter] = []
+    variants: list[tuple[str, ...]] = []
+    for name, _ in motors:
+        viscous, coulomb = f'{name}.viscous', f'{name}.coulomb'
+        linear += [
+            Parameter(viscous, 'c', 'N m s/rad', f'viscous friction of {name}', -1e6, 1e6, 0.0,
+                      scale=0.1),
+            Parameter(coulomb, 'F', 'N m', f'dry friction of {name}', -1e6, 1e6, 0.0, scale=0.1)]
+        variants += [(viscous,), (coulomb,), (viscous, coulomb)]
+    return type('CoupledDrives', (CoupledDrives,), {
+        'linear': tuple(linear), 'variants': tuple(variants), 'maps': dict(motors),
+        'unphysical_below': {one.name: 0.0 for one in linear}, '__module__': __name__,
+        'made_by': (_in_motors, (motors,))})

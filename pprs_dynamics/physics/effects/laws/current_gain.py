@@ -1,0 +1,99 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A torque constant that goes with temperature or position: (1 + kappa (T - T_0) + ...) F."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.drive_effect import DriveRange, DriveSamples, GainEffect
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.laws.friction_temperature import (
+    middle_temperature,
+    warmer_than,
+)
+
+# Waves of the constant in a turn of the motor: excentric, of two phases against each other, of
+# pole pairs.
+WAVES = (1, 2, 3, 4, 5, 6)
+
+
+class CurrentGain(GainEffect):
+    """Torque per current that falls as magnets warm, or ripples as the motor turns.
+
+    Efforts are currents times one constant; what the motor gives per current is another one.
+    """
+
+    name: ClassVar[str] = 'current_gain'
+    idealised: ClassVar[bool] = False
+    bends_columns: ClassVar[bool] = True
+    linear = (Parameter('temperature', 'kappa', '1/K', 'by which effort is measured too large per '
+                        'kelvin', -0.1, 0.1, 0.0, scale=0.001, expected=(0.002, 0.002)),
+              Parameter('ripple', 'a', '1', 'height of the wave over the effort', 0.0, 0.9, 0.0,
+                        scale=0.02),
+              Parameter('phase', 'phi', 'rad', 'phase of the wave at position 0', -2 * math.pi,
+                        2 * math.pi, 0.0, scale=0.5, is_angle=True))
+    shape = (Parameter('reference', 'T_0', 'degC', 'temperature at which the constant is the '
+                       "model's", -1e4, 1e4, 25.0, scale=10.0),
+             Parameter('pitch', 'p', 'm', 'distance between two waves', 1e-6, 10.0,
+                       scale=0.005, turning=(1e-6, 100.0), default=1.0))
+    coefficients = (
+        linear[0],
+        Parameter('sine', 'a cos(phi)', '1', 'share of the sine', -0.9, 0.9, scale=0.02,
+                  expected=(0.03, 0.03)),
+        Parameter('cosine', 'a sin(phi)', '1', 'share of the cosine', -0.9, 0.9, scale=0.02,
+                  expected=(0.03, 0.03)))
+    variants = (('temperature',), ('sine', 'cosine'))
+    card = Card(
+        'measured effort = (1 + kappa (T - T_0) + a sin(2 pi q / p + phi)) F',
+        'an error in proportion to the effort itself, weight, inertia and friction alike, that '
+        'grows with the temperature of the drive, or is a wave over its position that is higher '
+        'the larger the effort is, and of force_ripple none where the effort is 0',
+        'magnets lose 0.1 to 0.2 % of their flux per kelvin; windings and poles that differ, '
+        'offsets and gains of current sensors that differ by phase make torque ripple with the '
+        'current',
+        'hold a known load, cold and warm, and read the current; creep to and fro with and '
+        'without the load: the wave must grow with it (if it does not: force_ripple)',
+        'Gautier and Briot, Global identification of joint drive gains and dynamic parameters '
+        'of robots, 2014')
+
+    @classmethod
+    def shares(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
+        """Return (T - T_0, sin, cos of 2 pi q / p)."""
+        turn = 2 * math.pi * drive.position / shape['pitch']
+        return warmer_than(drive, shape['reference']), np.sin(turn), np.cos(turn)
+
+    @classmethod
+    def may_show(cls, covered: DriveRange) -> bool:
+        """Return whether a temperature changed, or waves of a motor are known to pass."""
+        return bool(middle_temperature(covered)[1]) or covered.gear_ratio > 1
+
+    @classmethod
+    def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
+        """Return temperatures about those measured, and waves of the motor."""
+        middle, span = middle_temperature(covered)
+        turn = 2 * math.pi / covered.gear_ratio
+        pitches = ([turn / waves for waves in WAVES] if covered.gear_ratio > 1 else [1.0])
+        return [*({'reference': middle + share * span, 'pitch': pitches[0]}
+                  for share in ((-1.0, 0.0, 1.0) if span else (0.0,))),
+                *({'reference': middle, 'pitch': pitch} for pitch in pitches[1:])]
+
+    @classmethod
+    def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
+        """Return kappa, a cos(phi) and a sin(phi)."""
+        a, phi = values['ripple'], values['phase']
+        return {'temperature': values['temperature'], 'sine': a * math.cos(phi),
+                'cosine': a * math.sin(phi)}
+
+    @classmethod
+    def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
+        """Return kappa, height and phase of the wave."""
+        sine, cosine = coefficients['sine'], coefficients['cosine']
+        return {'temperature': coefficients['temperature'], 'ripple': math.hypot(sine, cosine),
+                'phase': math.atan2(cosine, sine)}

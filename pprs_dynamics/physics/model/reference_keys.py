@@ -1,0 +1,68 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Reference runs of a model file: the recordings of the day on which its numbers were right."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from pprs_dynamics.errors import ModelError, UnknownNameError
+
+REFERENCE = 'reference'
+HASHES = 'reference_sha256'
+DIRECTIONS = 'reference_directions'
+RESIDUAL = 'reference_residual'
+KEYS = (REFERENCE, HASHES, DIRECTIONS, RESIDUAL)
+
+
+class ReferenceFile(NamedTuple):
+    """A reference run as a model file names it."""
+
+    path: Path
+    sha256: str
+
+
+def reference_files(values: Mapping[str, Any], source: str) -> tuple[ReferenceFile, ...]:
+    """Return the reference runs that values name, paths from the folder of their file."""
+    folder = Path(source).absolute().parent if source else Path()
+    return tuple(ReferenceFile(folder / name, sha256) for name, sha256 in zip(
+        values.get(REFERENCE, ()), values.get(HASHES, ()), strict=True))
+
+
+def with_reference(values: Mapping[str, Any], files: Sequence[ReferenceFile],
+                   directions: str = '', residual: str = '') -> dict[str, Any]:
+    """Return values that name reference runs, and what is kept of them, in place of others."""
+    new = {REFERENCE: [str(one.path) for one in files], HASHES: [one.sha256 for one in files],
+           DIRECTIONS: directions, RESIDUAL: residual}
+    return {**{key: value for key, value in values.items() if key not in KEYS},
+            **{key: value for key, value in new.items() if value}}
+
+
+def moved(values: Mapping[str, Any], before: Path, after: Path) -> dict[str, Any]:
+    """Return values whose reference runs are named from another folder."""
+    if not values.get(REFERENCE):
+        return dict(values)
+    return {**values, REFERENCE: [os.path.relpath(before / name, after)
+                                  for name in values[REFERENCE]]}
+
+
+def check_reference(parameters: Mapping[str, Any]) -> None:
+    """Raise ModelError for reference runs that are none."""
+    for key, value in parameters.items():
+        if key.partition('_')[0] != REFERENCE:
+            continue
+        if key not in KEYS:
+            raise UnknownNameError('key', key, KEYS)
+        if key in (DIRECTIONS, RESIDUAL):
+            if not isinstance(value, str):
+                raise ModelError(key, value, 'be a text that pprs fit wrote')
+        elif isinstance(value, str) or not hasattr(value, '__len__') or not all(
+                isinstance(one, str) and one for one in value):
+            raise ModelError(key, value, 'be a list of names')
+    if len(parameters.get(REFERENCE, ())) != len(parameters.get(HASHES, ())):
+        raise ModelError(REFERENCE, list(parameters.get(REFERENCE, ())),
+                         f'have a SHA-256 each under {HASHES}: pprs fit writes both')

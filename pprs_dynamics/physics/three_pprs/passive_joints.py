@@ -1,0 +1,159 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Friction in the passive joints C_i and A_i, Eq. (9), and its drive forces by Eq. (12)."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array, Sample, Value
+from pprs_dynamics.physics.mechanism.arithmetic import sqrt
+from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
+from pprs_dynamics.physics.mechanism.vectors import in_base, plus, times
+from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
+from pprs_dynamics.physics.three_pprs.closure import (
+    DriveValues,
+    Inverse,
+    Wrench,
+    power,
+    read_inverse,
+    rod_row,
+)
+from pprs_dynamics.physics.three_pprs.inverse_kinematics import ThreeChains, read_chains
+from pprs_dynamics.physics.three_pprs.joint_rates import Turnover, relative_rate
+from pprs_dynamics.physics.three_pprs.kernel_parameters import GeometryParameters, Joints
+
+
+class JointResistance(NamedTuple):
+    """k_ri and k_si of one chain at one sample [N m s/rad]."""
+
+    revolute: Value
+    spherical: Value
+
+
+def resist(c: Any, dry: Value, turnover: Any) -> Any:
+    """Return k = c + M sgn(s)/s for dry friction M, from the turnover sgn(s)/s."""
+    return c + dry * turnover                                                  # Eq. (2), (9)
+
+
+def dry_moment(mu: Value, d: Value, load: Any) -> Any:
+    """Return the dry friction moment of a joint of diameter d under a load [N m]."""
+    return mu * d / 2.0 * load                                                 # Eq. (1)
+
+
+def joint_resistances(
+    joints: Joints, H: Any, V: Any, W: Any, V_star: Any, W_star: Any, turnover: Turnover,
+) -> JointResistance:
+    """Return k_ri and k_si of a chain under its reactions."""
+    revolute = dry_moment(joints.mu_r, joints.d_r, sqrt(V_star * V_star + W_star * W_star))
+    spherical = dry_moment(joints.mu_s, joints.d_s, sqrt(H * H + V * V + W * W))
+    return JointResistance(resist(joints.c_r, joints.M_r + revolute, turnover.revolute),
+                           resist(joints.c_s, joints.M_s + spherical, turnover.spherical))
+
+
+@each_chain
+def chain_resistances(
+    i: int, geometry: GeometryParameters, rods: ThreeChains, k: Any, printed: Any,
+) -> Wrench:
+    """Return the wrench on the platform that overcomes the friction in the joints of chain i.
+
+    What acts about u_i is brought there by the rod's row, which gives [J_u] with [J].
+
+    Notes
+    -----
+    The corrected form is exact: k_si acts on u_dot_i n_i - omega of its own chain. The printed
+    form gives the same total power and another share per drive.
+    """
+    c, chain = rods[i], geometry.chains[i]
+    k_r, k_s = k[i]
+    about_u = (k_r + k_s) * c.u_dot - (1.0 + printed) * k_s * c.omega.n        # Eq. (12)
+    against = relative_rate((1.0 - printed) * c.u_dot, c.omega)
+    about_platform = times(-k_s, in_base(chain, against))                      # Eq. (12)
+    rod = rod_row(chain, geometry.l, c.arm, c.sin_u)
+    return Wrench(times(about_u, rod.force), plus(times(about_u, rod.moment), about_platform))
+
+
+def friction_forces(
+    geometry: GeometryParameters, rods: ThreeChains, inverse: Inverse, k: Any, printed: Any,
+) -> DriveValues:
+    """Return the drive forces that overcome resistances k_ri, k_si of the chains: [J]^T w."""
+    a, b, c = chain_resistances(geometry, rods, k, printed)
+    w = Wrench(plus(a.force, plus(b.force, c.force)), plus(a.moment, plus(b.moment, c.moment)))
+    return DriveValues(_slide_forces(w, inverse),
+                       _lift_forces(w, inverse, rods))
+
+
+@each_chain
+def _slide_forces(i: int, w: Wrench, inverse: Inverse) -> Any:
+    return power(w, inverse.columns.slides[i])                                 # Eq. (11)
+
+
+@each_chain
+def _lift_forces(i: int, w: Wrench, inverse: Inverse, rods: ThreeChains) -> Any:
+    return rods[i].sin_u * power(w, inverse.columns.lifts[i])                  # Eq. (11)
+
+
+class TransferParameters(NamedTuple):
+    """Parameters of `transfer_kernel`: `printed` is 1 for Eq. (12) to the letter, else 0."""
+
+    geometry: GeometryParameters
+    printed: Value
+
+
+def transfer_kernel(
+    p: TransferParameters, s: Sample, chains: Array, inverse: Array, resistances: Array,
+    force: Array,
+) -> Any:
+    """Fill a table of forces from one of k_r, k_s."""
+    _write_forces(force, s, friction_forces(
+        p.geometry, read_chains(chains, s), read_inverse(inverse, s),
+        _read_resistances(resistances, s), p.printed))
+    return True
+
+
+@each_chain
+def _read_resistances(i: int, resistances: Any, s: Sample) -> JointResistance:
+    return JointResistance(resistances[s, i], resistances[s, CHAINS + i])
+
+
+def resistance_kernel(
+    p: Joints, s: Sample, reactions: Array, turnover: Array, resistances: Array,
+) -> Any:
+    """Fill a table of k_r, k_s."""
+    k = _resistances_at(p, reactions, turnover, s)
+    for i in range(CHAINS):
+        resistances[s, i], resistances[s, CHAINS + i] = k[i].revolute, k[i].spherical
+    return True
+
+
+@each_chain
+def _resistances_at(
+    i: int, joints: Joints, reactions: Any, turnover: Any, s: Sample,
+) -> JointResistance:
+    return joint_resistances(
+        joints, reactions[s, i], reactions[s, 3 + i], reactions[s, 6 + i], reactions[s, 12 + i],
+        reactions[s, 15 + i], Turnover(turnover[s, i], turnover[s, CHAINS + i]))
+
+
+def _write_forces(force: Any, s: Sample, forces: DriveValues) -> None:
+    for i in range(CHAINS):
+        force[s, i], force[s, CHAINS + i] = forces.slides[i], forces.lifts[i]
+
+
+def resistance_table(joints: Joints, reactions: Array, turnover: Array) -> Array:
+    """Return k_r and k_s, (N, 6), from tables of reactions and of turnovers."""
+    k = np.empty(turnover.shape)
+    evaluate(resistance_kernel, KernelParameters(joints), reactions, turnover, k)
+    return k
+
+
+def transferred(geometry: KernelParameters[GeometryParameters], chains: Array, inverse: Array,
+                k: Array, printed: bool) -> Array:
+    """Return the drive forces that overcome k_r and k_s, (N, 6) [N m s/rad], (N, 6) [N]."""
+    force = np.empty(k.shape)
+    evaluate(transfer_kernel, geometry.extended(TransferParameters, printed), chains, inverse, k,
+             force)
+    return force

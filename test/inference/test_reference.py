@@ -1,0 +1,172 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What has changed since a reference run, on an arm whose healthy friction is of no catalogue."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import made_up_arm as arm
+import numpy as np
+import pytest
+
+import pprs_dynamics as pprs
+from pprs_dynamics import ArmModel, JointMotion
+from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import ModelError, UnreadableFileError
+from pprs_dynamics.inference.fit.reference import Reference, ReferenceRunError
+from pprs_dynamics.inference.fit.reference_runs import read_reference
+from pprs_dynamics.inference.regression.design import CarriedOver, Design
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.physics.model.model_file import build_model, load_model
+from pprs_dynamics.physics.model.model_writer import write_model
+
+NOISE = 0.2
+SIZE = np.array([2.0, 1.5, 2.5])  # of what no effect of the catalogue explains
+
+
+def healthy(moved: JointMotion) -> Array:
+    """Return the forces of cables and worn guides: by places, and by directions at places."""
+    q, v = moved.position, np.tanh(moved.velocity / 0.05)
+    force: Array = SIZE * (np.tanh(3 * np.sin(4 * q + 1)) + 0.7 * v * np.cos(5 * q))
+    return force
+
+
+def run(model: ArmModel, seed: int, noise: int, change: float = 0.0) -> Recording:
+    """Return a recording of a motion, with Coulomb friction of `swing` otherwise."""
+    moved = arm.motion(20.0, seed=seed)
+    clean = arm.record(model, moved, NOISE, noise)
+    effort = clean.effort + healthy(moved)
+    effort[:, 1] += change * np.tanh(moved.velocity[:, 1] / 0.002)
+    return Recording.from_arrays(f'run_{seed}_{noise}', clean.time, clean.position,
+                                 clean.velocity, effort, clean.drives)
+
+
+def variance(carried: CarriedOver, drive: int) -> Array:
+    """Return the variance of what is carried over to a drive, (M,)."""
+    rows = [one.rows[drive] for one in carried.directions if drive in one.rows]
+    return np.sum(np.square(rows), axis=0) if rows else np.zeros(len(carried.mean))
+
+
+@pytest.fixture(scope='module')
+def machine(tmp_path_factory: pytest.TempPathFactory) -> tuple[ArmModel, Reference]:
+    model = arm.real_arm(tmp_path_factory.mktemp('arm'))
+    return model, Reference.of(model, [run(model, 0, 1)])
+
+
+def test_what_was_in_the_reference_has_not_changed(machine: tuple[ArmModel, Reference]) -> None:
+    model, _ = machine
+    again = run(model, 0, 2)
+    found = pprs.diagnose(model, again, reference=run(model, 0, 1))
+    assert found.verdict == 'adequate'
+    assert found.to_dict()['reference']['recordings'] == ['run_0_1']
+    assert found.to_dict()['reference']['covered'] > 0.95
+    assert min(found.to_dict()['reference']['explained'].values()) > 0.9
+    assert found.to_dict()['changed_since'] == []
+    # The model lacks much all the same.
+    assert min(rms_by_drive(measure_residuals(model, [again])[0]).values()) > 5 * NOISE
+    assert max(found.diagnosis.noise_floors.values()) < 2 * NOISE
+
+
+def test_a_change_of_friction_is_told_alone(machine: tuple[ArmModel, Reference]) -> None:
+    model, _ = machine
+    found = pprs.diagnose(model, run(model, 0, 3, change=0.4), reference=run(model, 0, 1))
+    assert [one.name for one in found.effects] == ['coulomb_friction']
+    assert found.effects[0].drives == ('swing',)
+    value = found.effects[0].parameters['swing.force']
+    assert abs(value.value - 0.4) < 2 * value.std < 0.2
+
+
+def test_what_is_carried_over_is_as_uncertain_as_it_is_wrong(
+        machine: tuple[ArmModel, Reference]) -> None:
+    model, reference = machine
+    design = Design.of(model, [run(model, 0, 4)])
+    carried = reference.carried_over(design)
+    left = design.residuals.error - carried.mean
+    noise = NOISE ** 2 * len(left) / len(design.reconstructions[0])  # of means over blocks
+    for d in range(3):
+        assert 0.4 < np.nanmean(left[:, d] ** 2 / (noise + variance(carried, d))) < 1.5
+
+
+def test_on_another_path_a_reference_does_no_harm(machine: tuple[ArmModel, Reference]) -> None:
+    model, reference = machine
+    design = Design.of(model, [run(model, 5, 4)])
+    before = design.residuals.error
+    after = before - reference.carried_over(design).mean
+    ratio = np.sqrt(np.nanmean(after ** 2, axis=0) / np.nanmean(before ** 2, axis=0))
+    assert np.sqrt(np.mean(ratio ** 2)) < 0.9
+
+
+def test_far_from_its_states_a_reference_knows_less(
+        machine: tuple[ArmModel, Reference]) -> None:
+    model, reference = machine
+    near, far = (reference.carried_over(Design.of(model, [run(model, seed, 4)]))
+                 for seed in (0, 5))
+    assert near.covered > 0.95 > far.covered
+    width = [np.mean([variance(carried, d) for d in range(3)]) for carried in (near, far)]
+    assert width[1] > 2 * width[0]
+
+
+def test_a_fit_names_its_runs_and_a_diagnosis_takes_them(tmp_path: Path) -> None:
+    model = arm.real_arm(tmp_path)
+    for name, one in (('free', run(model, 0, 1)), ('later', run(model, 0, 2, change=0.6))):
+        write_recording(tmp_path / f'{name}.csv', one)
+    (tmp_path / 'models').mkdir()
+    base = tmp_path / 'models' / 'base.yaml'
+    free, later = (str(tmp_path / f'{name}.csv') for name in ('free', 'later'))
+    assert main(['fit', free, '--model', str(tmp_path / 'arm.yaml'), '--output', str(base)]) == 0
+    values = load_model(base).values
+    assert list(values['reference']) == ['../free.csv']
+    assert base.stat().st_size < 50_000
+    said = tmp_path / 'said.json'
+    assert main(['diagnose', later, '--model', str(base), '--reference', '--json', str(said)]) == 0
+    content = json.loads(said.read_text())
+    assert content['changed_since'] == ['coulomb_friction']
+    # What is written elsewhere names it from there.
+    write_model(tmp_path / 'new.yaml', values, base)
+    assert list(load_model(tmp_path / 'new.yaml').values['reference']) == ['free.csv']
+    with pytest.raises(UnreadableFileError, match='a reference must be another run'):
+        pprs.diagnose(base, free, reference=())
+    with (tmp_path / 'free.csv').open('a') as file:
+        file.write('\n')
+    with pytest.raises(UnreadableFileError, match='SHA-256'):
+        read_reference(load_model(base))
+    (tmp_path / 'free.csv').unlink()
+    with pytest.raises(UnreadableFileError, match='is not there'):
+        read_reference(load_model(base))
+
+
+def test_a_model_file_that_keeps_the_residual_stands_alone(
+        machine: tuple[ArmModel, Reference], tmp_path: Path) -> None:
+    model, reference = machine
+    kept = build_model({**model.values, 'reference_residual': reference.residual}, model.source)
+    path = tmp_path / 'kept.yaml'
+    write_model(path, kept.values, model.source)
+    assert path.stat().st_size < 50_000
+    design = Design.of(model, [run(model, 0, 4)])
+    error = design.residuals.error
+    left = error - read_reference(load_model(path)).carried_over(design).mean
+    assert np.all(np.nanstd(left, axis=0) < 0.35 * np.nanstd(error, axis=0))
+
+
+def test_what_is_no_reference_is_refused(machine: tuple[ArmModel, Reference]) -> None:
+    model, _ = machine
+    whole = run(model, 0, 1)
+    with pytest.raises(ReferenceRunError, match='names no reference run'):
+        read_reference(model)
+    with pytest.raises(ReferenceRunError, match='too short'):
+        read_reference(model, [Recording.from_arrays(
+            'short', whole.time[:150], whole.position[:150], None, whole.effort[:150],
+            whole.drives)])
+    other = np.random.default_rng(0).normal(size=whole.effort.shape)
+    with pytest.raises(ReferenceRunError, match='must explain half'):
+        read_reference(model, [Recording.from_arrays(
+            'other', whole.time, whole.position, None,
+            30 * np.cumsum(other, axis=0) / 40, whole.drives)])
+    with pytest.raises(ModelError, match='SHA-256'):
+        build_model({**model.values, 'reference': ['free.csv']}, model.source)

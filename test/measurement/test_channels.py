@@ -1,0 +1,160 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What is measured of drives beside motion and effort, from files of several kinds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from pprs_dynamics.drives import RecordedDrives
+from pprs_dynamics.errors import MotionError, UnreadableFileError
+from pprs_dynamics.measurement.files.contents import Series
+from pprs_dynamics.measurement.files.guessed_columns import guess_columns
+from pprs_dynamics.measurement.files.recording import (
+    Recording,
+    describe,
+    read_recording,
+    write_recording,
+)
+from pprs_dynamics.physics.model.recorded_names import recorded_columns
+
+JOINTS = ('j1', 'j2')
+TIME = np.arange(200) * 0.01
+POSITION = np.sin(TIME[:, None] * [1.0, 1.7])
+EFFORT = 2 * np.cos(TIME[:, None] * [1.0, 1.7])
+WARM = 30 + TIME  # what j2's thermometer says, every tenth sample
+SELDOM = np.where(np.arange(200) % 10 == 0, WARM, np.nan)
+
+
+def table(path: Path, **more: np.ndarray) -> Path:
+    """Write a table of our format with further columns."""
+    columns = {'time': TIME, **{f'{joint}/{name}': values[:, k] for name, values in (
+        ('position', POSITION), ('effort', EFFORT)) for k, joint in enumerate(JOINTS)}, **more}
+    rows = zip(*columns.values(), strict=True)
+    path.write_text(','.join(columns) + '\n' + ''.join(
+        ','.join('' if np.isnan(x) else repr(float(x)) for x in row) + '\n' for row in rows))
+    return path
+
+
+def read(path: Path, **keys: Any) -> Recording:
+    columns = recorded_columns({f'columns.{key.replace("__", ".")}': value
+                                for key, value in keys.items()}, JOINTS)
+    return read_recording(path, RecordedDrives(JOINTS, columns=columns))
+
+
+def test_a_column_of_a_drive_is_its_channel_and_gaps_stay_gaps(tmp_path):
+    recording = read(table(tmp_path / 'a.csv', **{'j2/temperature': SELDOM}))
+    found = recording.channels['temperature']
+    np.testing.assert_array_equal(found[:, 1], SELDOM)
+    assert np.isnan(found[:, 0]).all()
+    assert set(recording.channels) == {'temperature'}
+    assert describe(recording).drives['j2'].channels == {
+        'temperature': (WARM[0], pytest.approx(WARM[190]))}
+    assert describe(recording).drives['j1'].channels == {}
+    assert not [one for one in recording.findings if one.kind == 'ignored_columns']
+
+
+def test_columns_of_a_model_file_and_of_the_whole_machine(tmp_path):
+    file = table(tmp_path / 'a.csv', T2=WARM, oil=WARM + 5, hall=np.full(200, 1e5))
+    found = read(file, temperature='oil', j2__temperature='T2', pressure='hall').channels
+    np.testing.assert_allclose(found['temperature'], np.column_stack([WARM + 5, WARM]))
+    np.testing.assert_allclose(found['pressure'], 1e5)
+
+
+def test_a_column_that_is_not_there_is_told(tmp_path):
+    with pytest.raises(UnreadableFileError, match="no column 'T3'; it holds T2"):
+        read(table(tmp_path / 'a.csv', T2=WARM), j2__temperature='T3')
+
+
+@pytest.mark.parametrize('name', ['run.csv', 'run.mcap', 'bag'])
+def test_what_is_written_is_read_again(tmp_path, name):
+    channels = {'temperature': np.column_stack([np.full(200, np.nan), SELDOM])}
+    written = Recording.from_arrays('x', TIME, POSITION, None, EFFORT, JOINTS, channels)
+    write_recording(tmp_path / name, written)
+    found = read(tmp_path / name).channels['temperature']
+    np.testing.assert_allclose(found, channels['temperature'])
+
+
+def test_dropped_samples_take_their_temperature_with_them():
+    broken = POSITION.copy()
+    broken[3] = np.nan
+    recording = Recording.from_arrays('x', TIME, broken, None, EFFORT, JOINTS,
+                                      {'temperature': np.column_stack([WARM, WARM])})
+    np.testing.assert_array_equal(recording.channels['temperature'][:, 0], np.delete(WARM, 3))
+
+
+def test_channels_of_other_shapes_are_told():
+    with pytest.raises(MotionError, match=r'temperature: its shape is \(200,\)'):
+        Recording.from_arrays('x', TIME, POSITION, None, EFFORT, JOINTS,
+                              {'temperature': WARM.tolist()})
+
+
+def bag(path: Path, topic: str, kind: str, messages: list[tuple[float, dict[str, Any]]]) -> Path:
+    """Write joint states, and messages of another type with their times."""
+    write_recording(path / 'states.mcap',
+                    Recording.from_arrays('x', TIME, POSITION, None, EFFORT, JOINTS))
+    store = get_typestore(Stores.ROS2_KILTED)
+
+    def header(time: float, frame: str = '') -> Any:
+        stamp = store.types['builtin_interfaces/msg/Time'](*divmod(round(time * 1e9), 10**9))
+        return store.types['std_msgs/msg/Header'](stamp=stamp, frame_id=frame)
+
+    with Writer(path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        joints = writer.add_connection('/joint_states', 'sensor_msgs/msg/JointState',
+                                       typestore=store)
+        for time, q, tau in zip(TIME, POSITION, EFFORT, strict=True):
+            message = store.types['sensor_msgs/msg/JointState'](
+                header=header(time), name=list(JOINTS), position=q, velocity=np.zeros(0),
+                effort=tau)
+            writer.write(joints, round(time * 1e9), store.serialize_cdr(
+                message, 'sensor_msgs/msg/JointState'))
+        others = writer.add_connection(topic, kind, typestore=store)
+        for time, fields in messages:
+            if 'frame' in fields:
+                fields = {**fields, 'header': header(time, fields['frame'])}
+                del fields['frame']
+            writer.write(others, round(time * 1e9), store.serialize_cdr(
+                store.types[kind](**fields), kind))
+    return path / 'bag'
+
+
+@pytest.mark.parametrize(('topic', 'frame', 'drives'), [
+    ('/drives/j2/temperature', '', (1,)), ('/motor_temperature', 'j2', (1,)),
+    ('/j2_temperature', '', (1,)), ('/gearbox/temperature', 'base', (0, 1))])
+def test_a_thermometer_belongs_to_the_drive_that_it_names(tmp_path, topic, frame, drives):
+    messages = [(t, {'frame': frame, 'temperature': 40 + t, 'variance': 0.0})
+                for t in (0.0, 0.5, 1.0)]
+    found = read(bag(tmp_path, topic, 'sensor_msgs/msg/Temperature', messages))
+    temperature = found.channels['temperature']
+    for d in (0, 1):
+        known = np.flatnonzero(np.isfinite(temperature[:, d]))
+        assert list(found.time[known] - found.time[0]) == (
+            pytest.approx([0.0, 0.5, 1.0]) if d in drives else [])
+        np.testing.assert_allclose(temperature[known, d], [40, 40.5, 41][:len(known)])
+
+
+def test_joint_states_on_a_topic_of_temperatures(tmp_path):
+    messages = [(t, {'frame': '', 'name': ['j2', 'j1'], 'position': np.array([50 + t, 20.0]),
+                     'velocity': np.zeros(0), 'effort': np.zeros(0)}) for t in (0.2, 0.4)]
+    found = read(bag(tmp_path, '/joint_temperatures', 'sensor_msgs/msg/JointState', messages))
+    np.testing.assert_allclose(found.channels['temperature'][[20, 40]], [[20, 50.2], [20, 50.4]])
+    np.testing.assert_allclose(found.effort, EFFORT)
+
+
+def test_temperatures_are_guessed_by_their_names():
+    rng = np.random.default_rng(0)
+    names = [f'{kind}_{k}' for kind in ('q', 'tau', 'joint_temperature', 'target_temp')
+             for k in (0, 1)]
+    series = [Series('t', 't', np.arange(50) * 0.01),
+              *(Series(name, name, rng.normal(size=50)) for name in names)]
+    columns = guess_columns(series, JOINTS, (3.0, 3.0)).columns
+    assert columns['j1', 'temperature'] == 'joint_temperature_0'
+    assert columns['j2', 'temperature'] == 'joint_temperature_1'
+    assert columns['j2', 'effort'] == 'tau_1'

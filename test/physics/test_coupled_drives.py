@@ -1,0 +1,137 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Friction of motors that turn with several joints, and cylinders between two links."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_up_arm import motion, write_arm
+from numpy.testing import assert_allclose
+
+from pprs_dynamics import ArmModel
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.inference.regression.design import Design, searched_in_drives
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.effects.drive_effect import DriveSamples
+from pprs_dynamics.physics.effects.laws.counterbalance import Counterbalance
+from pprs_dynamics.physics.model.model_file import build_model
+
+MAP = '{wrist: {turn: -0.5, swing: 2.0}}'
+
+
+@pytest.fixture
+def arm(tmp_path):
+    return ArmModel.load(write_arm(tmp_path, friction__motors=MAP))
+
+
+def with_effect(model, name, **values):
+    found = build_model({**model.values, 'effects.active': [name], **{
+        f'effects.{name}.{key.replace("__", ".")}': value for key, value in values.items()}},
+        model.source)
+    assert isinstance(found, ArmModel)
+    return found
+
+
+def added(model, name, at, **values):
+    return with_effect(model, name, **values).drive_forces(at).parts[name]
+
+
+def test_friction_at_the_motor_does_the_same_work_as_in_its_joints(arm):
+    at = motion()
+    force = added(arm, 'coupled_drives', at, wrist__viscous=0.7, wrist__coulomb=3.0)
+    speed = -0.5 * at.velocity[:, 0] + 2.0 * at.velocity[:, 1]
+    fast = np.abs(speed) > 0.3  # far from where it turns over
+    assert fast.mean() > 0.5
+    rubbed = 0.7 * speed ** 2 + 3.0 * np.abs(speed)
+    assert_allclose(np.sum(force * at.velocity, axis=1)[fast], rubbed[fast], rtol=1e-9)
+    # Each joint by its share of the map, the third not at all.
+    assert_allclose(force[:, 0] * 2.0, force[:, 1] * -0.5)
+    assert not force[:, 2].any()
+
+
+def test_where_the_motor_stands_its_joints_feel_nothing(arm):
+    at = motion()
+    together = at.velocity.copy()
+    together[:, 1] = 0.25 * together[:, 0]
+    still = type(at)(at.position, together, at.acceleration, at.time)
+    assert_allclose(added(arm, 'coupled_drives', still, wrist__viscous=0.7, wrist__coulomb=3.0),
+                    0.0, atol=1e-12)
+
+
+def test_no_map_is_no_candidate(tmp_path, arm):
+    plain = ArmModel.load(write_arm(tmp_path))
+    for model, expected in ((plain, 0), (arm, 2)):
+        assert len(model.bound(CATALOGUE['coupled_drives']).coefficients) == expected
+
+
+@pytest.mark.parametrize(('motors', 'sentence'), [
+    ('{wrist: {turn: 1.0, elbow: 1.0}}', 'elbow'),
+    ('{wrist: {turn: 1.0}}', 'move two joints or more'),
+    ('{wrist: {turn: 1.0, swing: fast}}', 'friction.motors.wrist.swing')])
+def test_a_map_that_cannot_be_is_told(tmp_path, motors, sentence):
+    with pytest.raises(ModelError, match=sentence):
+        ArmModel.load(write_arm(tmp_path, friction__motors=motors))
+
+
+def stretched(q, nearer, farther, place):
+    """Return the distance of two points, one of which turns."""
+    return np.linalg.norm(nearer * np.stack([np.cos(q - place), np.sin(q - place)])
+                          - [[farther], [0.0]], axis=0)
+
+
+def test_a_spring_between_links_has_the_torque_of_its_energy(arm):
+    q = np.linspace(-1.2, 1.4, 400)
+    at = motion(duration=4.0)
+    position = at.position.copy()
+    position[:, 1] = q
+    still = type(at)(position, 0 * position, 0 * position, at.time)
+    # 80 mm and 0.4 m from the axis, 3000 N/m, 0.15 m long where it pulls nothing.
+    nearer, farther, stiffness, free, place = 0.08, 0.4, 3000.0, 0.15, 0.5
+    force = added(arm, 'counterbalance', still, swing__force=-stiffness * free * farther,
+                  swing__stiffness=stiffness * farther ** 2, swing__ratio=nearer / farther,
+                  swing__position=place)
+    step = 1e-5
+    energy = [stiffness / 2 * (stretched(q + side * step, nearer, farther, place) - free) ** 2
+              for side in (-1, 1)]
+    assert_allclose(force[:, 1], (energy[1] - energy[0]) / (2 * step), rtol=1e-6, atol=1e-6)
+    assert not force[:, [0, 2]].any()
+
+
+def test_means_of_a_cylinders_columns_are_columns_of_means():
+    q = np.linspace(-1, 1, 50)
+    samples = DriveSamples(None, q, q, q, q, q, q)
+    shapes = [{'ratio': 0.4, 'position': 0.2}, {'ratio': 0.8, 'position': -2.0}]
+    for shape, columns in zip(shapes, Counterbalance.averaged(samples, 0.01, shapes), strict=True):
+        assert_allclose(columns, Counterbalance.columns(samples, **shape)[:2])
+
+
+def test_a_cylinder_pulls_with_the_pressure_that_was_measured(arm):
+    at = motion(duration=4.0)
+    pressure = 5e6 + 1e6 * np.sin(at.time)
+    measured = at.with_channels({'pressure': np.tile(pressure, (3, 1)).T})
+    shape = {'swing__ratio': 0.2, 'swing__position': 0.5, 'swing__force': 0.0}
+    force = added(arm, 'counterbalance', measured, swing__area=3e-5, **shape)
+    # The same as a constant pull of that size at every moment.
+    unit = added(arm, 'counterbalance', at, **{**shape, 'swing__force': 1.0})
+    assert_allclose(force[:, 1], 3e-5 * pressure * unit[:, 1])
+    assert not added(arm, 'counterbalance', at, swing__area=3e-5, **shape).any()
+
+
+def test_effects_that_a_recording_cannot_show_are_not_tried(arm):
+    at = motion(duration=6.0)
+    position = at.position[0] + 0.1 * (at.position - at.position[0])
+    efforts = arm.drive_forces(at).total
+
+    def searched(**more):
+        design = Design.of(arm, [Recording.from_arrays(
+            'x', at.time, position, None, efforts, arm.drives, **more)])
+        return {effect.name for effect in searched_in_drives(design)}
+
+    assert not searched() & {'counterbalance', 'friction_temperature'}
+    steady = {'temperature': np.full(position.shape, 30.0)}
+    warming = {'temperature': 30.0 + np.arange(len(position))[:, None] * np.ones(3)}
+    assert 'friction_temperature' not in searched(channels=steady)
+    assert 'friction_temperature' in searched(channels=warming)
