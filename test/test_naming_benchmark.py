@@ -17,15 +17,19 @@ from benchmarks.naming import fetch
 from benchmarks.naming.entrants import CONTROL, ENTRANTS, PEERS, Entrant
 from benchmarks.naming.entrants.controls import perfect, random, silent
 from benchmarks.naming.entrants.cross_validation import block_cross_validation
+from benchmarks.naming.entrants.equations import Equations
 from benchmarks.naming.entrants.pprs import answer_of
-from benchmarks.naming.entrants.sindy import sindy
+from benchmarks.naming.entrants.sindy import unlike
 from benchmarks.naming.entrants.spike_and_slab import spike_and_slab
 from benchmarks.naming.entrants.stepwise import stepwise
 from benchmarks.naming.generate import draws
 from benchmarks.naming.page import best_of_settings, better_than_ours, fails_table
 from benchmarks.naming.problems import Answer, AnswerError, Column, Named, Problem, Truth
+from benchmarks.naming.robots import ROBOTS, hidden_names
 from benchmarks.naming.run import enter_all, score_all
 from benchmarks.naming.scoring import FIGURES, Rate, Scored, figures, judge
+from pprs_dynamics.simulation.arm_forms import NAMES
+from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
 
 DRIVES = ('a', 'b')
 EFFECTS = ('viscous', 'coulomb', 'spring', 'offset')
@@ -210,13 +214,13 @@ def test_every_entrant_has_a_key_of_its_own() -> None:
 
 def test_of_two_settings_the_better_one_is_ranked_and_peers_ahead_are_told() -> None:
     right, wrong = (scored(perfect), scored(Answer.of([Named('offset', ('a',))])))
-    tuned = next(name for name in ENTRANTS if name.startswith('LASSO, '))
-    every = {'pprs diagnose': wrong, 'LASSO': wrong, tuned: right, 'stepwise BIC, AR': wrong}
+    tuned = next(name for name in ENTRANTS if name.startswith('stepwise BIC, white, '))
+    every = {'pprs diagnose': wrong, 'stepwise BIC, white': wrong, tuned: right, 'LASSO': wrong}
     assert best_of_settings(every)[0] == tuned
-    assert 'LASSO' not in best_of_settings(every)
+    assert 'stepwise BIC, white' not in best_of_settings(every)
     said = better_than_ours({name: every[name] for name in best_of_settings(every)})
     assert f'*exact* (0 (0-56) here): {tuned} (100 (44-100))' in said
-    assert 'stepwise' not in said
+    assert 'LASSO' not in said
     assert all(ENTRANTS[name].sort == CONTROL for name in ('silent', 'random'))
 
 
@@ -253,14 +257,26 @@ def test_peers_find_what_stands_out_of_white_noise() -> None:
         assert abs(value - 0.2) < 4 * std
 
 
-def test_columns_that_others_make_up_are_no_error_of_frols() -> None:
-    pytest.importorskip('pysindy')
+def test_frols_gets_no_columns_that_others_make_up() -> None:
     made = problem(2, {('spring', 'b'): 1.0})
-    twice = Problem(made.drives, made.time, made.error, made.base,
-                    (*made.columns, Column('twin', 'c', 'b'), Column('nothing', 'c', 'a')),
-                    np.concatenate((made.rows, made.rows[6:7], 0 * made.rows[:1])))
-    found = sindy(twice, 'FROLS').sets[0]
-    assert found[0].name in ('spring', 'twin')
+    equations = Equations(Problem(
+        made.drives, made.time, made.error, made.base,
+        (*made.columns, Column('twin', 'c', 'b'), Column('zero', 'c', 'a')),
+        np.concatenate((made.rows, made.rows[6:7], 0 * made.rows[:1]))))
+    found = unlike(equations.compressed()[0], equations.best_single())
+    assert len(found) == len(made.columns)
+    assert set(range(len(made.columns))) - set(found) <= {6}  # or its twin
+
+
+def test_as_many_rows_as_columns_say_the_same() -> None:
+    equations = Equations(problem(4, {('spring', 'b'): 1.0}))
+    rows, seen = equations.compressed()
+    assert rows.shape == (8, 8)
+    np.testing.assert_allclose(rows.T @ rows, equations.X.T @ equations.X, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(rows.T @ seen, equations.X.T @ equations.y, rtol=1e-9, atol=1e-6)
+    out = equations.blocks == 3
+    rows, seen = equations.compressed(out)
+    np.testing.assert_allclose(rows.T @ rows, equations.X[~out].T @ equations.X[~out], atol=1e-6)
 
 
 def test_whitening_keeps_quiet_where_white_noise_is_assumed_in_vain() -> None:
@@ -279,6 +295,11 @@ def test_a_diagnosis_is_an_answer_with_its_rivals() -> None:
             'indistinguishable': [['rod_mass', 'payload_mass']]}
     assert [[one.name for one in found] for found in answer_of(said).sets] == [
         ['rod_mass'], ['payload_mass']]
+
+
+def test_what_may_be_hidden_can_be_simulated() -> None:
+    for robot in ROBOTS:
+        assert set(hidden_names(robot)) <= set(IN_CATALOGUE if robot == '3-PPRS' else NAMES)
 
 
 def test_seeds_give_the_same_problems_and_names_that_tell_nothing() -> None:

@@ -30,6 +30,7 @@ MAIN = ('right', 'first', 'named', 'exact', 'wrong alone', 'false alarms', 'unkn
         'right drives', 'intervals hold')
 TOLD = 4  # entrants whose answers on real machines are printed
 LESS_IS_BETTER = ('wrong alone', 'false alarms')
+MARKERS = 'os^vDPX'
 STRENGTHS = ((0.5, 1.0), (2.0,), (5.0, 20.0))  # of the three pictures
 SHORT = {'pprs diagnose': 'pprs', 'adaptive group LASSO': 'group LASSO', 'Bayesian averaging, AR':
          'averaging', 'block cross-validation': 'block c.v.', 'held-out F-test (LISDD)': 'LISDD',
@@ -54,7 +55,8 @@ def tables(scored: Mapping[str, Scored]) -> str:
     parts = {name: scored[name] for name in ordered(scored) if sort_of(name) in (OURS, PART)}
     lines = [*main_table(best), '', better_than_ours(best), '',
              '![Right against false, weak, middle and strong effects](images/naming.png)', '',
-             'This package without each of its parts:', '', *main_table(parts), '',
+             *(['This package without each of its parts:', '', *main_table(parts), '']
+               if any(sort_of(name) == PART for name in parts) else []),
              *folded('What each fails at', fails_table(best)),
              *folded('Every figure with its counts, defaults and tuned settings both',
                      full_table(scored)),
@@ -94,7 +96,7 @@ def _said(answer: Answer) -> str:
 
 
 def main_table(scored: Mapping[str, Scored]) -> list[str]:
-    """Return the rows of the figures that matter most: per cent, and Wilson's interval."""
+    """Return the rows of the figures that matter most: per cent (Wilson's 95 % interval)."""
     every = {name: all_figures(answers) for name, answers in scored.items()}
     counts = {figure: {found[figure].count for found in every.values()} for figure in MAIN}
     shown = [figure for figure in MAIN if counts[figure] != {0}]
@@ -250,7 +252,7 @@ def draw(scored: Mapping[str, Scored], picture: Path) -> None:
     figure, panels = plt.subplots(1, len(STRENGTHS), figsize=(12, 4.8), layout='constrained',
                                   sharex=True, sharey=True)
     names = [name for name in best_of_settings(scored) if sort_of(name) != CONTROL]
-    colours = plt.get_cmap('tab20')
+    colours = plt.get_cmap('tab10')
     for axes, strengths in zip(panels, STRENGTHS, strict=True):
         for k, name in enumerate(names):
             answers = scored[name]
@@ -259,12 +261,13 @@ def draw(scored: Mapping[str, Scored], picture: Path) -> None:
                              *(j.wrong_alone for _, j in here)])
             right = Rate.of(j.exact for _, j in here)
             ours = sort_of(name) == OURS
-            colour = 'black' if ours else colours(k % 20)
+            colour = 'black' if ours else colours(k % 10)
             (left, up), (low, high) = ((100 * x for x in one.interval) for one in (wrong, right))
             x, y = 100 * wrong.share, 100 * right.share
             axes.plot([left, up], [y, y], '-', color=colour, lw=0.6, alpha=0.35)
             axes.plot([x, x], [low, high], '-', color=colour, lw=0.6, alpha=0.35)
-            axes.plot([x], [y], '*' if ours else 'o', color=colour, ms=13 if ours else 7,
+            axes.plot([x], [y], '*' if ours else MARKERS[k % len(MARKERS)], color=colour,
+                      ms=13 if ours else 7, alpha=0.85, mec='white', mew=0.5,
                       label=SHORT.get(_peer(name), _peer(name)))
         axes.set(title='SNR ' + ', '.join(f'{one:g}' for one in strengths), xlim=(-3, 103),
                  ylim=(-3, 103), xlabel='claims that are wrong [%]')

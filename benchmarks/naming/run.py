@@ -63,8 +63,8 @@ def _make(draw: Draw, folder: Path) -> str:
 
 
 def enter_all(folder: Path, entrants: Mapping[str, Entrant], workers: int,
-              minutes: float = np.inf) -> int:
-    """Let entrants answer what they have not answered yet as they are now.
+              minutes: float = np.inf, part: tuple[int, int] = (1, 1)) -> int:
+    """Let entrants answer what they have not answered yet as they are now, or a part of it.
 
     Returns
     -------
@@ -75,7 +75,8 @@ def enter_all(folder: Path, entrants: Mapping[str, Entrant], workers: int,
     keys = {name: one.key() for name, one in entrants.items()}
     todo = []
     # In an order that mixes robots: what is there when it is stopped is a sample of all.
-    for file in sorted((folder / TRUTH).glob('*.json'), key=lambda one: one.stem[::-1]):
+    files = sorted((folder / TRUTH).glob('*.json'), key=lambda one: one.stem[::-1])
+    for file in files[part[0] - 1::part[1]]:
         keys_here = {name: f'{key} {_key_of_problem(folder, file.stem)}'
                      for name, key in keys.items()}
         missing = {name: key for name, key in keys_here.items()
@@ -166,6 +167,13 @@ def reveal(folder: Path, problem: str) -> int:
     return 0
 
 
+def _part(text: str) -> tuple[int, int]:
+    number, count = (int(one) for one in text.split('/'))
+    if not 1 <= number <= count:
+        raise ValueError(text)
+    return number, count
+
+
 def main() -> int:
     """Run a step."""
     parser = argparse.ArgumentParser(description=__doc__,
@@ -182,6 +190,8 @@ def main() -> int:
     parser.add_argument('--whole', action='store_true',
                         help='leave out this package without its parts')
     parser.add_argument('--page', type=Path, help='write the table and its picture')
+    parser.add_argument('--part', type=_part, default=(1, 1), metavar='K/N',
+                        help='of N parts of the problems the K-th, for machines that share them')
     parser.add_argument('--by-all', action='store_true',
                         help='score what every entrant has answered, of a run that was stopped')
     parser.add_argument('--real', type=Path, metavar='FOLDER', help='of real machines, see real.py')
@@ -191,7 +201,8 @@ def main() -> int:
     if options.step == 'enter':
         chosen = {name: ENTRANTS[name] for name in options.entrant or ENTRANTS
                   if not options.whole or ENTRANTS[name].sort != PART}
-        return min(enter_all(options.folder, chosen, options.workers, options.minutes), 1)
+        return min(enter_all(options.folder, chosen, options.workers, options.minutes,
+                             options.part), 1)
     if options.step == 'reveal':
         return reveal(options.folder, options.problem or '')
     scored = score_all(options.folder, options.by_all)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pprs_dynamics.errors import suggestion
-from pprs_dynamics.physics.effects.catalogue import FORMER, told_general_name
+from pprs_dynamics.physics.effects.former_names import FORMER, told_general_name
 from pprs_dynamics.simulation import hidden_bodies, hidden_forces, sensors
 from pprs_dynamics.simulation.hidden_effect import (
     DriveBound,

@@ -264,7 +264,7 @@ class LinkagePlant:
         laws = [(self._viscous, self._coulomb, self._width)]
         if self._passive:
             W = linkage.twists[0][0]
-            loads = linkage.loads(self.engine.robot, with_reactions=True)
+            loads = linkage.loads(self.engine.robot)
             for table in self._passive:
                 rows.append(_relative(self.structure.tables, linkage.motion, table, W))
                 load = _loads(linkage.motion, loads, table)

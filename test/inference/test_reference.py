@@ -93,6 +93,36 @@ def test_what_is_carried_over_is_as_uncertain_as_it_is_wrong(
         assert 0.4 < np.nanmean(left[:, d] ** 2 / (noise + variance(carried, d))) < 1.5
 
 
+def test_two_runs_tell_how_far_the_machine_repeats(machine: tuple[ArmModel, Reference]) -> None:
+    model, _ = machine
+    first, same = run(model, 0, 1), run(model, 0, 2)
+    moved = arm.motion(20.0, seed=0)
+    other = Recording.from_arrays(
+        'other', same.time, same.position, same.velocity,
+        same.effort - [1.0, 0.0, 0.0] * healthy(moved), same.drives)
+    steady, loose = (Reference.of(model, [first, one]).repeats for one in (same, other))
+    assert np.all(steady > 0.98)
+    assert loose[0] < 0.8
+    assert np.all(loose[1:] > 0.98)
+    # A single one says nothing of another day.
+    assert np.all(Reference.of(model, [first]).repeats <= 0.99)
+
+
+def test_a_drive_that_stood_in_the_reference_is_told_of_by_nothing(
+        machine: tuple[ArmModel, Reference]) -> None:
+    model, _ = machine
+    whole = run(model, 0, 1)
+    effort = whole.effort.copy()
+    effort[:, 2] = np.nan
+    reference = Reference.of(model, [Recording.from_arrays(
+        'two', whole.time, whole.position, whole.velocity, effort, whole.drives)])
+    design = Design.of(model, [run(model, 0, 4)])
+    error = design.residuals.error
+    left = np.nanstd(error - reference.carried_over(design).mean, axis=0) / np.nanstd(error, axis=0)
+    assert max(left[:2]) < 0.35
+    assert 0.8 < left[2] < 1.2
+
+
 def test_on_another_path_a_reference_does_no_harm(machine: tuple[ArmModel, Reference]) -> None:
     model, reference = machine
     design = Design.of(model, [run(model, 5, 4)])

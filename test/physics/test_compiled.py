@@ -266,7 +266,7 @@ print('numba' in sys.modules, np.ptp(forces, axis=0).max() < 1e-9)
     return done.stdout.split()
 
 
-@pytest.mark.parametrize(('kind', 'pays'), [('three_pprs', 1_000), ('hexapod', 400_000)])
+@pytest.mark.parametrize(('kind', 'pays'), [('three_pprs', 1_000), ('hexapod', 200_000)])
 def test_a_program_that_soon_ends_does_not_wait_for_the_compiler(kind, pays):
     pytest.importorskip('numba')
     begin = f'evaluation.PAYS = {pays}\nevaluation.postpone_compiling()'

@@ -17,8 +17,9 @@ from random_states import random_motion
 from pprs_dynamics import DriveModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.inference.adoption.request import requested
-from pprs_dynamics.physics.effects.catalogue import CATALOGUE, FORMER
+from pprs_dynamics.inference.adoption.request import EffectRequest, requested
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.effects.former_names import FORMER
 from pprs_dynamics.physics.model.ledger import read_steps, without_last_step
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.simulation.hidden_effects import draw_effect
@@ -117,6 +118,18 @@ def test_requests_and_hidden_effects_by_names_of_old(name: str) -> None:
         assert set(hidden.truth()['parameters']) == {
             f'{FORMER[name].place}.{key}' for key in hidden.ranges}
     assert name not in CATALOGUE
+
+
+@pytest.mark.parametrize('name', ['joint_friction', 'joint_spring', 'link_mass', 'payload_mass'])
+def test_a_request_is_of_the_joints_and_links_of_the_model(name: str) -> None:
+    paper, hexapod = DriveModel.load(), load_model('config/hexapod.yaml')
+    for model in (paper, hexapod):
+        placed = EffectRequest.of(name).placed(model)
+        assert placed.effect.coefficients
+        assert placed.effect is model.bound(CATALOGUE[name])
+        # What was of another robot is of this one then.
+        assert EffectRequest.of(name).placed(hexapod).placed(paper).effect is paper.bound(
+            CATALOGUE[name])
 
 
 def test_a_name_of_old_does_not_hide_a_wrong_value() -> None:

@@ -12,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import robots_with_loops as robots
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from oracles.mujoco_loops import MujocoLoops
 from random_states import random_motion
 from scipy.spatial.transform import Rotation
@@ -19,6 +21,8 @@ from scipy.spatial.transform import Rotation
 from pprs_dynamics import ArmModel, DriveModel, JointMotion, PlatformMotion, load_model
 from pprs_dynamics.errors import ModelError, PprsError, SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism import linkage
+from pprs_dynamics.physics.mechanism.linkage_equations import Motion
+from pprs_dynamics.physics.mechanism.mechanism import Linkage
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
@@ -73,10 +77,92 @@ def test_numpy_without_a_compiler_is_the_same(tmp_path: Path, name: str,
     motion = states(model, SIZES[name])
     compiled = model.drive_forces(motion).parts
     monkeypatch.setattr(linkage, 'compiled_or_none', lambda function, samples: None)
-    slow = model.drive_forces(motion).parts
-    assert set(slow) == set(compiled)
+    on_arrays, on_floats = (model.drive_forces(motion[part]).parts
+                            for part in (slice(None), slice(3, 5)))
+    assert set(on_arrays) == set(compiled)
     for part, values in compiled.items():
-        assert slow[part] == pytest.approx(values, abs=1e-9), part
+        assert on_arrays[part] == pytest.approx(values, abs=1e-9), part
+        assert on_floats[part] == pytest.approx(values[3:5], abs=1e-9), part
+
+
+@pytest.mark.parametrize('name', ROBOTS)
+def test_efforts_of_one_pass_are_those_of_the_links_that_are_kept(tmp_path: Path, name: str,
+                                                                  ) -> None:
+    model = ArmModel.load(ROBOTS[name]().write(tmp_path, {'joints': {
+        one: {'viscous': 0.1, 'torque': 0.1, 'coulomb': 0.2, 'radius': 0.02}
+        for one in friction_rows(ArmModel.load(ROBOTS[name]().write(tmp_path)).robot.structure)}}))
+    motion = states(model, SIZES[name])
+    quick, kept = model.mechanism(motion), model.mechanism(motion)
+    kept = kept.turning_over(kept.reversal)
+    assert quick.found is not None
+    assert kept.found is None
+    assert quick.rigid_force == pytest.approx(kept.rigid_force, abs=1e-10)
+    assert quick.closed == pytest.approx(kept.closed, abs=1e-10)
+    friction = quick.friction
+    assert quick.against_friction(friction) == pytest.approx(
+        kept.against_friction(friction), abs=1e-10)
+    assert np.abs(quick.against_friction(friction)).max() > 1e-3
+
+
+WANDER = {'hexapod': 0.05, 'delta': 0.6, 'five_bar': 0.9, 'three_rrr': 0.4}
+STEPS = 60
+
+
+@settings(max_examples=5, deadline=None,
+          suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(seed=st.integers(0, 2 ** 32 - 1))
+@pytest.mark.parametrize('name', ROBOTS)
+def test_efforts_do_not_depend_on_where_the_robot_was(tmp_path: Path, name: str, seed: int,
+                                                      ) -> None:
+    """Poses anywhere and a little apart: with a state as without, wherever there is an answer."""
+    random = np.random.default_rng(seed)
+    model = ArmModel.load(ROBOTS[name]().write(tmp_path))
+    home = model.robot.structure.home[model.robot.structure.tables.drives]
+    state, q, answered = model.initial_state(), home, 0
+    for _ in range(STEPS):
+        jump = random.uniform() < 0.3
+        q = (home + WANDER[name] * random.uniform(-1, 1, len(home)) if jump
+             else q + 0.03 * WANDER[name] * random.normal(size=len(home)))
+        v, a = random.normal(size=(2, 1, len(home)))
+        motion = JointMotion(q[None], v, a)
+        try:
+            cold = model.mechanism(motion)
+            expected, closed = model.drive_forces(motion).total, cold.closed
+        except PprsError:
+            q = home
+            continue
+        answered += 1
+        found = model.drive_forces(motion, state).total
+        assert state.closed[model.robot.structure] == pytest.approx(closed[0], abs=1e-9)
+        assert found == pytest.approx(expected, abs=1e-9 * np.max(np.abs(expected)))
+    assert answered > STEPS / 4
+
+
+def test_a_state_of_the_other_assembly_is_not_gone_on_from(tmp_path: Path) -> None:
+    """A five-bar whose tip was put on the other side of its elbows: the answer is home's."""
+    model = ArmModel.load(robots.five_bar().write(tmp_path))
+    structure = model.robot.structure
+    home, evaluation = structure.home, structure.evaluation
+    rest = np.zeros((1, len(structure.drives)))
+    motion = JointMotion(home[None, structure.tables.drives], rest, rest)
+    ends = home.copy()
+    points = {name: Linkage.of(structure, motion.position, rest, rest).frame_of(name).p[0, :2]
+              for name in ('left_rod', 'right_rod')}
+    # Both rods mirrored at the line through the elbows.
+    heading = np.arctan2(*(points['right_rod'] - points['left_rod'])[::-1])
+    for side in ('left', 'right'):
+        arm, elbow = (int(structure.tables.coordinate[structure.rows[name]])
+                      for name in (side, f'{side}_elbow'))
+        ends[elbow] = 2 * (heading - home[arm]) - home[elbow]
+    rows, failed = evaluation.follow(motion.position, rest, rest, ends)
+    assert failed < 0
+    flipped = evaluation.motion(rows)
+    assert flipped.state[0, 1] * evaluation.at_home[1] < 0
+    state = model.initial_state()
+    state.closed[structure] = flipped.q[0]
+    found = model.drive_forces(motion, state).total
+    assert found == pytest.approx(model.drive_forces(motion).total, abs=1e-9)
+    assert state.closed[structure] == pytest.approx(home, abs=1e-9)
 
 
 PAPER_FRICTION = ('friction.revolute', 'friction.spherical')
@@ -250,7 +336,7 @@ def test_a_loop_that_opens_in_motion_is_refused_although_it_closed_at_home(tmp_p
     assert tips[0] == pytest.approx(tips[1], abs=1e-9)
 
 
-def energy(model: ArmModel, moved: linkage.Motion) -> np.ndarray:
+def energy(model: ArmModel, moved: Motion) -> np.ndarray:
     """Return kinetic and potential energy from masses, centres and inertia alone, (N,) [J]."""
     robot, total = model.robot, 0.0
     for row, one in zip(robot.bodies, robot.inertial, strict=True):

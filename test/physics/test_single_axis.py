@@ -211,7 +211,7 @@ def test_an_offset_that_is_known_roughly_is_found_within_its_tolerance() -> None
 
 def test_effects_of_a_platform_are_not_offered_to_an_axis() -> None:
     with pytest.raises(EffectRequestError, match='payload_mass does not act in a single axis'):
-        EffectRequest.of('payload_mass').require_place(build_model(VALUES))
+        EffectRequest.of('payload_mass').placed(build_model(VALUES))
     with pytest.raises(EffectRequestError, match='one of axis'):
         EffectRequest.of('viscous_friction:lift_1', (AXIS,))
 

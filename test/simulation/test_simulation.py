@@ -776,10 +776,10 @@ def test_stops_end_the_strokes() -> None:
 
 # House rules.
 
-# What a true motion, or a load, is handed over in; an arm's come from its model, and so do the
-# numbers that MuJoCo takes.
+# What a true motion, or a load, is handed over in, and names; an arm's come from its model, and so
+# do the numbers that MuJoCo takes.
 CONTAINERS = (
-    'pprs_dynamics.drives',
+    'pprs_dynamics.drives', 'pprs_dynamics.physics.effects.former_names',
     'pprs_dynamics.physics.mechanism.motion', 'pprs_dynamics.physics.mechanism.joint_motion',
     'pprs_dynamics.physics.mechanism.structure_load',
     'pprs_dynamics.physics.mechanism.joint_series', 'pprs_dynamics.physics.model.arm_model',
@@ -788,7 +788,8 @@ CONTAINERS = (
 # equations they share one: the friction that the model file itself gives passive joints, which
 # hides nothing. All that is hidden, and the rigid body, is the engine's or a form of its own.
 DESCRIPTION = tuple(f'pprs_dynamics.physics.mechanism.{name}' for name in (
-    'description', 'urdf', 'structure', 'closures', 'mechanism', 'linkage_equations'))
+    'description', 'urdf', 'structure', 'closures', 'mechanism', 'linkage_equations',
+    'passive_joints'))
 OF_ARMS = {'engine_state.py': DESCRIPTION,
            **dict.fromkeys(('arm_run.py', 'linkage_plant.py'), (
                *DESCRIPTION, 'pprs_dynamics.physics.effects.laws.joint_friction'))}

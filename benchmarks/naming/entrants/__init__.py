@@ -9,7 +9,7 @@ import hashlib
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import pprs_dynamics
@@ -67,8 +67,12 @@ class Entrant:
 
     def key(self) -> str:
         """Return what an answer depends on beside its problem: sources, settings, library."""
+        try:
+            library = version(self.library)
+        except PackageNotFoundError:
+            library = ''
         found = hashlib.sha256(repr((self.method.__qualname__, sorted(self.settings.items()),
-                                     self.library, version(self.library))).encode())
+                                     self.library, library)).encode())
         for file in self._sources():
             found.update(file.read_bytes())
         return found.hexdigest()[:16]
@@ -85,10 +89,11 @@ class Entrant:
 
 
 PEERS: dict[str, Entrant] = {
-    'stepwise BIC, white': Entrant(stepwise, {'whiten': False}, ('weight', (1, 3, 10, 30, 100))),
+    'stepwise BIC, white': Entrant(stepwise, {'whiten': False}, ('weight', (1, 3, 10, 30, 100)),
+                                   10),
     'stepwise BIC, AR': Entrant(stepwise, {'whiten': True}, ('weight', (1, 2, 4, 8, 16))),
     'block cross-validation': Entrant(block_cross_validation, {}, ('errors', (0, 1, 2, 4))),
-    'LASSO': Entrant(lasso, {}, ('errors', (0, 1)), 1, library='scikit-learn'),
+    'LASSO': Entrant(lasso, {}, ('errors', (0, 1)), library='scikit-learn'),
     'adaptive group LASSO': Entrant(adaptive_group_lasso, {}, ('power', (0.5, 1, 2)),
                                     library='skglm'),
     'PySINDy STLSQ': Entrant(sindy, {'optimiser': 'STLSQ'},

@@ -43,17 +43,19 @@ def sindy(problem: Problem, optimiser: str = 'STLSQ', threshold: float = 0.1,
             'SR3': lambda: pysindy.SR3(reg_weight_lam=threshold ** 2 / 2, max_iter=300),
             'FROLS': lambda: pysindy.FROLS(max_iter=int(steps))}[optimiser]()
     rows, seen = equations.compressed()
-    columns = list(range(equations.X.shape[1]))
-    if optimiser == 'FROLS':
-        # It divides by what is left of a column beside others: one shape each, and none that
-        # others, or the model's own numbers, make up.
-        columns = equations.best_single()
-        size, order = qr(rows[:, columns], mode='r', pivoting=True)
-        left = np.abs(np.diag(size))
-        columns = sorted(columns[k] for k in order[:np.count_nonzero(left > ALIKE * left[0])])
+    # FROLS divides by what is left of a column beside others.
+    columns = (unlike(rows, equations.best_single()) if optimiser == 'FROLS'
+               else list(range(equations.X.shape[1])))
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')
         made.fit(rows[:, columns], seen[:, None])
     coefficients = np.zeros(equations.X.shape[1])
     coefficients[columns] = np.ravel(made.coef_)
     return equations.answered(best_shapes(equations, coefficients))
+
+
+def unlike(rows: np.ndarray, columns: list[int]) -> list[int]:
+    """Return the columns that others, or the model's own numbers, do not make up nearly."""
+    size, order = qr(rows[:, columns], mode='r', pivoting=True)
+    left = np.abs(np.diag(size))
+    return sorted(columns[k] for k in order[:np.count_nonzero(left > ALIKE * left[0])])

@@ -83,6 +83,9 @@ def _check(options: argparse.Namespace) -> None:
     if options.refit is not None and not options.adopt_all:
         raise arguments.UsageError('--refit: it is given without --adopt-all, which adds what the '
                                    'base model is fitted again beside')
+    if options.adopt_all and options.reference is not None:
+        raise arguments.UsageError('--reference: it is given with --adopt-all, but effects are '
+                                   'added to what the model lacks by itself: take one of them out')
     if options.output and not options.adopt_all:
         raise arguments.UsageError('--output: it is given without --adopt-all, but nothing is '
                                    'written to it then; --json and --report write the answer')

@@ -23,7 +23,7 @@ from pprs_dynamics.app.commands.arguments import (
 from pprs_dynamics.app.commands.input_output import tell
 from pprs_dynamics.app.front_door.simulate import FEEDFORWARDS, NOISE, RATE, simulate
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
-from pprs_dynamics.physics.effects.catalogue import FORMER
+from pprs_dynamics.physics.effects.former_names import FORMER
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import HelicalPath

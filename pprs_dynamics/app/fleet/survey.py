@@ -115,11 +115,8 @@ class SurveyResult:
 
 def requests_of(options: str, model: ForceModel) -> tuple[EffectRequest, ...]:
     """Return the effects that options name; errors as `EffectRequest`."""
-    requests = tuple(EffectRequest.of(text.strip().replace('+', ','), tuple(model.drives))
-                     for text in options.split(',') if text.strip())
-    for request in requests:
-        request.require_place(model)
-    return requests
+    return tuple(EffectRequest.of(text.strip().replace('+', ','), tuple(model.drives)).placed(model)
+                 for text in options.split(',') if text.strip())
 
 
 def identify(path: str) -> str | None:

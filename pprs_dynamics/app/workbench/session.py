@@ -303,9 +303,7 @@ class Session:
 
     def _tick(self, effect: str, drives: Sequence[str] | None,
               chosen: Mapping[Place, float] | None = None) -> ViewState:
-        request = EffectRequest.named(effect, drives, self.drives)
-        request.require_place(self.model)
-        request = replace(request, effect=self.model.bound(request.effect))
+        request = EffectRequest.named(effect, drives, self.drives).placed(self.model)
         view = self.view_state
         offer = next((one.candidate for one in view.offers
                       if one.candidate.effect is request.effect), None)
@@ -504,8 +502,7 @@ class Session:
             self._require(revision)
             tick = self.view_state.ticks.get(effect)
             on = drives or (views.names_of(tick.best, self.drives) if tick else None)
-            request = EffectRequest.named(effect, on or None, self.drives)
-            request.require_place(self.model)
+            request = EffectRequest.named(effect, on or None, self.drives).placed(self.model)
             if 'adopt' in self.jobs and self.jobs['adopt'].is_running:
                 raise SessionError(f'{self.jobs["adopt"].what} is being adopted, must end first')
             fits, inputs = self.fits, self.inputs

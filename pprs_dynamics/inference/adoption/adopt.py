@@ -87,8 +87,8 @@ def adopt(
                                  lambda share: report(DIAGNOSIS_BEFORE_CURVE * share))
         return _adopt_curve(
             _Case(model, model, request, recordings, validate, force, diagnosis), request, report)
-    request.require_place(model)
     start = original(model)
+    request = request.placed(start)
     if diagnosis is None:
         diagnosis = diagnose(start, recordings, (), lambda share: report(DIAGNOSIS * share))
     case = _Case(model, start, request, recordings, validate, force, diagnosis)

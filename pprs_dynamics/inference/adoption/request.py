@@ -15,10 +15,10 @@ from pprs_dynamics.physics.effects.catalogue import (
     REPLACED,
     catalogue,
     find_effect,
-    told_general_name,
 )
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.former_names import told_general_name
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.model.force_model import ForceModel
 
@@ -83,12 +83,19 @@ class EffectRequest:
                                          f'must be one of {", ".join(known)}')
         return cls(effect, tuple(sorted(drives, key=known.index)))
 
-    def require_place(self, model: ForceModel) -> None:
-        """Raise EffectRequestError where the effect cannot act in what the model is of."""
+    def placed(self, model: ForceModel) -> EffectRequest:
+        """Return the request of the effect with the joints and links of what a model is of.
+
+        Raises
+        ------
+        EffectRequestError
+            Where it cannot act there.
+        """
         if not model.offers(self.effect):
             offered = [name for name, effect in catalogue().items() if model.offers(effect)]
             raise EffectRequestError(f'{self.name} does not act in {model.title}, must be one of '
                                      f'{", ".join(offered)}')
+        return replace(self, effect=model.bound(self.effect))
 
     @property
     def name(self) -> str:
@@ -108,11 +115,9 @@ def requested(text: str, model: ForceModel) -> EffectRequest | CurveRequest:
     Raises
     ------
     PprsError
-        As `EffectRequest.of`, `EffectRequest.require_place` and `CurveRequest.of`.
+        As `EffectRequest.of`, `EffectRequest.placed` and `CurveRequest.of`.
     """
     name, _, rest = text.partition(':')
     if name == MeasuredCurve.name:
         return CurveRequest.of(rest, model.drives)
-    request = EffectRequest.of(text, model.drives)
-    request.require_place(model)
-    return replace(request, effect=model.bound(request.effect))
+    return EffectRequest.of(text, model.drives).placed(model)

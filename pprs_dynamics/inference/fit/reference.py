@@ -69,13 +69,15 @@ SLOW = 0.3  # of the rms speed of a drive: within it direction turns over
 # Tried: in standard deviations of the positions, and in turns of the directions.
 LENGTHS = tuple((position, speed) for position in (0.5, 1.5) for speed in (0.7, 2.0))
 OWN_LENGTHS = (0.3, 1.0)  # of what is of one drive's own state
+FIRST_SIZE = 0.4  # of a process, over the error: from which its size is fitted
+LEAST_SIZE = 1e-9  # [N, N m], of a process that does nothing
 ROUNDS = 3  # of the size of the process
 LEAST_INFORMATION = 0.1  # of a direction of the base, in units of its prior's
 LEAST_LENGTH = 200  # samples after treatment: a few seconds
 LEAST_REPEATS = 0.1  # of the process in two runs, below which nothing of it is carried over
 BLOCKS = 4  # of a single reference, each predicted from the others
 MOST_KEPT = 400  # means of a reference that a model file keeps
-MOST_DIRECTIONS = 48  # that become columns
+MOST_DIRECTIONS = 24  # that become columns
 
 
 class ReferenceRunError(PprsError, ValueError):
@@ -468,9 +470,10 @@ def _base(model: ForceModel, numbers: Array | None, residuals: Residuals, kept: 
         axes = np.linalg.qr(np.linalg.solve(prior, told_before), mode='complete')[0]
         prior = np.concatenate((told_before, prior @ axes[:, told_before.shape[1]:]), axis=1)
     columns = numbers @ prior
-    noise = np.nanmean(residuals.error ** 2, axis=0)
-    values, axes = np.linalg.eigh(np.einsum('mdp,mdq,d->pq', columns, columns, 1 / noise,
-                                            optimize=True))
+    known = np.isfinite(residuals.error).any(axis=0)
+    noise = np.nanmean(residuals.error[:, known] ** 2, axis=0)
+    values, axes = np.linalg.eigh(np.einsum(
+        'mdp,mdq,d->pq', columns[:, known], columns[:, known], 1 / noise, optimize=True))
     axes, told = axes[:, ::-1], int(np.sum(values > LEAST_INFORMATION))
     return columns @ axes[:, :told], prior @ axes, told
 
@@ -505,9 +508,13 @@ class _Fit:
 def _fitted(residuals: Residuals, columns: Array, own: Sequence[tuple[Process, Array]],
             states: States) -> _Fit:
     shared, count = Process.of(residuals, states), columns.shape[2]
-    size = np.sqrt(np.nanmean(residuals.error ** 2, axis=0))[:, None] * np.array([0.4, 0.4])
+    squares = np.nansum(residuals.error ** 2, axis=0) / np.maximum(
+        np.isfinite(residuals.error).sum(axis=0), 1)
+    size = np.repeat(FIRST_SIZE * np.sqrt(squares)[:, None], 2, axis=1)
     amplitudes, deviance = [], 0.0
-    for d in range(len(size)):
+    measured = Regression(residuals).drives
+    size[[d for d in range(len(size)) if d not in measured]] = LEAST_SIZE
+    for d in measured:
         features = (shared[1], own[d][1])
         edges = count + np.cumsum([0, *(one.shape[1] for one in features)])
         regression = Regression(residuals, (*_base_columns(columns, [d]),
@@ -518,7 +525,7 @@ def _fitted(residuals: Residuals, columns: Array, own: Sequence[tuple[Process, A
             start = fit.amplitudes
             # Expectation of the squares given the errors: evidence rises.
             squares = fit.coefficients ** 2 + np.diag(fit.covariance)
-            size[d] = [max(np.sqrt(np.mean(squares[a:b])), 1e-9) if b > a else 1e-9
+            size[d] = [max(np.sqrt(np.mean(squares[a:b])), LEAST_SIZE) if b > a else LEAST_SIZE
                        for a, b in pairwise(edges)]
             precision = _sizes(size[d], features) ** -2.0
             regression.columns = (*regression.columns[:count], *(
@@ -539,7 +546,8 @@ def _parts(residuals: Residuals) -> Integers:
 def _repeats(regression: Regression, fit: JointFit, told: int, parts: Integers) -> Array:
     """Return the correlation of the process in two runs of each drive, (D,).
 
-    Each part is predicted from the others: by how much of what they predict its errors are.
+    Each part is predicted from the others. What its errors are from that, beyond noise and what
+    the others leave unknown, is by expectation 2 (1 - correlation) of the process's square.
     """
     size, count = len(fit.coefficients), int(parts.max()) + 1
     H, b = np.zeros((count, size, size)), np.zeros((count, size))
@@ -554,19 +562,22 @@ def _repeats(regression: Regression, fit: JointFit, told: int, parts: Integers) 
             part = rows[:, parts[series.index] == k]
             H[k][np.ix_(index, index)] += part[:-1] @ part[:-1].T
             b[k, index] += part[:-1] @ part[-1]
-    prior = np.diag([column.precision for column in regression.columns])
-    found = np.full(len(regression.residuals.drives), DECISIONS.run_repeats)
-    others = [np.linalg.solve(H.sum(axis=0) - H[k] + prior, b.sum(axis=0) - b[k])
-              for k in range(count)]
-    for d, (index, rows) in white.items():
-        at = parts[regression.series[d].index]
-        known = DECISIONS.run_repeats_spread ** -2
-        pull = known * DECISIONS.run_repeats
-        for k, c in enumerate(others):
-            part = rows[:, at == k]
-            process = c[index[told:]] @ part[told:-1]
-            left = part[-1] - c[index[:told]] @ part[:told]
-            known += float(process @ process)
-            pull += float(process @ left)
-        found[d] = np.clip(pull / known, 0.0, 1.0)
-    return found
+    precision = np.array([column.precision for column in regression.columns])
+    known = np.zeros((len(regression.residuals.drives), 2))  # squares of the process, and beyond
+    for k in range(count):
+        covariance = np.linalg.inv(H.sum(axis=0) - H[k] + np.diag(precision))
+        coefficients = covariance @ (b.sum(axis=0) - b[k])
+        for d, (index, rows) in white.items():
+            part = rows[:, parts[regression.series[d].index] == k]
+            left = part[-1] - coefficients[index] @ part[:-1]
+            expected = part.shape[1] + np.sum(
+                (covariance[np.ix_(index, index)] @ part[:-1]) * part[:-1])
+            process = part[told:-1]
+            known[d] += (np.sum(process ** 2 / precision[index[told:], None]),
+                         left @ left - expected)
+    weight = (DECISIONS.run_repeats_spread * 2) ** -2
+    apart = (known[:, 1] + weight * 2 * (1 - DECISIONS.run_repeats)) / (known[:, 0] + weight)
+    found = np.clip(1 - apart / 2, 0.0, 1.0)
+    # Parts of a single run say nothing of another day.
+    return found if regression.residuals.record[-1] else np.minimum(
+        found, DECISIONS.one_run_repeats)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.inference.fit.reference import Reference, ReferenceRunError
+from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
 from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
@@ -54,8 +55,9 @@ def read_reference(model: ForceModel, files: Sequence[RunFile] = (),
     if not files and kept_run:
         return Reference.of_residual(model, kept_run)
     given = files or [one.path for one in _own(model)]
-    runs = [one if isinstance(one, Recording) else read_recording(one, model.recorded)
-            for one in given]
+    runs = excerpts_within_memory(model, [
+        one if isinstance(one, Recording) else read_recording(one, model.recorded)
+        for one in given])
     repeat = find_repeat(runs, diagnosed)
     if repeat is not None:
         raise UnreadableFileError(runs[repeat[0]].name, f'{repeat[1]}, but {OTHER}')

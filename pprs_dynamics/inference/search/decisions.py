@@ -131,6 +131,9 @@ class Decisions:
         '0.8')
     run_repeats_spread: float = _number(
         0.2, '1', 'standard deviation of that expectation', 'the same')
+    one_run_repeats: float = _number(
+        0.99, '1', 'the most that it is where a single run is the reference',
+        'a machine is not the same on two days: 14 % of what repeats is another')
     reference_direction: float = _number(
         4.0, '1', 'whitened square of what a reference leaves unknown in one direction, from '
         'which that is a column of every fit', 'two standard deviations of the noise; what is '

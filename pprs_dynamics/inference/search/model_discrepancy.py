@@ -38,12 +38,14 @@ def discrepancy_ratio(design: Design, regression: Regression, decisions: Decisio
         if size > 0:
             allowed += share ** 2 * size
             names.append(other.name)
-    for effect in design.given.effects:
-        if isinstance(effect, CatalogueEffect) and effect.idealised:
-            allowed += share ** 2 * _square_of_part(regression, found, effect.name, drives)
-            names.append(effect.name)
-    own = 0.0 if exact else decisions.own_form_share ** 2 * _own_friction(
-        design, regression, found, drives)
+    own = 0.0
+    if design.carried is None:  # else what the model's own forces lack of real ones is known
+        for effect in design.given.effects:
+            if isinstance(effect, CatalogueEffect) and effect.idealised:
+                allowed += share ** 2 * _square_of_part(regression, found, effect.name, drives)
+                names.append(effect.name)
+        own = 0.0 if exact else decisions.own_form_share ** 2 * _own_friction(
+            design, regression, found, drives)
     if own > allowed:
         names = ["the model's own friction"]
     square = beyond_others(regression, found, candidate)

@@ -39,17 +39,17 @@ def larger(x: Value, y: Value) -> Value:
 
 def everywhere(condition: Any) -> bool:
     """Return whether a condition holds, of arrays in all elements."""
-    return bool(np.all(condition))
+    return condition if isinstance(condition, bool) else bool(np.all(condition))
 
 
 def sin(x: Value) -> Value:
     """Return the sine [rad]."""
-    return np.sin(x)
+    return float(np.sin(x)) if isinstance(x, float) else np.sin(x)
 
 
 def cos(x: Value) -> Value:
     """Return the cosine [rad]."""
-    return np.cos(x)
+    return float(np.cos(x)) if isinstance(x, float) else np.cos(x)
 
 
 def largest(x: Any) -> int:
@@ -57,25 +57,42 @@ def largest(x: Any) -> int:
     return max(1, math.ceil(float(np.max(x, initial=0.0))))
 
 
-def solve(A: Any, B: Any, size: int, columns: int) -> Any:
+def solve(A: Any, B: Any, order: Any) -> Any:
     """Solve A X = B in place of B, and return the determinant of A, which is destroyed.
 
     Parameters
     ----------
-    A : (size, size, N) array
-    B : (size, columns or more, N) array
+    A : (n, n) or (n, n, N) array
+    B : (n, K) or (n, K, N) array
+    order : Tables
+        In which compiled code eliminates.
     """
-    a = np.moveaxis(A[:size, :size], -1, 0)
-    b = np.moveaxis(B[:size, :columns], -1, 0)
+    left, right = (np.asarray(each) for each in (A, B))
+    if left.ndim == 2:
+        determinant = float(np.linalg.det(left))
+        right[:] = _solution(left, right)
+        return determinant
+    a, b = np.moveaxis(left, -1, 0), np.moveaxis(right, -1, 0)
     determinant = np.linalg.det(a)
     try:
         found = np.linalg.solve(a, b)
     except np.linalg.LinAlgError:  # one sample suffices: those that can be solved, one by one
-        found = np.full_like(b, np.nan)
-        for s in np.flatnonzero(determinant):
-            found[s] = np.linalg.solve(a[s], b[s])
-    B[:size, :columns] = np.moveaxis(found, 0, -1)
+        found = np.array([_solution(*one) for one in zip(a, b, strict=True)])
+    right[:] = np.moveaxis(found, 0, -1)
     return determinant
+
+
+def _solution(a: Any, b: Any) -> Any:
+    """Return the solution of one system, not a number where there is none."""
+    try:
+        return np.linalg.solve(a, b)
+    except np.linalg.LinAlgError:
+        return np.full_like(b, np.nan)
+
+
+def elements(named: Any) -> Any:
+    """Return a named tuple of arrays whose elements are Python's numbers, which are faster."""
+    return type(named)(*(array.data for array in named))
 
 
 # Compiled code calls these in their place, and those of `math` for the others.
@@ -95,33 +112,67 @@ def compiled_largest(x: Any) -> int:
     return max(1, whole)
 
 
-def compiled_solve(A: Any, B: Any, size: int, columns: int) -> Any:
-    """Solve A X = B in place of B by elimination with pivoting; return the determinant of A."""
-    determinant = 1.0
+# A pivot smaller than this, of the largest number below it, is not taken: errors would grow by its
+# inverse. Elimination then goes on with all rows and columns that are left.
+STEADY = 0.05
+
+
+def compiled_solve(A: Any, B: Any, order: Any) -> Any:
+    """Solve A X = B in place of B by elimination in an order; return the determinant of A."""
+    swap, below, right, starts = order.swap, order.below, order.right, order.starts
+    size, columns = len(A), B.shape[1]
+    determinant, sparse = 1.0, size
     for k in range(size):
         pivot = k
-        for r in range(k + 1, size):
-            if abs(A[r, k]) > abs(A[pivot, k]):
-                pivot = r
+        if sparse == size:
+            for i in range(starts[k, 0], starts[k + 1, 0]):
+                if abs(A[swap[i], k]) > abs(A[pivot, k]):
+                    pivot = swap[i]
+            for i in range(starts[k, 1], starts[k + 1, 1]):
+                if STEADY * abs(A[below[i], k]) > abs(A[pivot, k]):
+                    sparse = k
+        if sparse < size:
+            for r in range(k + 1, size):
+                if abs(A[r, k]) > abs(A[pivot, k]):
+                    pivot = r
         if pivot != k:
             determinant = -determinant
-            for c in range(k, size):
+            for c in range(size):
                 A[k, c], A[pivot, c] = A[pivot, c], A[k, c]
             for c in range(columns):
                 B[k, c], B[pivot, c] = B[pivot, c], B[k, c]
         determinant *= A[k, k]
         scale = 1.0 / A[k, k]
-        for r in range(k + 1, size):
-            share = A[r, k] * scale
-            if share != 0.0:
+        if sparse == size:
+            for i in range(starts[k, 1], starts[k + 1, 1]):
+                r = below[i]
+                share = A[r, k] * scale
+                for n in range(starts[k, 2], starts[k + 1, 2]):
+                    A[r, right[n]] -= share * A[k, right[n]]
+                for c in range(columns):
+                    B[r, c] -= share * B[k, c]
+        else:
+            for r in range(k + 1, size):
+                share = A[r, k] * scale
                 for c in range(k + 1, size):
                     A[r, c] -= share * A[k, c]
                 for c in range(columns):
                     B[r, c] -= share * B[k, c]
     for k in range(size - 1, -1, -1):
+        scale = 1.0 / A[k, k]
+        if k < sparse:
+            for n in range(starts[k, 2], starts[k + 1, 2]):
+                for c in range(columns):
+                    B[k, c] -= A[k, right[n]] * B[right[n], c]
+        else:
+            for n in range(k + 1, size):
+                for c in range(columns):
+                    B[k, c] -= A[k, n] * B[n, c]
         for c in range(columns):
-            x = B[k, c]
-            for r in range(k + 1, size):
-                x -= A[k, r] * B[r, c]
-            B[k, c] = x / A[k, k]
+            B[k, c] *= scale
     return determinant
+
+
+def compiled_elements(named: Any) -> Any:
+    """Return a named tuple of arrays as it is: compiled code reads them fast enough."""
+    return named

@@ -15,8 +15,16 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.linkage import Integers, survey
-from pprs_dynamics.physics.mechanism.linkage_equations import ANGLE, TRANSLATION, Tables
+from pprs_dynamics.physics.mechanism.linkage import survey
+from pprs_dynamics.physics.mechanism.linkage_equations import (
+    ANGLE,
+    AXES,
+    KIND,
+    LOOP,
+    TRANSLATION,
+    Integers,
+    Tables,
+)
 
 X, Y, Z = range(3)
 Row = tuple[int, tuple[int, int, int, int], tuple[float, float]]
@@ -48,7 +56,6 @@ ROWS: dict[str, tuple[Row, ...]] = {
 # Files round angles such as pi / 2 to four digits; poorer conditions make no robot.
 RANK = 1e-4  # of the largest singular value
 OPEN = 1e-4  # of the size: by which a loop may be open at home, in rows that others imply
-OPEN_IN_MOTION = 1e-3  # the same in a motion, where roundings of a file add up
 TRIES = 60  # Newton steps to home
 LONGEST_STEP = 0.2  # of the size, or rad, in one of them
 CLOSED_HOME = 1e-12  # of the size
@@ -100,7 +107,7 @@ class Closing:
                  ) -> None:
         self.t, self.names, self.loops = t, names, loops
         self.columns = np.where(slides, size, 1.0)
-        self.rows = np.where(t.row_kind == TRANSLATION, 1 / size, 1.0)
+        self.rows = np.where(t.rows[:, KIND] == TRANSLATION, 1 / size, 1.0)
 
     def derivatives(self, q: Array) -> tuple[Array, Array]:
         """Return rows (r,) and their derivatives by all coordinates (r, C), in units of size."""
@@ -132,15 +139,14 @@ class Closing:
         worst = np.abs(gaps * self.rows)
         if np.max(worst, initial=0.0) > OPEN:
             row = int(np.argmax(worst))
-            name, kind = self.loops[t.row_loop[row]], t.row_kind[row]
+            name, kind = self.loops[t.rows[row, LOOP]], t.rows[row, KIND]
             amount = (f'{1e3 * abs(gaps[row]):.3g} mm' if kind == TRANSLATION
                       else f'{np.degrees(abs(gaps[row])):.3g} degrees')
             raise ModelError('robot.loops', name, f'close at home: it is open by {amount}, and '
                              'no position of the passive joints nearby closes it (check frames, '
                              'lengths, and robot.home)')
         for k, name in enumerate(self.loops):
-            kinds = {tuple(t.row_axes[r]) for r in np.flatnonzero(t.row_loop == k)
-                     if t.row_kind[r] == ANGLE}
+            kinds = {tuple(row[AXES:]) for row in t.rows if row[LOOP] == k and row[KIND] == ANGLE}
             along = np.einsum('ij,ij->j', m.A[0, k], m.B[0, k])
             if (X, Z, 0, 0) in kinds and along[Z] < 0:
                 raise ModelError('robot.loops', name, 'have both axes z the same way: they are '

@@ -32,9 +32,10 @@ FEW = 8  # samples, up to which floats are faster than arrays
 # Loading what is compiled takes 0.9 s of processor time; on arrays a sample takes 1 us more, a call
 # 0.1 ms.
 PAYS, CALL = 500_000, 100  # samples
-# A function over the tables of a mechanism takes longer without a compiler: a sample 0.1 ms, a call
-# 5 ms and more (hexapod), of which a call of the forces makes four.
-TREE_SAMPLE, TREE_CALL = 100, 5_000  # of such samples
+# A function over the tables of a mechanism takes longer without a compiler: on arrays a sample
+# 0.1 ms and a call 20 ms (hexapod); of few samples on floats each 5 ms.
+TREE_SAMPLE, TREE_CALL, TREE_ON_FLOATS = 100, 20_000, 5_000  # of such samples
+TREE_FEW = 4
 
 _loops: dict[Kernel, Callable[..., int]] = {}
 _functions: dict[Kernel, Callable[..., Any]] = {}
@@ -116,7 +117,8 @@ def compiled_or_none(function: Kernel, samples: int) -> Callable[..., Any] | Non
     ready = _functions.get(function)
     if ready is not None:
         return ready
-    if _is_plain(TREE_SAMPLE * samples + TREE_CALL):
+    if _is_plain(TREE_ON_FLOATS * samples if samples <= TREE_FEW
+                 else TREE_SAMPLE * samples + TREE_CALL):
         return None
     from pprs_dynamics.physics.mechanism.compilation import compiled_function
 

@@ -1,285 +1,326 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Evaluation of a mechanism's equations at samples: compiled, or by NumPy for all at once.
+"""Evaluation of a mechanism's equations at samples: compiled, on floats, or on arrays.
 
-NumPy walks to every sample from home, a compiled loop from the sample before: both end on the
-branch that home is on.
+One function goes through the samples, from each to the next; it is compiled, or runs as it is on
+Python's floats. Of many samples without a compiler NumPy takes all at once, each walked to from
+home. All end on the branch that home is on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.evaluation import compiled_or_none
+from pprs_dynamics.physics.mechanism.arithmetic import elements
+from pprs_dynamics.physics.mechanism.evaluation import TREE_FEW, compiled_or_none
 from pprs_dynamics.physics.mechanism.linkage_equations import (
+    WARM_STEPS,
+    Integers,
     JointFriction,
     Loads,
     Motion,
     Tables,
-    apply_bodies,
-    gap,
-    gradients,
-    move,
+    constraint_forces,
+    follow,
+    inverse_dynamics,
+    is_near,
+    is_sound,
+    jacobian,
+    joint_friction,
     place,
+    predict,
     reach,
-    react,
-    rub,
+    residual,
     twist,
 )
+from pprs_dynamics.physics.mechanism.packed import (
+    length_of,
+    packed_tables,
+    read_loads,
+    read_motion,
+    read_tables,
+    views,
+)
 
-Integers = np.typing.NDArray[np.int_]
-
-
-def follow_one(t: Tables, m: Motion, start: Any, v: Any, a: Any, passive_of: Any, drive_of: Any,
-               ) -> bool:
-    """Fill in the motion of one sample, whose drives' positions stand in `m.q`."""
-    if len(t.row_loop) and not reach(t, m, start, passive_of):
-        return False
-    for c in range(len(m.q)):
-        m.v[c] = 0.0
-        m.a[c] = 0.0
-    for d in range(len(t.drives)):
-        m.v[t.drives[d]] = v[d]
-        m.a[t.drives[d]] = a[d]
-    move(t, m, passive_of, drive_of)
-    return True
+# Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
+# joints. Where rows are kept there is one for each sample, else one that all use in turn.
+MOTION, FORCES, KEPT = 1, 2, 4
+NOWHERE = np.zeros(4)
+NO_FRICTION = JointFriction(*np.zeros((2, 0), dtype=np.int64), *np.zeros((4, 0)))
 
 
-def motion_at(m: Motion, s: int) -> Motion:
-    """Return one sample's motion, for compiled code."""
-    return Motion(m.q[s], m.v[s], m.a[s], m.R[s], m.p[s], m.z[s], m.w[s], m.u[s], m.wd[s],
-                  m.ud[s], m.A[s], m.B[s], m.pA[s], m.pB[s], m.T[s], m.J[s], m.inverse[s],
-                  m.rows[s], m.state[s])
+class Found(NamedTuple):
+    """What a robot needs for a motion, of N samples.
+
+    Parameters
+    ----------
+    q : (N, C) array
+        Closed coordinates.
+    efforts, friction : (N, D) arrays
+        Of the drives: without friction of joints, and against it [N m, N].
+    """
+
+    q: Array
+    efforts: Array
+    friction: Array
 
 
-def loads_at(o: Loads, s: int) -> Loads:
-    """Return one sample's loads, for compiled code."""
-    return Loads(o.f[s], o.n[s], o.coordinates[s], o.efforts[s], o.F[s], o.N[s], o.rows[s])
+def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,
+              given: Any, motions: Any, inertial: Any, gravity: Any, loads: Any, rubbing: Any,
+              resistance: Any, found: Any, stages: int, nearby: bool) -> int:
+    """Go through the samples; see `follow_drives` and `Evaluation`."""
+    t = elements(read_tables(sizes, integers, reals))
+    rubs = elements(JointFriction(rubbing[0], rubbing[1], resistance[0], resistance[1],
+                                  resistance[2], resistance[3]))
+    coordinates, drives = len(home), given.shape[2]
+    for s in range(len(found)):
+        at = s if stages & KEPT else 0
+        m = elements(read_motion(sizes, motions[at], reals))
+        o = elements(read_loads(sizes, loads[at], reals))
+        if stages & MOTION:
+            q, v, a = given[0, s], given[1, s], given[2, s]
+            done = False
+            if nearby and s == 0:
+                if is_near(t, start, q) and reach(t, m, start, q):
+                    follow(t, m, v, a)
+                    done = m.state[3] <= WARM_STEPS and is_sound(t, m, at_home)
+                if not done:
+                    for c in range(coordinates):
+                        start[c] = home[c]
+            if not done:
+                if not reach(t, m, start, q) and not reach(t, m, home, q):
+                    return s
+                follow(t, m, v, a)
+            for c in range(coordinates):
+                found[s, c] = start[c] = m.q[c]
+            if s + 1 < len(found) and is_near(t, start, given[0, s + 1]):
+                predict(t, m, given[0, s + 1], start)
+            if not stages & KEPT and not is_sound(t, m, at_home):
+                return s
+        if stages & FORCES:
+            if not stages & KEPT:
+                for k in range(len(o.links)):
+                    for c in range(3):
+                        o.links[k, c] = 0.0
+            inverse_dynamics(t, m, inertial, gravity, o)
+            constraint_forces(t, m, o)
+            for d in range(drives):
+                found[s, coordinates + d] = o.efforts[d]
+            joint_friction(t, m, o, rubs, found[s, coordinates + drives:])
+    return -1
 
 
-def _follow(t: Tables, m: Motion, start: Any, home: Any, v: Any, a: Any, passive_of: Any,
-            drive_of: Any) -> int:
-    failed = -1
-    for s in range(len(m.q)):
-        one = motion_at(m, s)
-        if not follow_one(t, one, start, v[s], a[s], passive_of, drive_of):
-            for d in range(len(t.drives)):
-                one.q[t.drives[d]] = one.v[t.drives[d]]
-            if not follow_one(t, one, home, v[s], a[s], passive_of, drive_of):
-                failed = s
-                break
-        for c in range(len(start)):
-            start[c] = one.q[c]
-        if s + 1 < len(m.q):
-            predict(t, one, m.q[s + 1], start)
-    return failed
+def _twist(sizes: Any, integers: Any, reals: Any, motions: Any, W: Any, U: Any) -> None:
+    t = read_tables(sizes, integers, reals)
+    for s in range(len(motions)):
+        twist(t, read_motion(sizes, motions[s], reals), W[s], U[s])
 
 
-def predict(t: Tables, one: Motion, goal: Any, start: Any) -> None:
-    """Move coordinates near a sample to where its rates lead on the way to the next drives."""
-    for d in range(len(t.drives)):
-        if not abs(goal[t.drives[d]] - start[t.drives[d]]) < t.stride[d]:
-            return
-    for d in range(len(t.drives)):
-        moved = goal[t.drives[d]] - start[t.drives[d]]
-        start[t.drives[d]] = goal[t.drives[d]]
-        for c in range(len(t.passive)):
-            start[t.passive[c]] += one.T[t.passive[c], d] * moved
-
-
-def _press(t: Tables, m: Motion, inertial: Any, gravity: Any, with_reactions: bool, o: Loads,
-           ) -> None:
-    for s in range(len(m.q)):
-        apply_bodies(t, motion_at(m, s), inertial, gravity, loads_at(o, s))
-        if with_reactions:
-            react(t, motion_at(m, s), loads_at(o, s))
-
-
-def _twist(t: Tables, m: Motion, W: Any, U: Any) -> None:
-    for s in range(len(m.q)):
-        twist(t, motion_at(m, s), W[s], U[s])
-
-
-def _rub(t: Tables, m: Motion, o: Loads, friction: JointFriction, W: Any, efforts: Any) -> None:
-    for s in range(len(m.q)):
-        rub(t, motion_at(m, s), loads_at(o, s), friction, W[s], efforts[s])
-
-
-def _openings(t: Tables, m: Motion, found: Any) -> None:
-    for s in range(len(m.q)):
-        one = motion_at(m, s)
-        for r in range(len(t.row_loop)):
-            found[s, r] = gap(t, one, r)
-
-
-def _survey(t: Tables, m: Motion, column_of: Any, gaps: Any, J: Any) -> None:
-    place(t, m)
-    for r in range(len(t.row_loop)):
-        gaps[r] = gap(t, m, r)
-    gradients(t, m, column_of, J)
-
-
-def samples_last(arrays: Any) -> Any:
-    """Return views with the samples last, as NumPy takes the equations."""
-    return type(arrays)(*(np.moveaxis(array, 0, -1) for array in arrays))
-
-
-def new_motion(t: Tables, samples: int) -> Motion:
-    """Return space for the motion of samples."""
-    coordinates = int(t.coordinate.max()) + 1
-    shapes = _shapes(len(t.row_loop), len(t.parent), len(t.loop_a), len(t.drives), coordinates)
-    return Motion(*(np.zeros((samples, *shape)) for shape in shapes))
-
-
-@cache
-def _shapes(rows: int, joints: int, loops: int, drives: int, coordinates: int,
-            ) -> tuple[tuple[int, ...], ...]:
-    """Return the shapes of a motion's arrays, in their order."""
-    shapes = dict.fromkeys(Motion._fields, (joints, 3)) | dict.fromkeys('qva', (coordinates,)) | {
-        'R': (joints, 3, 3), 'A': (loops, 3, 3), 'B': (loops, 3, 3), 'pA': (loops, 3),
-        'pB': (loops, 3), 'T': (coordinates, drives), 'J': (rows, rows),
-        'inverse': (rows, rows), 'rows': (rows, drives + 1), 'state': (3,)}
-    return tuple(shapes.values())
-
-
-def new_loads(t: Tables, m: Motion) -> Loads:
-    """Return space for the forces of a motion."""
-    samples, joints, loops = len(m.q), len(t.parent), len(t.loop_a)
-    return Loads(np.zeros((samples, joints, 3)), np.zeros((samples, joints, 3)),
-                 np.zeros(m.q.shape), np.zeros((samples, len(t.drives))),
-                 np.zeros((samples, loops, 3)), np.zeros((samples, loops, 3)),
-                 np.zeros((samples, len(t.row_loop))))
-
-
-def columns_of(coordinates: Integers, count: int) -> Integers:
-    """Return each coordinate's column among some coordinates, or -1."""
-    column = np.full(count, -1)
-    column[coordinates] = np.arange(len(coordinates))
-    return column
-
-
-def follow(t: Tables, home: Array, q: Array, v: Array, a: Array, start: Array | None = None,
-           ) -> tuple[Motion, int]:
-    """Return the motion of all links for positions, velocities and accelerations of the drives.
+class Evaluation:
+    """A mechanism's equations for what it is given.
 
     Parameters
     ----------
     t : Tables
     home : (C,) array
         Closed coordinates.
-    q, v, a : (N, D) arrays
-    start : (C,) array, optional
-        Closed coordinates near the first sample, instead of home.
-
-    Returns
-    -------
-    motion : Motion
-    failed : int
-        The first sample at which the loops do not close, or -1.
     """
-    m = new_motion(t, len(q))
-    m.q[:] = home
-    m.q[:, t.drives] = q
-    passive_of, drive_of = (columns_of(which, len(home)) for which in (t.passive, t.drives))
-    v, a = (np.ascontiguousarray(values, dtype=float) for values in (v, a))
-    loop = compiled_or_none(_follow, len(q))
-    if loop is not None:
-        begin = np.array(home if start is None else start)
-        return m, int(loop(t, m, begin, home, v, a, passive_of, drive_of))
-    with np.errstate(all='ignore'):
-        done = follow_one(t, samples_last(m), home, v.T, a.T, passive_of, drive_of)
-    if done:
-        return m, -1
-    size = m.state[:, 0]
-    return m, int(np.argmax(~(size < np.inf) | (size == np.max(size))))
+
+    def __init__(self, t: Tables, home: Array) -> None:
+        self.tables, self.home, self.packed = t, home, packed_tables(t)
+        self.sizes = self.packed.sizes
+        self._lengths = length_of(Motion, self.sizes), length_of(Loads, self.sizes)
+        self._no_bodies = np.zeros((len(t.joints), 10))
+        self._friction = NO_FRICTION, np.array(NO_FRICTION[:2]), np.array(NO_FRICTION[2:])
+
+    @cached_property
+    def at_home(self) -> Array:
+        """`Motion.state` at home, (4,)."""
+        still = np.zeros((3, 1, len(self.tables.drives)))
+        still[0] = self.home[self.tables.drives]
+        rows, _ = self.follow(*still)
+        state: Array = self.motion(rows).state[0]
+        return state
+
+    def motion(self, rows: Array) -> Motion:
+        """Return by name what rows of `follow` hold."""
+        return views(Motion, self.sizes, rows)
+
+    def loads(self, rows: Array) -> Loads:
+        """Return by name what rows of `forces` hold."""
+        return views(Loads, self.sizes, rows)
+
+    def follow(self, q: Array, v: Array, a: Array, start: Array | None = None,
+               nearby: Array | None = None) -> tuple[Array, int]:
+        """Return the motion of all links for positions, velocities and accelerations of the drives.
+
+        Parameters
+        ----------
+        q, v, a : (N, D) arrays
+        start : (C,) array, optional
+            Closed coordinates from which the first sample is walked to, instead of home.
+        nearby : (C,) array, optional
+            Closed coordinates of another motion: used where the first sample is within a stride
+            of them and the loops stay assembled as at home, so that nothing depends on them.
+
+        Returns
+        -------
+        rows : (N, K) array
+        failed : int
+            The first sample at which the loops do not close, or -1.
+        """
+        rows = np.zeros((len(q), self._lengths[0]))
+        failed = self._run(np.array((q, v, a)), start if nearby is None else nearby, rows,
+                           MOTION | KEPT, np.zeros(3), nearby is not None)
+        return rows, failed
+
+    def forces(self, rows: Array, inertial: Array, gravity: Array,
+               wrenches: Mapping[int, tuple[Array, Array]] | None = None) -> Array:
+        """Return what joints and closures transmit, in rows (N, K), for rows of `follow`.
+
+        Parameters
+        ----------
+        rows : (N, K) array
+        inertial : (J + 1, 10) array
+        gravity : (3,) array
+        wrenches : mapping of int to (force, moment), (N, 3) each, optional
+            That links apply to the world, by the joints that move them, in the base's frame, about
+            the origins of these joints [N, N m].
+        """
+        loads = np.zeros((len(rows), self._lengths[1]))
+        o = self.loads(loads)
+        for joint, (force, moment) in (wrenches or {}).items():
+            o.f[:, joint] += force
+            o.n[:, joint] += moment
+        self._run(None, None, rows, FORCES | KEPT, gravity, False, inertial, loads)
+        return loads
+
+    def friction(self, rows: Array, loads: Array, friction: JointFriction) -> Array:
+        """Return the drives' efforts (N, D) against friction of joints, for rows of both."""
+        found = np.zeros((len(rows), len(self.tables.drives)))
+        m, o = self.motion(rows), self.loads(loads)
+        with np.errstate(all='ignore'):
+            joint_friction(self.tables, samples_last(m), samples_last(o), friction, found.T)
+        return found
+
+    def found(self, motion: tuple[Array, Array, Array], inertial: Array, gravity: Array,
+              friction: JointFriction, nearby: Array | None = None) -> Found | None:
+        """Return what is needed for a motion, with nothing kept of the way there.
+
+        Parameters
+        ----------
+        motion : three (N, D) arrays
+            Position, velocity and acceleration of the drives.
+        inertial : (J + 1, 10) array
+        gravity : (3,) array
+        friction : JointFriction
+        nearby : (C,) array, optional
+            See `follow`.
+
+        Returns
+        -------
+        Found or None
+            None where a sample cannot be or is too near a singularity: `follow` tells which.
+        """
+        given = np.array(motion)
+        samples, drives = given.shape[1:]
+        count = len(self.home)
+        table = np.empty((samples, count + 2 * drives))
+        rows = np.empty((1, self._lengths[0]))
+        if self._run(given, nearby, rows, MOTION | FORCES, gravity, nearby is not None, inertial,
+                     np.empty((1, self._lengths[1])), friction, table) >= 0:
+            return None
+        return Found(table[:, :count], table[:, count:count + drives], table[:, count + drives:])
+
+    def twists(self, rows: Array) -> tuple[Array, Array]:
+        """Return angular and linear velocities of links per rate of drives, (N, J + 1, 3, D)."""
+        t = self.tables
+        W, U = np.zeros((2, len(rows), 3 * len(t.joints), len(t.drives)))
+        loop = compiled_or_none(_twist, len(rows))
+        if loop is not None:
+            loop(*self.packed, rows, W, U)
+        else:
+            twist(t, samples_last(self.motion(rows)), *samples_last((W, U)))
+        shape = len(rows), len(t.joints), 3, len(t.drives)
+        return W.reshape(shape), U.reshape(shape)
+
+    def _run(self, given: Array | None, start: Array | None, rows: Array, stages: int,
+             gravity: Array, warm: bool, inertial: Array | None = None,
+             loads: Array | None = None, friction: JointFriction = NO_FRICTION,
+             found: Array | None = None) -> int:
+        """Evaluate stages, and return the first sample that fails or -1; see `_evaluate`."""
+        drives = len(self.tables.drives)
+        if found is None:
+            found = np.empty((len(rows), len(self.home) + 2 * drives))
+        if given is None:
+            given = np.empty((3, 0, drives))
+        if loads is None or inertial is None:
+            loads, inertial = np.empty((len(rows), self._lengths[1])), self._no_bodies
+        last = self._friction
+        if friction is not last[0]:
+            last = self._friction = friction, np.array(friction[:2]), np.array(friction[2:])
+        at_home = self.at_home if warm or not stages & KEPT else NOWHERE
+        arguments = (
+            *self.packed, self.home, at_home, np.array(self.home if start is None else start),
+            given, rows, inertial, gravity, loads, last[1], last[2], found, stages, warm)
+        loop = compiled_or_none(_evaluate, len(found))
+        if loop is not None:
+            return int(loop(*arguments))
+        if len(found) <= TREE_FEW:
+            try:
+                return _evaluate(*arguments)
+            except (ZeroDivisionError, OverflowError, ValueError):
+                pass  # arrays answer with infinities instead
+        with np.errstate(all='ignore'):
+            return self._run_on_arrays(given, rows, stages, gravity, at_home, inertial, loads,
+                                       friction, found)
+
+    def _run_on_arrays(self, given: Array, rows: Array, stages: int, gravity: Array,
+                       at_home: Array, inertial: Array, loads: Array, friction: JointFriction,
+                       found: Array) -> int:
+        t, count, drives = self.tables, len(self.home), len(self.tables.drives)
+        if not stages & KEPT:
+            rows, loads = (np.zeros((len(found), each.shape[1])) for each in (rows, loads))
+        m, o = samples_last(self.motion(rows)), samples_last(self.loads(loads))
+        if stages & MOTION:
+            q, v, a = np.moveaxis(given, 1, -1)
+            if not reach(t, m, self.home, q):
+                size = m.state[0]
+                return int(np.argmax(~(size < np.inf) | (size == np.max(size))))
+            follow(t, m, v, a)
+            found[:, :count] = m.q.T
+            if not stages & KEPT and not is_sound(t, m, at_home):
+                return 0
+        if stages & FORCES:
+            inverse_dynamics(t, m, inertial, gravity, o)
+            constraint_forces(t, m, o)
+            found[:, count:count + drives] = o.efforts.T
+            joint_friction(t, m, o, friction, found[:, count + drives:].T)
+        return -1
 
 
-def openings(t: Tables, m: Motion) -> Array:
-    """Return by how much closures are open at samples of a motion, (N, r) [m, rad].
-
-    The rows may be others than those that the motion was closed by.
-    """
-    found = np.zeros((len(m.q), len(t.row_loop)))
-    loop = compiled_or_none(_openings, len(m.q))
-    if loop is not None:
-        loop(t, m, found)
-    else:
-        views = samples_last(m)
-        for r in range(len(t.row_loop)):
-            found[:, r] = gap(t, views, r)
-    return found
-
-
-def press(t: Tables, m: Motion, inertial: Array, gravity: Array, with_reactions: bool,
-          wrenches: Mapping[int, tuple[Array, Array]] | None = None) -> Loads:
-    """Return the forces that move bodies and apply wrenches.
-
-    Parameters
-    ----------
-    t : Tables
-    m : Motion
-    inertial : (J + 1, 10) array
-    gravity : (3,) array
-    with_reactions : bool
-        Whether those of closures are filled in.
-    wrenches : mapping of int to (force, moment), (N, 3) each, optional
-        That links apply to the world, by the joints that move them, in the base's frame, about
-        the origins of these joints [N, N m].
-    """
-    o = new_loads(t, m)
-    for joint, (force, moment) in (wrenches or {}).items():
-        o.f[:, joint] += force
-        o.n[:, joint] += moment
-    loop = compiled_or_none(_press, len(m.q))
-    if loop is not None:
-        loop(t, m, inertial, gravity, with_reactions, o)
-        return o
-    views = samples_last(m), samples_last(o)
-    apply_bodies(t, views[0], inertial, gravity, views[1])
-    if with_reactions:
-        react(t, *views)
-    return o
-
-
-def twists(t: Tables, m: Motion) -> tuple[Array, Array]:
-    """Return angular and linear velocities of links per rate of drives, (N, J + 1, 3, D)."""
-    shape = (len(m.q), len(t.parent), 3, len(t.drives))
-    W, U = np.zeros(shape), np.zeros(shape)
-    loop = compiled_or_none(_twist, len(m.q))
-    if loop is not None:
-        loop(t, m, W, U)
-    else:
-        twist(t, samples_last(m), np.moveaxis(W, 0, -1), np.moveaxis(U, 0, -1))
-    return W, U
-
-
-def friction_efforts(t: Tables, m: Motion, o: Loads, friction: JointFriction, W: Array) -> Array:
-    """Return the drives' efforts against friction of passive joints, (N, D)."""
-    efforts = np.zeros((len(m.q), len(t.drives)))
-    loop = compiled_or_none(_rub, len(m.q))
-    if loop is not None:
-        loop(t, m, o, friction, W, efforts)
-    else:
-        rub(t, samples_last(m), samples_last(o), friction, np.moveaxis(W, 0, -1), efforts.T)
-    return efforts
+def samples_last(arrays: Any) -> Any:
+    """Return views with the samples last, as NumPy takes the equations."""
+    moved = (np.moveaxis(array, 0, -1) for array in arrays)
+    return type(arrays)(*moved) if isinstance(arrays, Motion | Loads) else tuple(moved)
 
 
 def survey(t: Tables, q: Array, columns: Integers) -> tuple[Array, Array, Motion]:
     """Return all rows and their derivatives by some coordinates, (r,) and (r, K), at one place."""
-    m = new_motion(t, 1)
+    sizes = packed_tables(t).sizes
+    m = views(Motion, sizes, np.zeros((1, length_of(Motion, sizes))))
     m.q[0] = q
-    column_of = columns_of(columns, len(q))
-    gaps, J = np.zeros(len(t.row_loop)), np.zeros((len(t.row_loop), max(1, len(columns))))
-    loop = compiled_or_none(_survey, 1)
-    if loop is not None:
-        loop(t, motion_at(m, 0), column_of, gaps, J)
-    else:
-        views = samples_last(m)
-        _survey(t, views, column_of, gaps[:, None], J[..., None])
-    return gaps, J[:, :len(columns)], m
+    one = type(m)(*(array[0].data for array in m))
+    places = np.full((len(q), 2), -1)
+    places[columns, 0] = np.arange(len(columns))
+    place(t, one)
+    gaps = np.array([residual(t, one, r) for r in range(len(t.rows))])
+    J = np.zeros((len(t.rows), len(columns)))
+    jacobian(t, one, places, J, np.empty((len(J), 0)))
+    return gaps, J, m

@@ -21,6 +21,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.arithmetic import (
     cos,
     everywhere,
@@ -33,65 +36,164 @@ from pprs_dynamics.physics.mechanism.arithmetic import (
 )
 from pprs_dynamics.physics.mechanism.vectors import Vector, dot, minus, plus, product, times
 
-CLOSED = 1e-7  # [m, rad] of a row before the last Newton step, which squares it
+Integers = np.typing.NDArray[np.int_]
+
+CLOSED = 1e-7  # [m, rad] of a row and of the last Newton step, after which the error is its square
 MOST_STEPS = 25  # of Newton
 LONGEST_STEP = 0.3  # [m, rad] of a coordinate in a Newton step
 MOST_STRIDES = 400  # of the drives from where a motion was closed last
+WARM_STEPS = 6  # of Newton, in which loops close that were closed within a stride
+# Condition number of the loops, lengths in units of the mechanism's size, over that at home.
+WORST_CONDITION = 300.0
+# Of the size: by which rows may be open that others imply at home. Roundings of a file add up.
+OPEN_IN_MOTION = 1e-3
 TRANSLATION, ANGLE = 0, 1  # kinds of rows
+
+
+# Rows of tables of vectors: of a joint's frame, a closure's frames, a link's motion, a closure's
+# motion, and forces; a frame's orientation is three rows.
+PLACE_R, PLACE_P, AXIS, OF_FRAME = 0, 3, 4, 5
+A_R, A_P, B_R, B_P, OF_CLOSURE = 0, 3, 4, 7, 8
+R, P, Z, W, U, WD, UD, OF_LINK = 0, 3, 4, 5, 6, 7, 8, 9
+FORCE, MOMENT, OF_FORCES = 0, 1, 2
+# Columns of tables of whole numbers.
+PARENT, TURNS, COORDINATE = 0, 1, 2
+PASSIVE_OF, DRIVE_OF = 0, 1
+LOOP_A, LOOP_B, PATH_START, PATH_END = 0, 1, 2, 3
+LOOP, KIND, AXES = 0, 1, 2
+JOINT, SIGN = 0, 1
+SWAP, BELOW, RIGHT = 0, 1, 2
+UNIT = 2  # column of `row_reals`
+
+
+def _part(table: Array, of: int, at: int | slice) -> Array:
+    """Return a row, or some, of each group of `of` rows of vectors."""
+    return table.reshape(*table.shape[:-2], -1, of, 3)[..., at, :]
 
 
 class Tables(NamedTuple):
     """A mechanism as tables; joints are 1 .. J, in an order in which parents come first.
 
+    They are few: what compiled functions take costs by the number of arrays.
+
     Parameters
     ----------
-    parent, turns, coordinate : (J + 1,) int arrays
-    place_R (J + 1, 3, 3), place_p, axis (J + 1, 3), ratio, offset (J + 1,) : arrays
-        Frame at position 0 in the parent's, axis in the joint's; its position is
-        ratio q[coordinate] + offset.
+    joints : (J + 1, 3) int array
+        Parent, whether it turns, coordinate.
+    frames : ((J + 1) OF_FRAME, 3) array
+        Frame at position 0 in the parent's, and axis in the joint's.
+    ratio, offset : (J + 1,) arrays
+        A joint's position is ratio q[coordinate] + offset.
     passive, drives : int arrays
         Coordinates that closures determine, and those that are given.
+    places : (C, 2) int array
+        Place of each coordinate among them, or -1.
     stride : (D,) array
         By which drives move between closings.
-    loop_a, loop_b : (L,) int arrays
-        Joints whose links a closure connects; a_R, a_p, b_R, b_p its frames there.
-    row_loop, row_kind : (r,) int arrays
-    row_axes : (r, 4) int array
-        Translation along the first (axis of A). Angle: axis of A, axis of B, and a second pair.
-    row_weights : (r, 2) array
-        Of the two pairs.
-    path_start : (L + 1,), path_joint, path_sign : int arrays
-        Joints between a closure's two links, 1 on the side of B, -1 on that of A.
-    row_unit, passive_unit : (r,) arrays
-        The mechanism's size for lengths, 1 for angles: units in which conditioning is judged.
+    closures : (L, 4) int array
+        Joints whose links it connects; where its path begins and ends.
+    closure_frames : (L OF_CLOSURE, 3) array
+        Frames A and B there.
+    rows : (r, 6) int array
+        Closure, kind, and four axes. Translation along the first (axis of A); angle: axis of A,
+        axis of B, and a second pair. The first rows, as many as passive coordinates, determine
+        these; the others follow from them at home.
+    row_reals : (r, 3) array
+        Weights of the two pairs; the mechanism's size for lengths, 1 for angles: the unit in which
+        conditioning is judged.
+    passive_unit : (passive,) array
+        The same for coordinates.
+    path : (K, 2) int array
+        Joints between closures' two links, and 1 on the side of B, -1 on that of A.
+    starts : (passive + 1, 3) int array
+        Where lists begin in `swap`, `below` and `right`.
+    swap, below, right : int arrays
+        The order in which J_p is eliminated; see `elimination`.
     """
 
-    parent: Any
-    turns: Any
-    place_R: Any
-    place_p: Any
-    axis: Any
-    coordinate: Any
-    ratio: Any
-    offset: Any
-    passive: Any
-    drives: Any
-    stride: Any
-    loop_a: Any
-    loop_b: Any
-    a_R: Any
-    a_p: Any
-    b_R: Any
-    b_p: Any
-    row_loop: Any
-    row_kind: Any
-    row_axes: Any
-    row_weights: Any
-    path_start: Any
-    path_joint: Any
-    path_sign: Any
-    row_unit: Any
-    passive_unit: Any
+    joints: Integers
+    passive: Integers
+    drives: Integers
+    places: Integers
+    closures: Integers
+    rows: Integers
+    path: Integers
+    starts: Integers
+    swap: Integers
+    below: Integers
+    right: Integers
+    frames: Array
+    ratio: Array
+    offset: Array
+    stride: Array
+    closure_frames: Array
+    row_reals: Array
+    passive_unit: Array
+
+    @property
+    def parent(self) -> Integers:
+        """Parent of each joint, (J + 1,)."""
+        return self.joints[:, PARENT]
+
+    @property
+    def turns(self) -> Integers:
+        """Whether each joint turns, (J + 1,)."""
+        return self.joints[:, TURNS]
+
+    @property
+    def coordinate(self) -> Integers:
+        """Coordinate of each joint, (J + 1,)."""
+        return self.joints[:, COORDINATE]
+
+    @property
+    def place_R(self) -> Array:
+        """Orientation of each joint in its parent, (J + 1, 3, 3)."""
+        return _part(self.frames, OF_FRAME, slice(PLACE_R, PLACE_R + 3))
+
+    @property
+    def place_p(self) -> Array:
+        """Origin of each joint in its parent, (J + 1, 3)."""
+        return _part(self.frames, OF_FRAME, PLACE_P)
+
+    @property
+    def axis(self) -> Array:
+        """Axis of each joint, (J + 1, 3)."""
+        return _part(self.frames, OF_FRAME, AXIS)
+
+    @property
+    def loop_a(self) -> Integers:
+        """Joints whose links are A of each closure, (L,)."""
+        return self.closures[:, LOOP_A]
+
+    @property
+    def loop_b(self) -> Integers:
+        """Joints whose links are B of each closure, (L,)."""
+        return self.closures[:, LOOP_B]
+
+    @property
+    def a_R(self) -> Array:
+        """Orientation of the frames A in their links, (L, 3, 3)."""
+        return _part(self.closure_frames, OF_CLOSURE, slice(A_R, A_R + 3))
+
+    @property
+    def a_p(self) -> Array:
+        """Origins of the frames A in their links, (L, 3)."""
+        return _part(self.closure_frames, OF_CLOSURE, A_P)
+
+    @property
+    def b_R(self) -> Array:
+        """Orientation of the frames B in their links, (L, 3, 3)."""
+        return _part(self.closure_frames, OF_CLOSURE, slice(B_R, B_R + 3))
+
+    @property
+    def b_p(self) -> Array:
+        """Origins of the frames B in their links, (L, 3)."""
+        return _part(self.closure_frames, OF_CLOSURE, B_P)
+
+    @property
+    def row_unit(self) -> Array:
+        """Units of the rows, (r,)."""
+        return self.row_reals[:, UNIT]
 
 
 class Motion(NamedTuple):
@@ -101,63 +203,113 @@ class Motion(NamedTuple):
     ----------
     q, v, a : (C,) arrays
         Of all coordinates.
-    R (J + 1, 3, 3), p, z, w, u, wd, ud (J + 1, 3) : arrays
+    links : ((J + 1) OF_LINK, 3) array
         Orientation, origin, axis, angular and linear velocity and acceleration of each joint's
         link, at its origin.
-    A, B (L, 3, 3), pA, pB (L, 3) : arrays
+    loops : (L OF_CLOSURE, 3) array
         Frames of the closures.
     T : (C, D) array
-    J, inverse : (r, r) arrays
+    J, inverse : (passive, passive) arrays
         Scratch, and the inverse of J_p.
-    rows : (r, D + 1) array
+    by_drives : (passive, D) array
         Scratch.
-    state : (3,) array
-        Largest row before the last step; determinant and condition number of J_p.
+    gaps : (passive, 1) array
+        Scratch.
+    state : (4,) array
+        Largest row before the last step; determinant and condition number of J_p; steps of Newton
+        in the last stride.
     """
 
     q: Any
     v: Any
     a: Any
-    R: Any
-    p: Any
-    z: Any
-    w: Any
-    u: Any
-    wd: Any
-    ud: Any
-    A: Any
-    B: Any
-    pA: Any
-    pB: Any
+    links: Any
+    loops: Any
     T: Any
     J: Any
     inverse: Any
-    rows: Any
+    by_drives: Any
+    gaps: Any
     state: Any
+
+    @property
+    def R(self) -> Any:
+        """Orientation of each joint's link, (N, J + 1, 3, 3)."""
+        return _part(self.links, OF_LINK, slice(R, R + 3))
+
+    @property
+    def p(self) -> Any:
+        """Its origin, (N, J + 1, 3)."""
+        return _part(self.links, OF_LINK, P)
+
+    @property
+    def z(self) -> Any:
+        """Axis of each joint."""
+        return _part(self.links, OF_LINK, Z)
+
+    @property
+    def w(self) -> Any:
+        """Angular velocity of its link."""
+        return _part(self.links, OF_LINK, W)
+
+    @property
+    def u(self) -> Any:
+        """Velocity of its origin."""
+        return _part(self.links, OF_LINK, U)
+
+    @property
+    def wd(self) -> Any:
+        """Angular acceleration of its link."""
+        return _part(self.links, OF_LINK, WD)
+
+    @property
+    def ud(self) -> Any:
+        """Acceleration of its origin."""
+        return _part(self.links, OF_LINK, UD)
+
+    @property
+    def A(self) -> Any:
+        """Orientation of the closures' frames A, (N, L, 3, 3)."""
+        return _part(self.loops, OF_CLOSURE, slice(A_R, A_R + 3))
+
+    @property
+    def pA(self) -> Any:
+        """Their origins, (N, L, 3)."""
+        return _part(self.loops, OF_CLOSURE, A_P)
+
+    @property
+    def B(self) -> Any:
+        """Orientation of the closures' frames B."""
+        return _part(self.loops, OF_CLOSURE, slice(B_R, B_R + 3))
+
+    @property
+    def pB(self) -> Any:
+        """Their origins."""
+        return _part(self.loops, OF_CLOSURE, B_P)
 
 
 def vector(table: Any, k: int) -> Vector:
-    """Return row k of a table as a vector."""
+    """Return a row as a vector."""
     return Vector(table[k, 0], table[k, 1], table[k, 2])
 
 
 def column(table: Any, k: int, c: int) -> Vector:
-    """Return column c of matrix k of a table as a vector."""
-    return Vector(table[k, 0, c], table[k, 1, c], table[k, 2, c])
+    """Return column c of the matrix that begins with row k."""
+    return Vector(table[k, c], table[k + 1, c], table[k + 2, c])
 
 
 def put(table: Any, k: int, v: Vector) -> None:
-    """Write a vector to row k of a table."""
+    """Write a vector to a row."""
     table[k, 0], table[k, 1], table[k, 2] = v.x, v.y, v.z
 
 
 def put_column(table: Any, k: int, c: int, v: Vector) -> None:
-    """Write a vector to column c of matrix k of a table."""
-    table[k, 0, c], table[k, 1, c], table[k, 2, c] = v.x, v.y, v.z
+    """Write a vector to column c of the matrix that begins with row k."""
+    table[k, c], table[k + 1, c], table[k + 2, c] = v.x, v.y, v.z
 
 
 def increase(table: Any, k: int, v: Vector) -> None:
-    """Add a vector to row k of a table."""
+    """Add a vector to a row."""
     table[k, 0] += v.x
     table[k, 1] += v.y
     table[k, 2] += v.z
@@ -168,293 +320,350 @@ def length(v: Vector) -> Any:
     return sqrt(dot(v, v))
 
 
-def turned(R: Any, j: int, v: Vector) -> Vector:
-    """Return R[j] times a vector."""
-    return Vector(R[j, 0, 0] * v.x + R[j, 0, 1] * v.y + R[j, 0, 2] * v.z,
-                  R[j, 1, 0] * v.x + R[j, 1, 1] * v.y + R[j, 1, 2] * v.z,
-                  R[j, 2, 0] * v.x + R[j, 2, 1] * v.y + R[j, 2, 2] * v.z)
+def turned(table: Any, k: int, v: Vector) -> Vector:
+    """Return the matrix that begins with row k times a vector."""
+    return Vector(dot(vector(table, k), v), dot(vector(table, k + 1), v),
+                  dot(vector(table, k + 2), v))
 
 
-def turned_back(R: Any, j: int, v: Vector) -> Vector:
-    """Return the transpose of R[j] times a vector."""
-    return Vector(dot(column(R, j, 0), v), dot(column(R, j, 1), v), dot(column(R, j, 2), v))
+def turned_back(table: Any, k: int, v: Vector) -> Vector:
+    """Return the transpose of the matrix that begins with row k times a vector."""
+    x, y, z = vector(table, k), vector(table, k + 1), vector(table, k + 2)
+    return plus(plus(times(v.x, x), times(v.y, y)), times(v.z, z))
 
 
 def place(t: Tables, m: Motion) -> None:
     """Place joints and frames of closures for the coordinates."""
+    links, frames = m.links, t.frames
     for r in range(3):
         for c in range(3):
-            m.R[0, r, c] = 1.0 if r == c else 0.0
-        m.p[0, r] = 0.0
-    for j in range(1, len(t.parent)):
-        i = t.parent[j]
-        s = t.ratio[j] * m.q[t.coordinate[j]] + t.offset[j]
-        axis = vector(t.axis, j)
-        origin = plus(vector(m.p, i), turned(m.R, i, vector(t.place_p, j)))
-        z = turned(m.R, i, turned(t.place_R, j, axis))
-        if t.turns[j]:
-            _turn(t, m, i, j, axis, cos(s), sin(s))
+            links[R + r, c] = 1.0 if r == c else 0.0
+        links[P, r] = 0.0
+    for j in range(1, len(t.joints)):
+        at, above, own = OF_LINK * j, OF_LINK * t.joints[j, PARENT], OF_FRAME * j
+        s = t.ratio[j] * m.q[t.joints[j, COORDINATE]] + t.offset[j]
+        axis = vector(frames, own + AXIS)
+        origin = plus(vector(links, above + P), turned(links, above + R,
+                                                       vector(frames, own + PLACE_P)))
+        z = turned(links, above + R, turned(frames, own + PLACE_R, axis))
+        if t.joints[j, TURNS]:
+            # Columns of the rotation about the axis, each taken to the base.
+            C, S = cos(s), sin(s)
+            e = times(1.0 - C, axis)
+            x_of = Vector(C + e.x * axis.x, e.y * axis.x + S * axis.z, e.z * axis.x - S * axis.y)
+            y_of = Vector(e.x * axis.y - S * axis.z, C + e.y * axis.y, e.z * axis.y + S * axis.x)
+            z_of = Vector(e.x * axis.z + S * axis.y, e.y * axis.z - S * axis.x, C + e.z * axis.z)
+            put_column(links, at + R, 0, turned(links, above, turned(frames, own, x_of)))
+            put_column(links, at + R, 1, turned(links, above, turned(frames, own, y_of)))
+            put_column(links, at + R, 2, turned(links, above, turned(frames, own, z_of)))
         else:
             origin = plus(origin, times(s, z))
             for c in range(3):
-                put_column(m.R, j, c, turned(m.R, i, column(t.place_R, j, c)))
-        put(m.p, j, origin)
-        put(m.z, j, z)
-    for k in range(len(t.loop_a)):
-        _place_frame(m, t.loop_a[k], t.a_R, t.a_p, k, m.A, m.pA)
-        _place_frame(m, t.loop_b[k], t.b_R, t.b_p, k, m.B, m.pB)
+                put_column(links, at + R, c, turned(links, above, column(frames, own, c)))
+        put(links, at + P, origin)
+        put(links, at + Z, z)
+    for k in range(len(t.closures)):
+        for side in range(2):
+            j, own = OF_LINK * t.closures[k, side], OF_CLOSURE * k + side * B_R
+            put(m.loops, own + A_P, plus(vector(links, j + P), turned(
+                links, j, vector(t.closure_frames, own + A_P))))
+            for c in range(3):
+                put_column(m.loops, own, c, turned(links, j, column(t.closure_frames, own, c)))
 
 
-def _turn(t: Tables, m: Motion, i: int, j: int, a: Vector, C: Any, S: Any) -> None:
-    """Fill in the orientation of a joint's link after a turn about its axis."""
-    e = times(1.0 - C, a)
-    # Columns of the rotation about the axis, each taken to the base.
-    x = Vector(C + e.x * a.x, e.y * a.x + S * a.z, e.z * a.x - S * a.y)
-    y = Vector(e.x * a.y - S * a.z, C + e.y * a.y, e.z * a.y + S * a.x)
-    z = Vector(e.x * a.z + S * a.y, e.y * a.z - S * a.x, C + e.z * a.z)
-    put_column(m.R, j, 0, turned(m.R, i, turned(t.place_R, j, x)))
-    put_column(m.R, j, 1, turned(m.R, i, turned(t.place_R, j, y)))
-    put_column(m.R, j, 2, turned(m.R, i, turned(t.place_R, j, z)))
-
-
-def _place_frame(m: Motion, j: int, frame_R: Any, frame_p: Any, k: int, placed: Any,
-                 origin: Any) -> None:
-    put(origin, k, plus(vector(m.p, j), turned(m.R, j, vector(frame_p, k))))
-    for c in range(3):
-        put_column(placed, k, c, turned(m.R, j, column(frame_R, k, c)))
-
-
-def gap(t: Tables, m: Motion, r: int) -> Any:
+def residual(t: Tables, m: Motion, r: int) -> Any:
     """Return a row's value: by how much a closure is open [m, rad]."""
-    k, i = t.row_loop[r], t.row_axes[r, 0]
-    if t.row_kind[r] == TRANSLATION:
-        return dot(column(m.A, k, i), minus(vector(m.pB, k), vector(m.pA, k)))
-    j, g, h = t.row_axes[r, 1], t.row_axes[r, 2], t.row_axes[r, 3]
-    return (t.row_weights[r, 0] * dot(column(m.A, k, i), column(m.B, k, j))
-            + t.row_weights[r, 1] * dot(column(m.A, k, g), column(m.B, k, h)))
+    k, i, loops = OF_CLOSURE * t.rows[r, LOOP], t.rows[r, AXES], m.loops
+    if t.rows[r, KIND] == TRANSLATION:
+        return dot(column(loops, k + A_R, i), minus(vector(loops, k + B_P), vector(loops, k + A_P)))
+    j, g, h = t.rows[r, AXES + 1], t.rows[r, AXES + 2], t.rows[r, AXES + 3]
+    return (t.row_reals[r, 0] * dot(column(loops, k + A_R, i), column(loops, k + B_R, j))
+            + t.row_reals[r, 1] * dot(column(loops, k + A_R, g), column(loops, k + B_R, h)))
 
 
 def row_axis(t: Tables, m: Motion, r: int) -> Vector:
     """Return what a row multiplies the relative velocity by: of points, or angular."""
-    k, i = t.row_loop[r], t.row_axes[r, 0]
-    if t.row_kind[r] == TRANSLATION:
-        return column(m.A, k, i)
-    j, g, h = t.row_axes[r, 1], t.row_axes[r, 2], t.row_axes[r, 3]
-    return plus(times(t.row_weights[r, 0], product(column(m.B, k, j), column(m.A, k, i))),
-                times(t.row_weights[r, 1], product(column(m.B, k, h), column(m.A, k, g))))
+    k, i, loops = OF_CLOSURE * t.rows[r, LOOP], t.rows[r, AXES], m.loops
+    if t.rows[r, KIND] == TRANSLATION:
+        return column(loops, k + A_R, i)
+    j, g, h = t.rows[r, AXES + 1], t.rows[r, AXES + 2], t.rows[r, AXES + 3]
+    return plus(
+        times(t.row_reals[r, 0], product(column(loops, k + B_R, j), column(loops, k + A_R, i))),
+        times(t.row_reals[r, 1], product(column(loops, k + B_R, h), column(loops, k + A_R, g))))
 
 
-def gradients(t: Tables, m: Motion, place_of: Any, J: Any) -> None:
-    """Add up the derivatives of the rows by coordinates; `place_of` has their columns, or -1."""
-    # Arrays by names of their own: compiled code counts references to those of a tuple, at each
-    # use within a loop.
-    pB, p, z, turns = m.pB, m.p, m.z, t.turns
-    start, joint, sign, coordinate, ratio = (t.path_start, t.path_joint, t.path_sign, t.coordinate,
-                                             t.ratio)
-    for r in range(len(t.row_loop)):
-        for c in range(len(J[0])):
-            J[r, c] = 0.0
-        k, of_points = t.row_loop[r], t.row_kind[r] == TRANSLATION
+def jacobian(t: Tables, m: Motion, places: Any, of_passive: Any, of_drives: Any) -> None:
+    """Fill in the derivatives of the first rows by passive coordinates, and by drives.
+
+    Parameters
+    ----------
+    t, m : Tables, Motion
+    places : (C, 2) int array
+        Column of each coordinate in either, or -1.
+    of_passive (r, P), of_drives (r, D) : arrays
+        As many rows as are filled in.
+    """
+    for r in range(len(of_passive)):
+        for c in range(of_passive.shape[1]):
+            of_passive[r, c] = 0.0
+        for d in range(of_drives.shape[1]):
+            of_drives[r, d] = 0.0
+        k, of_points = t.rows[r, LOOP], t.rows[r, KIND] == TRANSLATION
         e = row_axis(t, m, r)
         # Per rate of a joint on the side of B: e' (z x (p_B - p)), e' z, or nothing.
-        moment = product(vector(pB, k), e)
-        for n in range(start[k], start[k + 1]):
-            j = joint[n]
-            c = place_of[coordinate[j]]
-            if c < 0 or not (of_points or turns[j]):
+        moment = product(vector(m.loops, OF_CLOSURE * k + B_P), e)
+        for n in range(t.closures[k, PATH_START], t.closures[k, PATH_END]):
+            j = t.path[n, JOINT]
+            turns = t.joints[j, TURNS]
+            if not (of_points or turns):
                 continue
-            factor = sign[n] * ratio[j]
-            if of_points and turns[j]:
-                J[r, c] += factor * dot(vector(z, j), minus(moment, product(vector(p, j), e)))
-            else:
-                J[r, c] += factor * dot(e, vector(z, j))
+            z = vector(m.links, OF_LINK * j + Z)
+            along = dot(z, minus(moment, product(vector(m.links, OF_LINK * j + P), e))) if (
+                of_points and turns) else dot(z, e)
+            x = t.path[n, SIGN] * t.ratio[j] * along
+            c, d = places[t.joints[j, COORDINATE], 0], places[t.joints[j, COORDINATE], 1]
+            if c >= 0:
+                of_passive[r, c] += x
+            if d >= 0:
+                of_drives[r, d] += x
 
 
-def close(t: Tables, m: Motion, passive_of: Any) -> Any:
-    """Move the passive coordinates until the loops close; return the largest row before."""
-    count = len(t.row_loop)
-    size = 0.0 * m.q[0]
-    for _ in range(MOST_STEPS):
-        place(t, m)
-        size = 0.0 * size
-        for r in range(count):
-            m.rows[r, 0] = gap(t, m, r)
-            size = larger(size, abs(m.rows[r, 0]))
-        gradients(t, m, passive_of, m.J)
-        solve(m.J, m.rows, count, 1)
-        step = 0.0 * size
-        for r in range(count):
-            step = larger(step, abs(m.rows[r, 0]))
-        share = LONGEST_STEP / larger(step, LONGEST_STEP + 0.0 * step)
-        for r in range(count):
-            m.q[t.passive[r]] -= share * m.rows[r, 0]
-        if everywhere(size < CLOSED):
-            break
-    return size
+def reach(t: Tables, m: Motion, start: Any, goal: Any) -> bool:
+    """Close the loops for the drives' positions `goal`, walked from closed coordinates `start`.
 
-
-def reach(t: Tables, m: Motion, start: Any, passive_of: Any) -> bool:
-    """Close the loops for the drives of `m.q`, walked from the closed coordinates `start`.
+    In each stride Newton's method moves the passive coordinates until the loops close.
 
     Returns
     -------
     bool
         False where the loops do not close on the way.
     """
-    need = 0.0 * m.q[0]
+    zero, count = 0.0 * goal[0], len(t.passive)
+    for c in range(len(m.q)):
+        m.q[c] = start[c] + zero
+    m.state[0] = m.state[3] = need = size = zero
     for d in range(len(t.drives)):
-        c = t.drives[d]
-        m.v[c] = m.q[c]  # the goal, until velocities are filled in
-        need = larger(need, abs(m.v[c] - start[c]) / t.stride[d])
+        m.q[t.drives[d]] = goal[d]
+        need = larger(need, abs(goal[d] - start[t.drives[d]]) / t.stride[d])
+    if not count:
+        return True
     if not everywhere(need < MOST_STRIDES):
         m.state[0] = need + 1.0
         return False
     strides = largest(need)
-    for c in range(len(m.q)):
-        m.q[c] = start[c] + 0.0 * need
-    size = 0.0 * need
     for k in range(1, strides + 1):
         for d in range(len(t.drives)):
             c = t.drives[d]
-            m.q[c] = m.v[c] + (1.0 - k / strides) * (start[c] - m.v[c])
-        size = larger(0.0 * size, close(t, m, passive_of))
+            m.q[c] = goal[d] + (1.0 - k / strides) * (start[c] - goal[d])
+        for n in range(MOST_STEPS):
+            m.state[3] = 1.0 + n + zero
+            place(t, m)
+            size = zero
+            for r in range(count):
+                m.gaps[r, 0] = residual(t, m, r)
+                size = larger(size, abs(m.gaps[r, 0]))
+            jacobian(t, m, t.places, m.J, m.by_drives)
+            solve(m.J, m.gaps, t)
+            step = zero
+            for r in range(count):
+                step = larger(step, abs(m.gaps[r, 0]))
+            share = LONGEST_STEP / larger(step, LONGEST_STEP + 0.0 * step)
+            for r in range(count):
+                m.q[t.passive[r]] -= share * m.gaps[r, 0]
+            if everywhere(larger(step, size) < CLOSED):
+                break
         if not everywhere(size < CLOSED):
             break
     m.state[0] = size
     return everywhere(size < CLOSED)
 
 
-def move(t: Tables, m: Motion, passive_of: Any, drive_of: Any) -> None:
+def is_near(t: Tables, start: Any, goal: Any) -> bool:
+    """Return whether all drives are within a stride of a goal (D,) at coordinates `start`."""
+    near = True
+    for d in range(len(t.drives)):
+        near = near and abs(goal[d] - start[t.drives[d]]) < t.stride[d]
+    return near
+
+
+def is_sound(t: Tables, m: Motion, at_home: Any) -> bool:
+    """Return whether the loops are assembled as at home, well conditioned, and all closed.
+
+    Parameters
+    ----------
+    t, m : Tables, Motion
+    at_home : (4,) array
+        `m.state` there.
+    """
+    if len(t.passive) and not everywhere((m.state[1] * at_home[1] > 0.0) & (
+            m.state[2] < WORST_CONDITION * at_home[2])):
+        return False
+    for r in range(len(t.passive), len(t.rows)):
+        if not everywhere(abs(residual(t, m, r)) < OPEN_IN_MOTION * t.row_reals[r, UNIT]):
+            return False
+    return True
+
+
+def follow(t: Tables, m: Motion, v: Any, a: Any) -> None:
     """Fill in all that follows from closed positions, and velocities and accelerations of drives.
 
-    `m.v` and `m.a` hold those of the drives, and 0 elsewhere.
+    Parameters
+    ----------
+    t : Tables
+    m : Motion
+        With `q`.
+    v, a : (D,) arrays
     """
-    count, drives = len(t.row_loop), len(t.drives)
-    T, inverse, rows, v, a = m.T, m.inverse, m.rows, m.v, m.a
-    passive, driven = t.passive, t.drives
+    count, drives = len(t.passive), len(t.drives)
+    T, inverse, by_drives, passive = m.T, m.inverse, m.by_drives, t.passive
     zero = 0.0 * m.q[0]
-    place(t, m)
-    for c in range(len(v)):
+    for c in range(len(m.v)):
+        m.v[c] = zero
+        m.a[c] = zero
         for d in range(drives):
             T[c, d] = 0.0
     for d in range(drives):
-        T[driven[d], d] = 1.0
+        m.v[t.drives[d]] = v[d]
+        m.a[t.drives[d]] = a[d]
+        T[t.drives[d], d] = 1.0
+    place(t, m)
+    m.state[1] = m.state[2] = zero
     if count:
-        gradients(t, m, passive_of, m.J)
-        there = size_in_units(m.J, t.row_unit, t.passive_unit)
+        jacobian(t, m, t.places, m.J, by_drives)
+        there = zero
         for r in range(count):
             for c in range(count):
+                x = m.J[r, c] * t.passive_unit[c] / t.row_reals[r, UNIT]
+                there = there + x * x
                 inverse[r, c] = 1.0 if r == c else 0.0
-        m.state[1] = solve(m.J, inverse, count, count)
-        m.state[2] = there * size_in_units(inverse, t.passive_unit, t.row_unit)
-        gradients(t, m, drive_of, rows)
+        m.state[1] = solve(m.J, inverse, t)
+        # The condition number takes all of the inverse, so that it serves for the rest as well.
+        back = zero
+        for c in range(count):
+            for r in range(count):
+                x = inverse[c, r] * t.row_reals[r, UNIT] / t.passive_unit[c]
+                back = back + x * x
+        m.state[2] = sqrt(there * back)
         # Drives innermost: their sums do not wait for one another.
         for c in range(count):
             k = passive[c]
             for r in range(count):
                 for d in range(drives):
-                    T[k, d] -= inverse[c, r] * rows[r, d]
+                    T[k, d] -= inverse[c, r] * by_drives[r, d]
         for c in range(count):
             x = zero
             for d in range(drives):
-                x = x + T[passive[c], d] * v[driven[d]]
-            v[passive[c]] = x
-            a[passive[c]] = 0.0
+                x = x + T[passive[c], d] * v[d]
+            m.v[passive[c]] = x
     velocities(t, m)
     accelerations(t, m)
     if count:
         for r in range(count):
-            rows[r, 0] = row_acceleration(t, m, r)
+            m.gaps[r, 0] = row_acceleration(t, m, r)
         for c in range(count):
             x = zero
             for r in range(count):
-                x = x + inverse[c, r] * rows[r, 0]
-            a[passive[c]] = -x
+                x = x + inverse[c, r] * m.gaps[r, 0]
+            m.a[passive[c]] = -x
         accelerations(t, m)
 
 
-def size_in_units(matrix: Any, of_rows: Any, of_columns: Any) -> Any:
-    """Return Frobenius' norm of a matrix that takes what has units to what has others."""
-    total = 0.0 * matrix[0, 0]
-    for r in range(len(of_rows)):
-        along = 0.0 * total
-        for c in range(len(of_columns)):
-            x = matrix[r, c] * of_columns[c]
-            along = along + x * x
-        total = total + along / (of_rows[r] * of_rows[r])
-    return sqrt(total)
+def predict(t: Tables, m: Motion, goal: Any, start: Any) -> None:
+    """Move closed coordinates from a sample to where its rates lead with the next drives' goal.
+
+    Parameters
+    ----------
+    t, m : Tables, Motion
+    goal : (D,) array
+        Within a stride.
+    start : (C,) array
+        Those of the sample.
+    """
+    for d in range(len(t.drives)):
+        moved = goal[d] - start[t.drives[d]]
+        start[t.drives[d]] = goal[d]
+        for c in range(len(t.passive)):
+            start[t.passive[c]] += m.T[t.passive[c], d] * moved
 
 
 def velocities(t: Tables, m: Motion) -> None:
     """Fill in the velocities of the links."""
+    links = m.links
     for c in range(3):
-        m.w[0, c] = m.u[0, c] = 0.0
-    for j in range(1, len(t.parent)):
-        i = t.parent[j]
-        w = vector(m.w, i)
-        u = plus(vector(m.u, i), product(w, minus(vector(m.p, j), vector(m.p, i))))
-        own = times(t.ratio[j] * m.v[t.coordinate[j]], vector(m.z, j))
-        if t.turns[j]:
+        links[W, c] = links[U, c] = 0.0
+    for j in range(1, len(t.joints)):
+        at, above = OF_LINK * j, OF_LINK * t.joints[j, PARENT]
+        w = vector(links, above + W)
+        arm = minus(vector(links, at + P), vector(links, above + P))
+        u = plus(vector(links, above + U), product(w, arm))
+        own = times(t.ratio[j] * m.v[t.joints[j, COORDINATE]], vector(links, at + Z))
+        if t.joints[j, TURNS]:
             w = plus(w, own)
         else:
             u = plus(u, own)
-        put(m.w, j, w)
-        put(m.u, j, u)
+        put(links, at + W, w)
+        put(links, at + U, u)
 
 
 def accelerations(t: Tables, m: Motion) -> None:
     """Fill in the accelerations of the links."""
+    links = m.links
     for c in range(3):
-        m.wd[0, c] = m.ud[0, c] = 0.0
-    for j in range(1, len(t.parent)):
-        i, z = t.parent[j], vector(m.z, j)
-        w, wd = vector(m.w, i), vector(m.wd, i)
-        arm = minus(vector(m.p, j), vector(m.p, i))
-        ud = plus(plus(vector(m.ud, i), product(wd, arm)), product(w, product(w, arm)))
-        own = times(t.ratio[j] * m.a[t.coordinate[j]], z)
-        turning = product(w, times(t.ratio[j] * m.v[t.coordinate[j]], z))
-        if t.turns[j]:
+        links[WD, c] = links[UD, c] = 0.0
+    for j in range(1, len(t.joints)):
+        at, above = OF_LINK * j, OF_LINK * t.joints[j, PARENT]
+        k, z = t.joints[j, COORDINATE], vector(links, at + Z)
+        w, wd = vector(links, above + W), vector(links, above + WD)
+        arm = minus(vector(links, at + P), vector(links, above + P))
+        ud = plus(plus(vector(links, above + UD), product(wd, arm)), product(w, product(w, arm)))
+        own = times(t.ratio[j] * m.a[k], z)
+        turning = product(w, times(t.ratio[j] * m.v[k], z))
+        if t.joints[j, TURNS]:
             wd = plus(plus(wd, own), turning)
         else:
             ud = plus(plus(ud, own), times(2.0, turning))
-        put(m.wd, j, wd)
-        put(m.ud, j, ud)
+        put(links, at + WD, wd)
+        put(links, at + UD, ud)
 
 
-def _point(m: Motion, j: int, place: Vector) -> Any:
+def _point(m: Motion, j: int, at: Vector) -> Any:
     """Return velocity and acceleration of a link's point at a place."""
-    arm, w = minus(place, vector(m.p, j)), vector(m.w, j)
+    k = OF_LINK * j
+    arm, w = minus(at, vector(m.links, k + P)), vector(m.links, k + W)
     v = product(w, arm)
-    return (plus(vector(m.u, j), v),
-            plus(plus(vector(m.ud, j), product(vector(m.wd, j), arm)), product(w, v)))
+    return (plus(vector(m.links, k + U), v),
+            plus(plus(vector(m.links, k + UD), product(vector(m.links, k + WD), arm)),
+                 product(w, v)))
 
 
 def _turning(m: Motion, j: int, direction: Vector) -> Any:
     """Return first and second derivative of a direction fixed in a link."""
-    w = vector(m.w, j)
+    w = vector(m.links, OF_LINK * j + W)
     v = product(w, direction)
-    return v, plus(product(vector(m.wd, j), direction), product(w, v))
+    return v, plus(product(vector(m.links, OF_LINK * j + WD), direction), product(w, v))
 
 
 def row_acceleration(t: Tables, m: Motion, r: int) -> Any:
     """Return the second derivative of a row by time."""
-    k, i = t.row_loop[r], t.row_axes[r, 0]
-    if t.row_kind[r] == TRANSLATION:
-        e, p_a, p_b = column(m.A, k, i), vector(m.pA, k), vector(m.pB, k)
-        de, dde = _turning(m, t.loop_a[k], e)
-        v_a, a_a = _point(m, t.loop_a[k], p_a)
-        v_b, a_b = _point(m, t.loop_b[k], p_b)
+    k, i, loops = t.rows[r, LOOP], t.rows[r, AXES], m.loops
+    if t.rows[r, KIND] == TRANSLATION:
+        own = OF_CLOSURE * k
+        e, p_a, p_b = column(loops, own, i), vector(loops, own + A_P), vector(loops, own + B_P)
+        de, dde = _turning(m, t.closures[k, LOOP_A], e)
+        v_a, a_a = _point(m, t.closures[k, LOOP_A], p_a)
+        v_b, a_b = _point(m, t.closures[k, LOOP_B], p_b)
         return (dot(e, minus(a_b, a_a)) + 2.0 * dot(de, minus(v_b, v_a))
                 + dot(dde, minus(p_b, p_a)))
-    total = t.row_weights[r, 0] * _angle_acceleration(t, m, k, i, t.row_axes[r, 1])
-    return total + t.row_weights[r, 1] * _angle_acceleration(
-        t, m, k, t.row_axes[r, 2], t.row_axes[r, 3])
+    total = t.row_reals[r, 0] * _angle_acceleration(t, m, k, i, t.rows[r, AXES + 1])
+    return total + t.row_reals[r, 1] * _angle_acceleration(
+        t, m, k, t.rows[r, AXES + 2], t.rows[r, AXES + 3])
 
 
 def _angle_acceleration(t: Tables, m: Motion, k: int, i: int, j: int) -> Any:
-    a, b = column(m.A, k, i), column(m.B, k, j)
-    da, dda = _turning(m, t.loop_a[k], a)
-    db, ddb = _turning(m, t.loop_b[k], b)
+    own = OF_CLOSURE * k
+    a, b = column(m.loops, own + A_R, i), column(m.loops, own + B_R, j)
+    da, dda = _turning(m, t.closures[k, LOOP_A], a)
+    db, ddb = _turning(m, t.closures[k, LOOP_B], b)
     return dot(dda, b) + dot(a, ddb) + 2.0 * dot(da, db)
 
 
@@ -463,118 +672,128 @@ class Loads(NamedTuple):
 
     Parameters
     ----------
-    f, n : (J + 1, 3) arrays
+    links : ((J + 1) OF_FORCES, 3) array
         What each joint transmits to its link: force, and moment about its origin.
-    coordinates : (C,) array
-        Efforts of the tree's coordinates.
+    loops : (L OF_FORCES, 3) array
+        What the link of A does to that of B in each closure: force and moment.
+    coordinates, rubbed : (C,) arrays
+        Efforts of the tree's coordinates, and against friction of joints.
     efforts : (D,) array
         Of the drives.
-    F, N : (L, 3) arrays
-        What the link of A does to that of B in each closure.
-    rows : (r,) array
     """
 
-    f: Any
-    n: Any
+    links: Any
+    loops: Any
     coordinates: Any
+    rubbed: Any
     efforts: Any
-    F: Any
-    N: Any
-    rows: Any
+
+    @property
+    def f(self) -> Any:
+        """Forces that joints transmit, (N, J + 1, 3)."""
+        return _part(self.links, OF_FORCES, FORCE)
+
+    @property
+    def n(self) -> Any:
+        """Moments that joints transmit about their origins."""
+        return _part(self.links, OF_FORCES, MOMENT)
+
+    @property
+    def F(self) -> Any:
+        """Forces in the closures, (N, L, 3)."""
+        return _part(self.loops, OF_FORCES, FORCE)
 
 
-def apply_bodies(t: Tables, m: Motion, inertial: Any, gravity: Any, o: Loads) -> None:
-    """Add the forces that move the bodies, `inertial` (J + 1, 10), and fill in what follows.
+def inverse_dynamics(t: Tables, m: Motion, inertial: Any, gravity: Any, o: Loads) -> None:
+    """Add the forces that move the bodies, `inertial` (J + 1, 10), and the efforts that follow.
 
-    `o.f` and `o.n` hold what links apply to the world beside them.
+    `o.links` holds what links apply to the world beside them.
     """
-    g = Vector(gravity[0], gravity[1], gravity[2])
-    for j in range(1, len(t.parent)):
-        mass = inertial[j, 0]
+    g, links = Vector(gravity[0], gravity[1], gravity[2]), m.links
+    for j in range(1, len(t.joints)):
+        mass, at = inertial[j, 0], OF_LINK * j
         if mass == 0.0 and inertial[j, 4] == 0.0 and inertial[j, 1] == 0.0:
             continue
-        h = turned(m.R, j, Vector(inertial[j, 1], inertial[j, 2], inertial[j, 3]))
-        a, w, wd = minus(vector(m.ud, j), g), vector(m.w, j), vector(m.wd, j)
-        increase(o.f, j, plus(plus(times(mass, a), product(wd, h)), product(w, product(w, h))))
-        spin = plus(_inertia_times(m.R, j, inertial, wd),
-                    product(w, _inertia_times(m.R, j, inertial, w)))
-        increase(o.n, j, plus(spin, product(h, a)))
-    transmit(t, m, o)
-
-
-def _inertia_times(R: Any, j: int, inertial: Any, v: Vector) -> Vector:
-    x, y, z = turned_back(R, j, v)
-    xx, xy, yy = inertial[j, 4], inertial[j, 5], inertial[j, 6]
-    xz, yz, zz = inertial[j, 7], inertial[j, 8], inertial[j, 9]
-    return turned(R, j, Vector(xx * x + xy * y + xz * z, xy * x + yy * y + yz * z,
-                               xz * x + yz * y + zz * z))
-
-
-def transmit(t: Tables, m: Motion, o: Loads) -> None:
-    """Add up what joints transmit from what their links need, and the efforts that follow."""
+        h = turned(links, at + R, Vector(inertial[j, 1], inertial[j, 2], inertial[j, 3]))
+        a, w, wd = minus(vector(links, at + UD), g), vector(links, at + W), vector(links, at + WD)
+        increase(o.links, OF_FORCES * j + FORCE, plus(
+            plus(times(mass, a), product(wd, h)), product(w, product(w, h))))
+        spin = plus(_inertia_times(links, j, inertial, wd),
+                    product(w, _inertia_times(links, j, inertial, w)))
+        increase(o.links, OF_FORCES * j + MOMENT, plus(spin, product(h, a)))
     for c in range(len(m.q)):
         o.coordinates[c] = 0.0
-    for j in range(len(t.parent) - 1, 0, -1):
-        i, z, f, n = t.parent[j], vector(m.z, j), vector(o.f, j), vector(o.n, j)
-        along = dot(z, n) if t.turns[j] else dot(z, f)
-        o.coordinates[t.coordinate[j]] += t.ratio[j] * along
-        arm = minus(vector(m.p, j), vector(m.p, i))
-        increase(o.f, i, f)
-        increase(o.n, i, plus(n, product(arm, f)))
-    T, of_tree, passive = m.T, o.coordinates, t.passive
-    for d in range(len(t.drives)):
-        x = of_tree[t.drives[d]] + 0.0
+    for j in range(len(t.joints) - 1, 0, -1):
+        i, own = t.joints[j, PARENT], OF_FORCES * j
+        f, n = vector(o.links, own + FORCE), vector(o.links, own + MOMENT)
+        along = dot(vector(links, OF_LINK * j + Z), n if t.joints[j, TURNS] else f)
+        o.coordinates[t.joints[j, COORDINATE]] += t.ratio[j] * along
+        arm = minus(vector(links, OF_LINK * j + P), vector(links, OF_LINK * i + P))
+        increase(o.links, OF_FORCES * i + FORCE, f)
+        increase(o.links, OF_FORCES * i + MOMENT, plus(n, product(arm, f)))
+    to_drives(t, m, o.coordinates, o.efforts)
+
+
+def _inertia_times(links: Any, j: int, inertial: Any, v: Vector) -> Vector:
+    x, y, z = turned_back(links, OF_LINK * j + R, v)
+    xx, xy, yy = inertial[j, 4], inertial[j, 5], inertial[j, 6]
+    xz, yz, zz = inertial[j, 7], inertial[j, 8], inertial[j, 9]
+    return turned(links, OF_LINK * j + R, Vector(
+        xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z))
+
+
+def to_drives(t: Tables, m: Motion, of_tree: Any, efforts: Any) -> None:
+    """Fill in the drives' efforts T' tau for efforts of the tree's coordinates."""
+    T, passive, driven = m.T, t.passive, t.drives
+    for d in range(len(driven)):
+        x = of_tree[driven[d]] + 0.0
         for c in range(len(passive)):
             x = x + T[passive[c], d] * of_tree[passive[c]]
-        o.efforts[d] = x
+        efforts[d] = x
 
 
-def react(t: Tables, m: Motion, o: Loads) -> None:
-    """Fill in the reactions: what the closures transmit, and with them the joints."""
-    count = len(t.row_loop)
-    for k in range(len(t.loop_a)):
+def constraint_forces(t: Tables, m: Motion, o: Loads) -> None:
+    """Fill in what the closures transmit, and with them the joints."""
+    count, inverse = len(t.passive), m.inverse
+    for k in range(len(o.loops)):
         for c in range(3):
-            o.F[k, c] = o.N[k, c] = 0.0
-    inverse, of_tree, passive = m.inverse, o.coordinates, t.passive
+            o.loops[k, c] = 0.0
     for r in range(count):
         x = 0.0 * m.q[0]
         for c in range(count):
-            x = x + inverse[c, r] * of_tree[passive[c]]
-        o.rows[r] = x
-        k = t.row_loop[r]
-        if t.row_kind[r] == TRANSLATION:
-            increase(o.F, k, times(x, row_axis(t, m, r)))
-        else:
-            increase(o.N, k, times(x, row_axis(t, m, r)))
-    for k in range(len(t.loop_a)):
-        F, N, p_b = vector(o.F, k), vector(o.N, k), vector(m.pB, k)
-        for s in range(t.path_start[k], t.path_start[k + 1]):
-            j, sign = t.path_joint[s], t.path_sign[s]
-            arm = minus(p_b, vector(m.p, j))
-            increase(o.f, j, times(-sign, F))
-            increase(o.n, j, times(-sign, plus(N, product(arm, F))))
+            x = x + inverse[c, r] * o.coordinates[t.passive[c]]
+        kind = FORCE if t.rows[r, KIND] == TRANSLATION else MOMENT
+        increase(o.loops, OF_FORCES * t.rows[r, LOOP] + kind, times(x, row_axis(t, m, r)))
+    for k in range(len(t.closures)):
+        F, N = vector(o.loops, OF_FORCES * k + FORCE), vector(o.loops, OF_FORCES * k + MOMENT)
+        p_b = vector(m.loops, OF_CLOSURE * k + B_P)
+        for s in range(t.closures[k, PATH_START], t.closures[k, PATH_END]):
+            j, sign = t.path[s, JOINT], 1.0 * t.path[s, SIGN]
+            arm = minus(p_b, vector(m.links, OF_LINK * j + P))
+            increase(o.links, OF_FORCES * j + FORCE, times(-sign, F))
+            increase(o.links, OF_FORCES * j + MOMENT, times(-sign, plus(N, product(arm, F))))
 
 
-def twist(t: Tables, m: Motion, W: Any, U: Any) -> None:
-    """Fill in angular and linear velocity of each link per rate of each drive, (J + 1, 3, D)."""
-    T, turns, axis = m.T, t.turns, m.z
+def twist(t: Tables, m: Motion, of_turns: Any, of_origins: Any) -> None:
+    """Fill in angular and linear velocity of each link per rate of each drive, (3 (J + 1), D)."""
     drives = len(t.drives)
-    for d in range(drives):
-        for c in range(3):
-            W[0, c, d] = U[0, c, d] = 0.0
-    for j in range(1, len(t.parent)):
-        i, k, ratio = t.parent[j], t.coordinate[j], t.ratio[j]
-        arm, z = minus(vector(m.p, j), vector(m.p, i)), vector(axis, j)
+    for c in range(3):
         for d in range(drives):
-            w = column(W, i, d)
-            u = plus(column(U, i, d), product(w, arm))
-            own = times(ratio * T[k, d], z)
-            if turns[j]:
+            of_turns[c, d] = of_origins[c, d] = 0.0
+    for j in range(1, len(t.joints)):
+        at, i, k = OF_LINK * j, t.joints[j, PARENT], t.joints[j, COORDINATE]
+        arm = minus(vector(m.links, at + P), vector(m.links, OF_LINK * i + P))
+        z = vector(m.links, at + Z)
+        for d in range(drives):
+            w = column(of_turns, 3 * i, d)
+            u = plus(column(of_origins, 3 * i, d), product(w, arm))
+            own = times(t.ratio[j] * m.T[k, d], z)
+            if t.joints[j, TURNS]:
                 w = plus(w, own)
             else:
                 u = plus(u, own)
-            put_column(W, j, d, w)
-            put_column(U, j, d, u)
+            put_column(of_turns, 3 * j, d, w)
+            put_column(of_origins, 3 * j, d, u)
 
 
 class JointFriction(NamedTuple):
@@ -596,28 +815,32 @@ class JointFriction(NamedTuple):
     width: Any
 
 
-def load_across(t: Tables, m: Motion, o: Loads, j: int) -> Any:
-    """Return the force that a joint transmits across its axis [N]."""
-    return length(product(vector(o.f, j), vector(m.z, j)))
+def joint_friction(t: Tables, m: Motion, o: Loads, s: JointFriction, efforts: Any) -> None:
+    """Fill in the drives' efforts (D,) against friction of passive joints, with their loads.
 
-
-def rub(t: Tables, m: Motion, o: Loads, s: JointFriction, W: Any, efforts: Any) -> None:
-    """Add the drives' efforts against friction of passive joints, with their loads."""
+    The moment in a closure acts on both of its links: it is felt in the joints between them.
+    """
+    zero, of_tree, links = 0.0 * m.q[0], o.rubbed, m.links
+    for c in range(len(m.q)):
+        of_tree[c] = zero
     for k in range(len(s.joint)):
         j = s.joint[k]
         if j >= 0:
-            c = t.coordinate[j]
+            c = t.joints[j, COORDINATE]
             rate = t.ratio[j] * m.v[c]
-            dry = s.torque[k] + s.lever[k] * load_across(t, m, o, j)
-            x = t.ratio[j] * (s.viscous[k] * rate + dry * tanh(rate / s.width[k]))
-            for d in range(len(t.drives)):
-                efforts[d] += m.T[c, d] * x
+            across = product(vector(o.links, OF_FORCES * j + FORCE), vector(links, OF_LINK * j + Z))
+            dry = s.torque[k] + s.lever[k] * length(across)
+            of_tree[c] += t.ratio[j] * (s.viscous[k] * rate + dry * tanh(rate / s.width[k]))
         else:
             g = s.loop[k]
-            a, b = t.loop_a[g], t.loop_b[g]
-            relative = minus(vector(m.w, b), vector(m.w, a))
+            relative = minus(vector(links, OF_LINK * t.closures[g, LOOP_B] + W),
+                             vector(links, OF_LINK * t.closures[g, LOOP_A] + W))
             speed = larger(length(relative), 1e-8 * s.width[k])
-            dry = s.torque[k] + s.lever[k] * length(vector(o.F, g))
-            f = s.viscous[k] + dry * tanh(speed / s.width[k]) / speed
-            for d in range(len(t.drives)):
-                efforts[d] += f * dot(relative, minus(column(W, b, d), column(W, a, d)))
+            dry = s.torque[k] + s.lever[k] * length(vector(o.loops, OF_FORCES * g + FORCE))
+            moment = times(s.viscous[k] + dry * tanh(speed / s.width[k]) / speed, relative)
+            for n in range(t.closures[g, PATH_START], t.closures[g, PATH_END]):
+                i = t.path[n, JOINT]
+                if t.joints[i, TURNS]:
+                    of_tree[t.joints[i, COORDINATE]] += t.path[n, SIGN] * t.ratio[i] * dot(
+                        vector(links, OF_LINK * i + Z), moment)
+    to_drives(t, m, of_tree, efforts)

@@ -19,21 +19,19 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError, WorkspaceError
-from pprs_dynamics.physics.mechanism.closures import OPEN_IN_MOTION
 from pprs_dynamics.physics.mechanism.description import PARAMETERS, Frame, inertial_in
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.linkage import (
-    follow,
-    friction_efforts,
-    openings,
-    press,
-    twists,
-)
+from pprs_dynamics.physics.mechanism.linkage import NO_FRICTION, Found, samples_last
 from pprs_dynamics.physics.mechanism.linkage_equations import (
+    KIND,
+    LOOP,
+    OPEN_IN_MOTION,
     TRANSLATION,
+    WORST_CONDITION,
     JointFriction,
     Loads,
     Motion,
+    residual,
 )
 from pprs_dynamics.physics.mechanism.passive_joints import friction_table, passive_joints
 from pprs_dynamics.physics.mechanism.places import BodyPlace, PassiveJoint
@@ -41,9 +39,6 @@ from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.system.parallel import lazy
-
-# Condition number of the loops, lengths in units of the mechanism's size, over that at home.
-WORST_CONDITION = 300.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +103,11 @@ class Mechanism:
         table = np.zeros((len(self.structure.tables.parent), PARAMETERS))
         table[self.bodies] = self.inertial
         return table
+
+    @cached_property
+    def gravity_row(self) -> Array:
+        """`gravity` as an array."""
+        return np.array(self.gravity, dtype=float)
 
     @property
     def numbers(self) -> Array:
@@ -194,29 +194,34 @@ class Linkage:
     Parameters
     ----------
     structure : Structure
-    motion : Motion
+    rows : (N, K) array
+        See `Evaluation.follow`.
     drives : tuple of (N, D) arrays
         What it was computed for: position, velocity and acceleration.
     """
 
     structure: Structure
-    motion: Motion
+    rows: Array
     drives: tuple[Array, Array, Array]
 
     @classmethod
     def of(cls, structure: Structure, position: Array, velocity: Array, acceleration: Array,
-           start: Array | None = None) -> Linkage:
-        """Return the motion, or raise as `Mechanism.at`; see `follow` on `start`."""
-        t = structure.tables
-        motion, failed = follow(t, structure.home, position, velocity, acceleration, start)
+           start: Array | None = None, nearby: Array | None = None) -> Linkage:
+        """Return the motion, or raise as `Mechanism.at`; see `Evaluation.follow`."""
+        rows, failed = structure.evaluation.follow(position, velocity, acceleration, start, nearby)
         if failed >= 0:
             raise WorkspaceError(failed, 'the loops do not close for the positions of the drives',
                                  'must be within reach, on the way from home')
-        found = cls(structure, motion, (position, velocity, acceleration))
-        if len(t.row_loop):
+        found = cls(structure, rows, (position, velocity, acceleration))
+        if len(structure.tables.passive):
             found._require_regular()
         found._require_closed()
         return found
+
+    @cached_property
+    def motion(self) -> Motion:
+        """The motion by name."""
+        return self.structure.evaluation.motion(self.rows)
 
     def is_of(self, position: Array, velocity: Array, acceleration: Array) -> bool:
         """Return whether it was computed for these very arrays."""
@@ -226,12 +231,12 @@ class Linkage:
     @property
     def condition(self) -> Array:
         """Condition number of the loops over that at home, (N,); 0 without loops."""
-        home = self.structure.home_state[2]
+        home = self.structure.evaluation.at_home[2]
         condition: Array = self.motion.state[:, 2] / home if home else self.motion.state[:, 2]
         return condition
 
     def _require_regular(self) -> None:
-        lost = ~(self.motion.state[:, 1] * self.structure.home_state[1] > 0)
+        lost = ~(self.motion.state[:, 1] * self.structure.evaluation.at_home[1] > 0)
         if lost.any():
             raise SingularityError(
                 int(np.argmax(lost)), 'the motion leaves the assembly of home through a '
@@ -249,19 +254,22 @@ class Linkage:
 
         At a home where joints are in line, others become dependent than elsewhere.
         """
-        rows = self.structure.implied
-        if not len(rows.row_loop):
+        t = self.structure.tables
+        implied = np.arange(len(t.passive), len(t.rows))
+        if not len(implied):
             return
-        gaps = openings(rows, self.motion)
-        size = np.abs(gaps) / rows.row_unit
+        m = samples_last(self.motion)
+        gaps = np.stack([residual(t, m, int(r)) for r in implied], axis=-1)
+        size = np.abs(gaps) / t.row_unit[implied]
         if np.all(size < OPEN_IN_MOTION):
             return
         sample = int(np.argmax(~np.all(size < OPEN_IN_MOTION, axis=1)))
-        row = int(np.argmax(size[sample]))
-        amount = (f'{1e3 * abs(gaps[sample, row]):.3g} mm' if rows.row_kind[row] == TRANSLATION
-                  else f'{np.degrees(abs(gaps[sample, row])):.3g} degrees')
+        worst = int(np.argmax(size[sample]))
+        row = implied[worst]
+        amount = (f'{1e3 * abs(gaps[sample, worst]):.3g} mm' if t.rows[row, KIND] == TRANSLATION
+                  else f'{np.degrees(abs(gaps[sample, worst])):.3g} degrees')
         raise WorkspaceError(
-            sample, f'the loop {self.structure.loops[rows.row_loop[row]].name} is open by {amount}',
+            sample, f'the loop {self.structure.loops[t.rows[row, LOOP]].name} is open by {amount}',
             'must close as at home, where it follows from the other loops and joints alone: name a '
             'robot.home at which no links are in line')
 
@@ -274,13 +282,17 @@ class Linkage:
     @cached_property
     def twists(self) -> tuple[Array, Array]:
         """Angular and linear velocity of links per rate of drives, (N, J + 1, 3, D)."""
-        return twists(self.structure.tables, self.motion)
+        return self.structure.evaluation.twists(self.rows)
 
-    def loads(self, mechanism: Mechanism, with_reactions: bool = False,
-              wrenches: Mapping[int, tuple[Array, Array]] | None = None) -> Loads:
-        """Return the forces that move the bodies and apply wrenches; see `press`."""
-        return press(self.structure.tables, self.motion, mechanism.by_joint,
-                     np.array(mechanism.gravity, dtype=float), with_reactions, wrenches)
+    def load_rows(self, mechanism: Mechanism,
+                  wrenches: Mapping[int, tuple[Array, Array]] | None = None) -> Array:
+        """Return the forces that move the bodies and apply wrenches; see `Evaluation.forces`."""
+        return self.structure.evaluation.forces(
+            self.rows, mechanism.by_joint, mechanism.gravity_row, wrenches)
+
+    def loads(self, mechanism: Mechanism) -> Loads:
+        """Return the forces that move the bodies, by name."""
+        return self.structure.evaluation.loads(self.load_rows(mechanism))
 
     def efforts(self, mechanism: Mechanism) -> Array:
         """Return the efforts of the drives that move the bodies, (N, D)."""
@@ -288,7 +300,7 @@ class Linkage:
         return efforts
 
     def wrenches_of(self, load: StructureLoad) -> dict[int, tuple[Array, Array]]:
-        """Return a load as wrenches that links apply, by the joints that move them; see `press`."""
+        """Return a load as wrenches that links apply, by the joints that move them."""
         t, m = self.structure.tables, self.motion
         row, _ = self.structure.links[self.structure.tool]
         arm = self.frame_of(self.structure.tool).p - m.p[:, row]
@@ -343,16 +355,34 @@ class Linkage:
 
 @dataclass(frozen=True, eq=False)
 class LinkageState(JointMotion):
-    """A motion of a mechanism's drives with the quantities that effects take, (N, D) each."""
+    """A motion of a mechanism's drives with the quantities that effects take, (N, D) each.
+
+    Efforts and the model's own friction of joints come from one pass that keeps nothing else; the
+    motion of links and what joints transmit are computed when they are asked for.
+
+    Parameters
+    ----------
+    robot : Mechanism
+    reversal : Reversal
+    load : StructureLoad, optional
+    known : Linkage, optional
+        The motion of all links, where it is there.
+    friction : JointFriction
+        The model's own, which is found with the efforts.
+    nearby : (C,) array, optional
+        See `Evaluation.found`.
+    """
 
     robot: Mechanism = field(kw_only=True)
     reversal: Reversal = field(default_factory=Reversal, kw_only=True)
     load: StructureLoad | None = field(default=None, kw_only=True)
     known: Linkage | None = field(default=None, kw_only=True)
+    friction: JointFriction = field(default=NO_FRICTION, kw_only=True)
+    nearby: Array | None = field(default=None, kw_only=True)
 
     def __getitem__(self, samples: Any) -> Self:
         """Return the samples that a slice, a mask or indices select, with their load."""
-        return replace(super().__getitem__(samples), known=None,
+        return replace(super().__getitem__(samples), known=None, nearby=None,
                        load=None if self.load is None else self.load.at(samples))
 
     @property
@@ -361,12 +391,30 @@ class LinkageState(JointMotion):
         return self.robot.structure.drives
 
     @lazy
+    def found(self) -> Found | None:
+        """Closed coordinates, efforts and own friction in one pass; None where links are needed."""
+        if self.known is not None or self.load is not None:
+            return None
+        robot = self.robot
+        return robot.structure.evaluation.found(
+            (self.position, self.velocity, self.acceleration), robot.by_joint, robot.gravity_row,
+            self.friction, self.nearby)
+
+    @lazy
     def linkage(self) -> Linkage:
         """The motion of all links."""
-        if self.known is not None and self.known.is_of(self.position, self.velocity,
-                                                       self.acceleration):
+        motion = self.position, self.velocity, self.acceleration
+        if self.known is not None and self.known.is_of(*motion):
             return self.known
-        return self.robot.at(self.position, self.velocity, self.acceleration)
+        found = vars(self).get('found')
+        if found is None or not len(found.q):
+            return Linkage.of(self.robot.structure, *motion, nearby=self.nearby)
+        return Linkage.of(self.robot.structure, *motion, found.q[0])
+
+    @property
+    def closed(self) -> Array:
+        """Closed coordinates, (N, C)."""
+        return self.linkage.motion.q if self.found is None else self.found.q
 
     @lazy
     def direction(self) -> Array:
@@ -377,7 +425,7 @@ class LinkageState(JointMotion):
     @lazy
     def rigid_force(self) -> Array:
         """Efforts without friction [N m, N]."""
-        efforts: Array = self.reactions.efforts + self.robot.armature * self.acceleration
+        efforts: Array = self.transmitted + self.robot.armature * self.acceleration
         return efforts
 
     @property
@@ -386,7 +434,7 @@ class LinkageState(JointMotion):
 
         The motor accelerates its rotor on its own side of the gear.
         """
-        efforts: Array = self.reactions.efforts
+        efforts: Array = self.reactions.efforts if self.found is None else self.found.efforts
         return efforts
 
     @lazy
@@ -396,10 +444,14 @@ class LinkageState(JointMotion):
         return load
 
     @lazy
+    def _load_rows(self) -> Array:
+        wrenches = None if self.load is None else self.linkage.wrenches_of(self.load)
+        return self.linkage.load_rows(self.robot, wrenches)
+
+    @lazy
     def reactions(self) -> Loads:
         """What joints and closures transmit without friction."""
-        wrenches = None if self.load is None else self.linkage.wrenches_of(self.load)
-        return self.linkage.loads(self.robot, with_reactions=True, wrenches=wrenches)
+        return self.robot.structure.evaluation.loads(self._load_rows)
 
     @property
     def tool_velocity(self) -> Array:
@@ -430,14 +482,15 @@ class LinkageState(JointMotion):
 
     def against_friction(self, friction: JointFriction) -> Array:
         """Return the drives' efforts against friction of joints, (N, D)."""
-        linkage = self.linkage
-        return friction_efforts(linkage.structure.tables, linkage.motion, self.reactions, friction,
-                                linkage.twists[0])
+        if friction is self.friction and self.found is not None:
+            return self.found.friction
+        return self.robot.structure.evaluation.friction(self.linkage.rows, self._load_rows,
+                                                        friction)
 
     def turning_over(self, reversal: Reversal) -> LinkageState:
         """Return the state with a sgn of other widths; all else is computed once for both."""
         state = replace(self, reversal=reversal, known=self.linkage)
-        vars(state)['reactions'] = self.reactions
+        vars(state)['_load_rows'] = self._load_rows
         return state
 
     def loaded(self, robot: Mechanism, load: StructureLoad | None = None) -> LinkageState:

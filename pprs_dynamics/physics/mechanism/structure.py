@@ -9,9 +9,11 @@ coordinate of the joint that it follows.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -31,8 +33,9 @@ from pprs_dynamics.physics.mechanism.description import (
     Loop,
     inertial_in,
 )
-from pprs_dynamics.physics.mechanism.linkage import Integers, follow, survey
-from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Tables
+from pprs_dynamics.physics.mechanism.elimination import determining, given
+from pprs_dynamics.physics.mechanism.linkage import Evaluation, survey
+from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Integers, Tables
 
 # Drives move by these between closings when a motion is walked to.
 STRIDE_TURN, STRIDE_SLIDE = 0.1, 0.1  # [rad], and of the mechanism's size
@@ -48,8 +51,6 @@ class Structure:
     description : Description
     tables : Tables
         Their drives are in the model's order.
-    implied : Tables
-        With the rows of closures that follow from the others at home instead.
     drives : tuple of str
     kinds : tuple of str
         `revolute` or `prismatic`, of the drives.
@@ -70,7 +71,6 @@ class Structure:
 
     description: Description
     tables: Tables
-    implied: Tables
     drives: tuple[str, ...]
     kinds: tuple[str, ...]
     coordinates: tuple[str, ...]
@@ -91,12 +91,9 @@ class Structure:
         return self.mobility.home
 
     @cached_property
-    def home_state(self) -> Array:
-        """`Motion.state` at home, (3,)."""
-        q = self.home[None, self.tables.drives]
-        motion, _ = follow(self.tables, self.home, q, np.zeros_like(q), np.zeros_like(q))
-        state: Array = motion.state[0]
-        return state
+    def evaluation(self) -> Evaluation:
+        """Its equations."""
+        return Evaluation(self.tables, self.home)
 
     @cached_property
     def inertial(self) -> Array:
@@ -274,12 +271,10 @@ class _Builder:
         self.coordinate[row] = self.coordinate[self.rows[leader.name]]
         self.ratio[row], self.offset[row] = ratio, offset
 
-    def tables(self, loops: tuple[Loop, ...], passive: Integers, rows: Integers | None,
-               size: float) -> Tables:
-        """Return tables with all rows of the loops, or with chosen ones."""
+    def tables(self, loops: tuple[Loop, ...], size: float) -> Tables:
+        """Return tables with all rows of the loops, and no passive coordinates yet."""
         placed = [(*self._on(loop, 'a'), *self._on(loop, 'b')) for loop in loops]
-        every = [(k, row) for k, loop in enumerate(loops) for row in ROWS[loop.kind]]
-        kept = every if rows is None else [every[r] for r in rows]
+        rows = [(k, row) for k, loop in enumerate(loops) for row in ROWS[loop.kind]]
         starts, joints, signs = [0], [], []
         for a, _, b, _ in placed:
             of_a, of_b = path_to_base(self.parent, a), path_to_base(self.parent, b)
@@ -289,22 +284,26 @@ class _Builder:
                         joints.append(row)
                         signs.append(sign)
             starts.append(len(joints))
-        driven = np.array([self.coordinate[self.rows[name]] for name in self.drives])
-        return Tables(
-            _integers(self.parent), np.array(self.turns), _stack([f.R for f in self.place], 3, 3),
-            _stack([f.p for f in self.place], 3), _stack(self.axis, 3),
-            _integers(self.coordinate), np.array(self.ratio), np.array(self.offset), passive,
-            driven, np.array([STRIDE_SLIDE * size if self.slides[c] else STRIDE_TURN
-                              for c in driven]),
-            _integers([each[0] for each in placed]), _integers([each[2] for each in placed]),
-            _stack([each[1].R for each in placed], 3, 3), _stack([each[1].p for each in placed], 3),
-            _stack([each[3].R for each in placed], 3, 3), _stack([each[3].p for each in placed], 3),
-            _integers([k for k, _ in kept]), _integers([row[0] for _, row in kept]),
-            np.array([row[1] for _, row in kept], dtype=np.int64).reshape(-1, 4),
-            np.array([row[2] for _, row in kept], dtype=float).reshape(-1, 2),
-            _integers(starts), _integers(joints), np.array(signs, dtype=float),
-            np.array([size if row[0] == TRANSLATION else 1.0 for _, row in kept]),
-            np.array([size if self.slides[c] else 1.0 for c in passive]))
+        driven = _integers([self.coordinate[self.rows[name]] for name in self.drives])
+        none = _integers([])
+        return given(Tables(
+            joints=np.column_stack((self.parent, self.turns, self.coordinate)).astype(np.int64),
+            passive=none, drives=driven, places=none,
+            closures=_integers([(a, b, *ends) for (a, _, b, _), ends in zip(
+                placed, pairwise(starts), strict=True)]).reshape(-1, 4),
+            rows=_integers([(k, row[0], *row[1]) for k, row in rows]).reshape(-1, 6),
+            path=_integers([*zip(joints, signs, strict=True)]).reshape(-1, 2),
+            starts=np.zeros((1, 3), dtype=np.int64), swap=none, below=none, right=none,
+            frames=_vectors(each for frame, axis in zip(self.place, self.axis, strict=True)
+                            for each in (*frame.R, frame.p, axis)),
+            ratio=np.array(self.ratio), offset=np.array(self.offset),
+            stride=np.array([STRIDE_SLIDE * size if self.slides[c] else STRIDE_TURN
+                             for c in driven]),
+            closure_frames=_vectors(each for _, a, _, b in placed
+                                    for each in (*a.R, a.p, *b.R, b.p)),
+            row_reals=_vectors((*row[2], size if row[0] == TRANSLATION else 1.0)
+                               for _, row in rows),
+            passive_unit=np.zeros(0)), driven, len(self.coordinates))
 
     def _on(self, loop: Loop, side: str) -> tuple[int, Frame]:
         link, frame = ((loop.a, loop.frame_a) if side == 'a' else (loop.b, loop.frame_b))
@@ -314,12 +313,12 @@ class _Builder:
         return row, on @ frame
 
 
-def _integers(values: list[int]) -> Integers:
+def _integers(values: Sequence[Any]) -> Integers:
     return np.array(values, dtype=np.int64)
 
 
-def _stack(values: list[Array], *shape: int) -> Array:
-    return np.ascontiguousarray(np.array(values, dtype=float).reshape(-1, *shape))
+def _vectors(rows: Iterable[Any]) -> Array:
+    return np.array([*rows], dtype=float).reshape(-1, 3)
 
 
 def build_structure(description: Description, base: str, tool: str, drives: tuple[str, ...],
@@ -364,25 +363,24 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
                          f'{"joints" if lock_others else "drives"} move')
     start = np.array(build.start)
     none = _integers([])
-    t = build.tables(loops, none, None, 1.0)
-    size = _size(t, start)
+    size = _size(build.tables(loops, 1.0), start)
+    t = build.tables(loops, size)
     closing = Closing(t, np.array(build.slides), build.coordinates,
                       [loop.name for loop in loops], size)
-    given = [name for name in home if name in build.rows]
-    free = np.array([name not in given or name not in drives for name in build.coordinates])
+    named = [name for name in home if name in build.rows]
+    free = np.array([name not in named or name not in drives for name in build.coordinates])
     q = _home(closing, start, free) if loops else start
     structure = Structure(
-        description, t, t, drives,
+        description, t, drives,
         tuple('revolute' if description.joints[name].kind in TURNING else PRISMATIC
               for name in drives), tuple(build.coordinates), build.links, build.rows, loops, tool,
         Mobility(none, none, none, q, len(q), 1.0), size,
         *(np.array([getattr(description.joints[name], limit) for name in drives])
           for limit in ('lower', 'upper', 'speed', 'effort')))
     mobility = closing.mobility(q, t.drives, _moves(structure) * closing.columns)
-    implied = np.setdiff1d(np.arange(len(t.row_loop)), mobility.rows)
-    tables, others = (build.tables(loops, mobility.passive, rows, size)
-                      for rows in (mobility.rows, implied))
-    return replace(structure, mobility=mobility, tables=tables, implied=others)
+    units = np.where(build.slides, size, 1.0)
+    return replace(structure, mobility=mobility, tables=determining(
+        t, mobility.rows, mobility.passive, units, q))
 
 
 def _home(closing: Closing, start: Array, free: Array) -> Array:

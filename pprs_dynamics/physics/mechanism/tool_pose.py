@@ -12,6 +12,7 @@ coordinates as many are given as the robot has drives; the drives are then passi
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +20,9 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError, SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism.closures import RANK, ROWS
 from pprs_dynamics.physics.mechanism.description import Frame
+from pprs_dynamics.physics.mechanism.elimination import determining, given
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.linkage import Integers, follow, twists
-from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Tables
+from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Integers, Tables
 from pprs_dynamics.physics.mechanism.mechanism import Linkage
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.structure import (
@@ -62,9 +63,10 @@ class ToolPose:
         t, home = structure.tables, structure.home
         row, frame = structure.links[structure.tool]
         q = home[None, t.drives]
-        m, _ = follow(t, home, q, np.zeros_like(q), np.zeros_like(q))
+        rows, _ = structure.evaluation.follow(q, np.zeros_like(q), np.zeros_like(q))
+        m = structure.evaluation.motion(rows)
         self.home = Frame(m.R[0, row], m.p[0, row]) @ frame
-        W, U = (each[0, row] for each in twists(t, m))
+        W, U = (each[0, row] for each in structure.evaluation.twists(rows))
         lever = m.R[0, row] @ frame.p
         linear, angular = U + np.cross(W, lever, axis=0), W
         self.chosen = _independent(np.vstack((linear / structure.size,
@@ -73,30 +75,38 @@ class ToolPose:
             raise ModelError('robot.tool', structure.tool, 'be a link of a robot with loops whose '
                              'pose determines all drives, for a trajectory of its poses')
         self._tied = replace(
-            structure, tables=_with_pose(t, row, frame, self.home, self.chosen, len(home),
-                                         structure.size),
+            structure, tables=_tied_tables(structure, row, frame, self.home, self.chosen),
             mobility=replace(structure.mobility, home=np.append(home, np.zeros(6))))
 
-    def linkage(self, motion: PlatformMotion) -> tuple[JointMotion, Linkage]:
-        """Return the motion of the drives, and of all links, for that of the tool in the base.
+    def drives(self, motion: PlatformMotion, closed: dict[Any, Array] | None = None,
+               ) -> tuple[JointMotion, Array]:
+        """Return the motion of the drives for that of the tool in the base.
 
         Parameters
         ----------
         motion : PlatformMotion
             Of the tool's origin and axes. Twists along what the robot cannot choose are not read.
+        closed : dict of Structure to array, optional
+            Coordinates at the last sample of another motion, by structure; brought up to date.
+
+        Returns
+        -------
+        moved : JointMotion
+        nearby : (C,) array
+            Closed coordinates of the robot at the first sample.
 
         Raises
         ------
         WorkspaceError
             Where the tool cannot be there, in position or in attitude.
         SingularityError
-            Where its pose does not determine the drives, or these not the motion.
+            Where its pose does not determine the drives.
         """
         q, v, a = self._coordinates(motion)
-        given = self.chosen
+        closed = {} if closed is None else closed
         try:
-            tied = Linkage.of(self._tied, *(np.ascontiguousarray(each[:, given])
-                                            for each in (q, v, a)))
+            tied = Linkage.of(self._tied, q[:, self.chosen], v[:, self.chosen], a[:, self.chosen],
+                              nearby=closed.get(self._tied))
         except SingularityError as error:
             raise SingularityError(
                 error.sample, 'the pose of the tool does not determine the drives',
@@ -107,11 +117,13 @@ class ToolPose:
                                  'must be within reach, on the way from home') from None
         found, count, drives = tied.motion, len(self.structure.home), self.structure.tables.drives
         self._require_followed(q, found.q[:, count:])
+        if len(motion):
+            closed[self._tied] = found.q[-1].copy()
         position, velocity, acceleration = (
             np.ascontiguousarray(each[:, drives]) for each in (found.q, found.v, found.a))
-        moved = JointMotion(position, velocity, acceleration, motion.time)
-        return moved, Linkage.of(self.structure, moved.position, moved.velocity,
-                                 moved.acceleration, found.q[0, :count])
+        return (JointMotion(position, velocity, acceleration, motion.time,
+                            channels=motion.channels),
+                found.q[0, :count] if len(motion) else self.structure.home)
 
     def _coordinates(self, motion: PlatformMotion) -> tuple[Array, Array, Array]:
         """Return the six coordinates of the motion with their derivatives, (N, 6) each.
@@ -178,32 +190,43 @@ def _independent(rows: Array) -> Integers:
     return np.sort(np.array(chosen, dtype=np.int64))
 
 
-def _with_pose(t: Tables, row: int, frame: Frame, home: Frame, chosen: Integers, count: int,
-               size: float) -> Tables:
-    """Return tables with the pose's coordinates, those chosen as drives, tied to the tool."""
+def _tied_tables(structure: Structure, row: int, frame: Frame, home: Frame, chosen: Integers,
+                 ) -> Tables:
+    """Return tables with the pose's coordinates, those chosen as drives, tied to the tool.
+
+    Parameters
+    ----------
+    structure : Structure
+    row : int
+        Joint that moves the tool.
+    frame, home : Frame
+        The tool's in the joint's, and at home in the base's.
+    chosen : int array
+    """
+    t, size, count = structure.tables, structure.size, len(structure.home)
     first, k = len(t.parent), len(t.loop_a)
     units = np.where(np.arange(len(COORDINATES)) < SLIDES, size, 1.0)
     strides = np.where(np.arange(len(COORDINATES)) < SLIDES, STRIDE_SLIDE * size, STRIDE_TURN)
     left = np.setdiff1d(np.arange(len(COORDINATES)), chosen)
-    slides = {int(c): not turns for c, turns in zip(t.coordinate, t.turns, strict=True) if c >= 0}
     axes, turned = np.eye(3)[[0, 1, 2, 2, 1, 0]], np.tile(np.eye(3), (6, 1, 1))
     origins = np.zeros((6, 3))
     origins[0], turned[SLIDES] = home.p, home.R
-    way = path_to_base(t.parent, row)
-    ties, joints = ROWS['fixed'], np.arange(first, first + 6)
-    added = {
-        'parent': [0, *joints[:-1]], 'turns': [False] * 3 + [True] * 3, 'place_R': turned,
-        'place_p': origins, 'axis': axes, 'coordinate': count + np.arange(6), 'ratio': np.ones(6),
-        'offset': np.zeros(6), 'passive': [*t.drives, *(count + left)],
-        'loop_a': way[:1], 'loop_b': joints[-1:], 'a_R': frame.R[None], 'a_p': frame.p[None],
-        'b_R': np.eye(3)[None], 'b_p': np.zeros((1, 3)), 'row_loop': [k] * len(ties),
-        'row_kind': [tie[0] for tie in ties], 'row_axes': [tie[1] for tie in ties],
-        'row_weights': [tie[2] for tie in ties],
-        'path_start': [t.path_start[-1] + len(joints) + len(way)],
-        'path_joint': [*joints[::-1], *way], 'path_sign': [1.0] * len(joints) + [-1.0] * len(way),
-        'row_unit': [size if tie[0] == TRANSLATION else 1.0 for tie in ties],
-        'passive_unit': [*(size if slides[int(c)] else 1.0 for c in t.drives), *units[left]]}
-    return t._replace(
-        drives=count + chosen, stride=strides[chosen],
-        **{name: np.concatenate((getattr(t, name), np.asarray(values, getattr(t, name).dtype)))
-           for name, values in added.items()})
+    way, ties, joints = path_to_base(t.parent, row), ROWS['fixed'], np.arange(first, first + 6)
+    every = np.ones(count)
+    every[t.coordinate[(t.coordinate >= 0) & (t.turns == 0)]] = size
+    along = [*((j, 1) for j in joints[::-1]), *((j, -1) for j in way)]
+    added: dict[str, Any] = {
+        'joints': np.column_stack(([0, *joints[:-1]], [0] * 3 + [1] * 3, count + np.arange(6))),
+        'frames': np.concatenate((turned, origins[:, None], axes[:, None]), axis=1).reshape(-1, 3),
+        'ratio': np.ones(6), 'offset': np.zeros(6),
+        'closures': [(way[0], joints[-1], len(t.path), len(t.path) + len(along))],
+        'closure_frames': [*frame.R, frame.p, *np.eye(3), np.zeros(3)],
+        'rows': [(k, kind, *of) for kind, of, _ in ties], 'path': along,
+        'row_reals': [(*weights, size if kind == TRANSLATION else 1.0)
+                      for kind, _, weights in ties]}
+    tied = given(t._replace(
+        stride=strides[chosen], **{name: np.concatenate((getattr(t, name), values))
+                                   for name, values in added.items()}), count + chosen, count + 6)
+    rows = np.array([*range(len(t.passive)), *range(len(t.rows), len(tied.rows))])
+    return determining(tied, rows, np.concatenate((t.passive, t.drives, count + left)),
+                       np.append(every, units), np.append(structure.home, np.zeros(6)))

@@ -23,16 +23,19 @@ from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.physics.effects.effect import ARM, SINGLE_AXIS, CatalogueEffect
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
+from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.description import REVOLUTE
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.linkage import NO_FRICTION
+from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
 from pprs_dynamics.physics.mechanism.mechanism import LinkageState, Mechanism
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tool_pose import ToolPose
 from pprs_dynamics.physics.model.effects_block import added_effects
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.force_model import ForceModel, Forces, ModelState
 from pprs_dynamics.physics.model.keys import ARM as ARM_BLOCK
 from pprs_dynamics.physics.model.keys import AXIS as AXIS_BLOCK
 from pprs_dynamics.physics.model.keys import (
@@ -235,14 +238,38 @@ class ArmModel(ForceModel):
         """
         return ToolPose(self.robot.structure)
 
-    def mechanism(self, motion: JointMotion | PlatformMotion) -> LinkageState:
-        """Return what effects take of a motion; see `drive_forces`."""
-        known = None
+    def drive_forces(self, motion: JointMotion | PlatformMotion, state: ModelState | None = None,
+                     ) -> Forces:
+        """Return the forces for a motion; see `ForceModel.drive_forces`.
+
+        With a state the loops close from where they were at its last sample, where that is near.
+        """
+        self._require_motion(motion)
+        if state is None:
+            state = self.initial_state()
+        with np.errstate(over='ignore', invalid='ignore'):
+            mechanism = self.mechanism(motion, state.closed)
+            forces = self.forces_at(mechanism, state)
+        if len(motion) and self.robot.structure.loops:
+            state.closed[self.robot.structure] = mechanism.closed[-1].copy()
+        return forces
+
+    def mechanism(self, motion: JointMotion | PlatformMotion,
+                  closed: dict[Any, Array] | None = None) -> LinkageState:
+        """Return what effects take of a motion; see `drive_forces` and `ModelState.closed`."""
+        closed = {} if closed is None else closed
+        nearby = closed.get(self.robot.structure)
         if isinstance(motion, PlatformMotion):
-            motion, known = self.tool_pose.linkage(motion)
+            motion, nearby = self.tool_pose.drives(motion, closed)
         return LinkageState(motion.position, motion.velocity, motion.acceleration, motion.time,
                             channels=motion.channels, robot=self.robot, reversal=self.reversal,
-                            known=known)
+                            nearby=nearby, friction=self._joint_friction)
+
+    @cached_property
+    def _joint_friction(self) -> JointFriction:
+        """The model's own friction of joints, which is found in one pass with the efforts."""
+        return next((effect.table(self.robot, self.reversal) for effect in self.effects
+                     if isinstance(effect, LinkageFriction)), NO_FRICTION)
 
     def at_drives(self, state: LinkageState) -> LinkageState:
         """Return the state in which the links follow drives that move as in another."""

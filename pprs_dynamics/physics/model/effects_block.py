@@ -9,9 +9,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.effects.catalogue import FORMER, REPLACED, catalogue, find_effect
+from pprs_dynamics.physics.effects.catalogue import REPLACED, catalogue, find_effect
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.former_names import FORMER
 from pprs_dynamics.physics.model.keys import Key, title_of
 
 # Keys of the block `effects` that are no effect.

@@ -24,6 +24,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits, RecordedDrives
 from pprs_dynamics.errors import EffectError, MotionError
+from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
@@ -84,10 +85,17 @@ class ModelState:
         By effect.
     start : float, optional
         When the motion began [s]; None before its first sample.
+
+    Attributes
+    ----------
+    closed : dict of Structure to (C,) array
+        Coordinates of a mechanism at the last sample, from which its loops close in fewer steps
+        where the next one is near. No result depends on them.
     """
 
     def __init__(self, memories: dict[str, Any], start: float | None = None) -> None:
         self.memories, self.start = memories, start
+        self.closed: dict[Any, Array] = {}
 
     def begin(self, time: Array | None) -> None:
         """Take the first sample of times (N,) as the start, where that is not known yet."""
@@ -114,7 +122,9 @@ class ModelState:
             except Exception as error:  # another package's effect may keep anything
                 raise EffectError(name, 'its memory cannot be copied '
                                   f'({type(error).__name__}: {error})') from error
-        return ModelState(copied, self.start)
+        state = ModelState(copied, self.start)
+        state.closed = dict(self.closed)
+        return state
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -319,7 +329,8 @@ class ForceModel(ABC):
 
     def bound(self, effect: type[CatalogueEffect]) -> type[CatalogueEffect]:
         """Return an effect of the catalogue with the parameters that it has in this model."""
-        return effect.bound(self.mechanism_of_effects)
+        # Of one with the parameters that it has elsewhere, its own again.
+        return (find_effect(effect.name) or effect).bound(self.mechanism_of_effects)
 
     @abstractmethod
     def mechanism(self, motion: Any) -> Any:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pprs_dynamics.physics.effects.catalogue import FORMER, general_name, told_general_name
+from pprs_dynamics.physics.effects.former_names import FORMER, general_name, told_general_name
 from pprs_dynamics.physics.model.ledger import BLOCK, PREVIOUS
 
 ACTIVE = 'effects.active'

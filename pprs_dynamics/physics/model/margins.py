@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.mechanism import WORST_CONDITION
+from pprs_dynamics.physics.mechanism.linkage_equations import WORST_CONDITION
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number

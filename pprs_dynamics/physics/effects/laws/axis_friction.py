@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -33,8 +34,12 @@ class AxisFriction(Effect):
 
     def force(self, state: DriveStates, memory: Any = None) -> Array:
         """Return the drives' forces, (N, D) [N, N m]."""
-        return (np.asarray(self.viscous) * state.velocity
-                + np.asarray(self.coulomb) * state.direction)
+        viscous, coulomb = self._rows
+        return viscous * state.velocity + coulomb * state.direction
+
+    @cached_property
+    def _rows(self) -> tuple[Array, Array]:
+        return np.asarray(self.viscous), np.asarray(self.coulomb)
 
     def dry(self, guide_load: Array) -> Array:
         """Return the dry friction in full motion [N], in the shape of the guide's load."""
@@ -56,4 +61,9 @@ class AxisOffset(Effect):
 
     def force(self, state: DriveStates, memory: Any = None) -> Array:
         """Return the drives' forces, (N, D) [N, N m]."""
-        return np.full_like(state.velocity, np.asarray(self.value))
+        force: Array = 0.0 * state.velocity + self._row
+        return force
+
+    @cached_property
+    def _row(self) -> Array:
+        return np.asarray(self.value)
