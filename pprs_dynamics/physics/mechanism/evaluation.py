@@ -43,6 +43,7 @@ _compile: Callable[[Kernel, tuple[Any, ...]], Callable[..., int]] | None = None
 _decided = False
 _plain_samples = 0  # that may still be evaluated before compiling pays
 _compiling: set[int] = set()  # threads that compile while others must not wait
+_waiting: set[int] = set()  # threads that do not compile yet
 
 
 class KernelParameters(Generic[P]):
@@ -135,6 +136,8 @@ def compiled_or_none(function: Kernel, samples: int) -> Callable[..., Any] | Non
 def _is_plain(samples: int) -> bool:
     """Return whether as many samples are to be evaluated without compiled code now."""
     global _plain_samples
+    if _waiting and threading.get_ident() in _waiting:
+        return True
     if _plain_samples > 0 and not _decided:
         _plain_samples -= samples
         return True
@@ -156,6 +159,19 @@ def compiling_here() -> Iterator[None]:
         yield
     finally:
         _compiling.discard(threading.get_ident())
+
+
+@contextmanager
+def not_compiling_yet() -> Iterator[None]:
+    """While the block lasts this thread evaluates plainly what is not compiled yet.
+
+    For the few samples that building a model takes: a node must be there before it compiles.
+    """
+    _waiting.add(threading.get_ident())
+    try:
+        yield
+    finally:
+        _waiting.discard(threading.get_ident())
 
 
 def evaluate_if_ready(kernel: Kernel, parameters: KernelParameters[Any], *tables: Array) -> int:

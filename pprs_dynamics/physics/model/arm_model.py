@@ -26,6 +26,7 @@ from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisO
 from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.description import REVOLUTE
+from pprs_dynamics.physics.mechanism.evaluation import not_compiling_yet
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.linkage import NO_FRICTION
 from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
@@ -325,7 +326,8 @@ def _require_driven_bodies(robot: Mechanism) -> None:
         pushed = np.zeros_like(home)
         pushed[0, d] = 1.0
         rest = np.zeros_like(home)
-        moved, still = (robot.torques(home, rest, one)[0, d] for one in (pushed, rest))
+        with not_compiling_yet():
+            moved, still = (robot.torques(home, rest, one)[0, d] for one in (pushed, rest))
         if not moved - still + robot.armature[d] > 0:
             raise ModelError('robot.drives', name, 'move a body: no link that it moves has a mass')
 
