@@ -78,6 +78,7 @@ setup(
         'naming': ['scikit-learn>=1.5', 'skglm>=0.4', 'pysindy>=2.0'],
         'test': ['pytest>=8', 'pytest-xdist>=3.5', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3',
                  'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11', 'pandas>=2',
+                 'axe-playwright-python>=0.1.4',  # accessibility of pages
                  'polars>=1', 'duckdb>=1', 'moto[server]>=5', 's3fs>=2024.6', 'cryptography>=42',
                  'cosmic-ray>=8.3',  # make mutants
                  'jsonschema>=4',  # ~/status against its schema

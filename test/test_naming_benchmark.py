@@ -8,13 +8,14 @@ from __future__ import annotations
 import gzip
 import json
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks.naming import fetch
-from benchmarks.naming.entrants import CONTROL, ENTRANTS, PEERS, Entrant
+from benchmarks.naming.entrants import CONTROL, ENTRANTS, PEERS, Entrant, ablations
 from benchmarks.naming.entrants.controls import perfect, random, silent
 from benchmarks.naming.entrants.cross_validation import block_cross_validation
 from benchmarks.naming.entrants.equations import Equations
@@ -28,6 +29,9 @@ from benchmarks.naming.problems import Answer, AnswerError, Column, Named, Probl
 from benchmarks.naming.robots import ROBOTS, hidden_names
 from benchmarks.naming.run import enter_all, score_all
 from benchmarks.naming.scoring import FIGURES, Rate, Scored, figures, judge
+from pprs_dynamics.inference.residuals.noise import NoiseShapes
+from pprs_dynamics.inference.search import fitted_sets, relinearisation, search
+from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.simulation.arm_forms import NAMES
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
 
@@ -210,6 +214,24 @@ def test_every_entrant_has_a_key_of_its_own() -> None:
     keys = {name: one.key() for name, one in ENTRANTS.items()}
     assert len(set(keys.values())) == len(keys)
     assert all(one.tuning for one in PEERS.values())
+
+
+@pytest.mark.parametrize('without', [
+    ablations.white_noise, ablations.without_prices, ablations.greedy, ablations.given_model])
+def test_a_part_that_is_left_out_is_there_and_comes_back(
+    without: Callable[[Problem], Answer], monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    owners = NoiseShapes, Search, fitted_sets, relinearisation, search
+    before = [dict(vars(owner)) for owner in owners]
+    within: list[bool] = []
+
+    def diagnosed(asked: Problem) -> Answer:
+        within.append([dict(vars(owner)) for owner in owners] != before)
+        return Answer('none')
+    monkeypatch.setattr(ablations, 'pprs', diagnosed)
+    without(problem(0, {}))
+    assert within == [True]
+    assert [dict(vars(owner)) for owner in owners] == before
 
 
 def test_of_two_settings_the_better_one_is_ranked_and_peers_ahead_are_told() -> None:

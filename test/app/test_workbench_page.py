@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from accessibility import broken_rules
 from browser import LEAST_CONTRAST, LEAST_TEXT, READABLE, chromium, needs_browser
 from workbench_bench import write_hidden
 from workbench_page import Page
@@ -76,7 +77,7 @@ def test_the_page_loads_under_its_own_policy(browser: Any, bench: Workbench) -> 
     page = Page(browser, bench, bypass_csp=False)
     page.tab.locator('#curves canvas').nth(5).wait_for()
     page.tab.locator('.error .figures').nth(5).wait_for()
-    assert page.tab.locator('.effect').count() == 27
+    assert page.tab.locator('.effect').count() == len(bench.screen()['effects']) > 20
     assert 'noise' in page.tab.locator('#errors').inner_text()
     page.tab.keyboard.press('2')
     page.tab.locator('#scatter').wait_for()
@@ -392,3 +393,95 @@ def test_the_next_experiment_is_designed_and_downloaded(page: Page, folder: Path
     lines = (folder / 'next.csv').read_text().splitlines()
     assert lines[0].startswith('time,x,y,z,qx,qy,qz,qw')
     assert len(lines) == 1 + 501
+
+
+def test_a_link_shows_what_is_seen(page: Page, browser: Any, bench: Workbench) -> None:
+    page.mark(1, 0.3, 0.4)
+    page.tab.keyboard.press('z')
+    page.tab.wait_for_function("location.hash.includes('window')")
+    seen = page.tab.evaluate('[bench.curves.range(), bench.curves.span, bench.curves.on]')
+    second = Page(browser, bench)
+    second.settled()
+    second.tab.evaluate('hash => { location.hash = hash; }', page.tab.evaluate('location.hash'))
+    second.tab.wait_for_function('bench.curves?.span && bench.curves.window')
+    assert second.tab.evaluate('[bench.curves.range(), bench.curves.span, bench.curves.on]') == [
+        pytest.approx(seen[0], abs=1e-3), pytest.approx(seen[1], abs=1e-3), seen[2]]
+    second.tab.evaluate("location.hash = '#view=robot'")
+    second.tab.wait_for_function('bench.robot?.time')
+    second.tab.locator('#view-robot').wait_for()
+    assert second.complaints == []
+    second.context.close()
+
+
+def test_a_tick_is_taken_back_and_done_again_by_keys(page: Page) -> None:
+    before = errors(page.settled())
+    after = errors(page.tick('payload_mass'))
+    page.tab.locator('h1').click()
+    page.tab.keyboard.press('Control+z')
+    page.tab.wait_for_function("!document.getElementById('tick-payload_mass').checked")
+    assert errors(page.settled()) == before
+    assert 'payload_mass ticked' in page.tab.locator('#forward').get_attribute('title')
+    page.tab.keyboard.press('Control+y')
+    page.tab.wait_for_function("document.getElementById('tick-payload_mass').checked")
+    assert errors(page.settled()) == pytest.approx(after, rel=1e-3)
+
+
+def test_files_are_dropped_and_let_go_of(page: Page, folder: Path) -> None:
+    """A recording of another motion comes in by a drop, and goes by its button."""
+    write_hidden(folder / 'dropped.csv', 3, 4.0)
+    text = (folder / 'dropped.csv').read_text()
+    page.tab.evaluate("""text => {
+        const data = new DataTransfer();
+        data.items.add(new File([text], 'dropped.csv', {type: 'text/csv'}));
+        for (const kind of ['dragover', 'drop']) {
+            document.body.dispatchEvent(new DragEvent(kind, {
+                dataTransfer: data, bubbles: true, cancelable: true}));
+        }
+    }""", text)
+    page.tab.wait_for_function('bench.state.recordings.length === 2')
+    page.settled()
+    page.tab.get_by_role('button', name='Remove dropped.csv').click()
+    page.tab.wait_for_function('bench.state.recordings.length === 1')
+    page.settled()
+
+
+def test_the_robot_is_where_a_curve_was_clicked_on(page: Page) -> None:
+    page.tab.keyboard.press('3')
+    page.tab.wait_for_function('bench.robot.time')
+    page.tab.keyboard.press('1')
+    box = page.tab.locator('#curves .u-over').nth(2).bounding_box()
+    page.tab.mouse.click(box['x'] + 0.5 * box['width'], box['y'] + 0.5 * box['height'])
+    where, time, end = page.tab.evaluate(
+        '[bench.curves.playhead, bench.robot.time[bench.robot.frame], bench.curves.range()[1]]')
+    assert where == pytest.approx(0.5 * end, rel=0.02)
+    assert time == pytest.approx(where, abs=0.2)
+
+
+def test_the_error_is_seen_closer_with_alt_and_the_wheel(page: Page) -> None:
+    height = ('(() => { const {min, max} = bench.curves.plots[0].scales.y; return max - min; })()')
+    before, other = page.tab.evaluate(height), page.tab.evaluate(height.replace('[0]', '[1]'))
+    page.tab.locator('#curves .u-over').nth(0).hover()
+    page.tab.keyboard.down('Alt')
+    page.tab.mouse.wheel(0, -120)
+    page.tab.keyboard.up('Alt')
+    page.tab.wait_for_function(f'{height} < {0.9 * before}')
+    assert page.tab.evaluate(height) == pytest.approx(0.8 * before, rel=1e-6)
+    assert page.tab.evaluate(height.replace('[0]', '[1]')) == other
+    page.tab.locator('h1').click()
+    page.tab.keyboard.press('a')
+    page.tab.wait_for_function(f'Math.abs({height} - {before}) < 1e-9')
+
+
+@pytest.mark.parametrize('scheme', ['light', 'dark'])
+def test_no_rule_of_accessibility_is_broken(page: Page, scheme: str) -> None:
+    """As axe-core has them, in every view; what is drawn on canvases it cannot see."""
+    page.mark(1, 0.3, 0.4)
+    page.tick('payload_mass')
+    if page.tab.evaluate('document.documentElement.dataset.scheme') != scheme:
+        page.tab.locator('#scheme').click()
+    assert page.tab.evaluate('document.documentElement.dataset.scheme') == scheme
+    for number, view in enumerate(('curves', 'scatter', 'robot', 'experiment', 'recordings'), 1):
+        page.tab.locator('h1').click()
+        page.tab.keyboard.press(str(number))
+        page.tab.locator(f'#view-{view}').wait_for()
+        assert broken_rules(page.tab) == [], view

@@ -209,7 +209,9 @@ def test_everything_on_the_screen_is_json(session: Session) -> None:
     found = json.loads(json.dumps(session.to_dict(), allow_nan=False))
     session.experiment = None
     assert found['experiment']['accuracy'] == [{'std_before': None}]
-    assert len(found['effects']) == 27
+    names = [one['name'] for one in found['effects']]
+    assert names == [one.name for one in session.candidates]
+    assert {'payload_mass', 'joint_friction', 'coulomb_friction', 'time_delay'} <= set(names)
     assert found['errors']['lift_1']['now'] < found['errors']['lift_1']['before']
 
 
@@ -425,3 +427,72 @@ def test_an_arm_is_shown_in_its_own_words_and_units(tmp_path: Path) -> None:
     shown, = effects['viscous_friction']['parameters']
     assert (shown['key'], shown['unit']) == ('turn.coefficient', 'N m s/rad')
     assert shown['value'] == pytest.approx(6.0, rel=0.05)
+
+
+def ticked(session: Session) -> dict[str, Any]:
+    return {name: (one.best.drives, dict(one.chosen))
+            for name, one in session.view_state.ticks.items()}
+
+
+def test_ticks_and_values_are_taken_back_and_done_again(session: Session) -> None:
+    session.tick('payload_mass')
+    session.tick('coulomb_friction', ['lift_2'])
+    force = session.settle().estimates['coulomb_friction']['lift_2.force'].value
+    for share in (1.1, 1.2, 1.3):  # a slider is one deed
+        session.choose('coulomb_friction', 'lift_2.force', share * force)
+    session.untick('payload_mass')
+    after, error = ticked(session), session.overall().now
+    undone = []
+    while session.view_state.ticks:
+        undone.append(session.history.undoes)
+        session.back()
+    assert undone == ['payload_mass unticked', 'coulomb_friction: lift_2.force chosen',
+                      'coulomb_friction ticked on lift_2', 'payload_mass ticked']
+    np.testing.assert_array_equal(session.now, session.before)
+    for _ in undone:
+        session.forward()
+    assert ticked(session) == after
+    assert session.overall().now == pytest.approx(error, rel=0.02)
+    with pytest.raises(SessionError, match='nothing was taken back'):
+        session.forward()
+    session.back()
+    session.tick('effort_offset')
+    assert not session.history.redoes
+
+
+def test_an_adoption_is_taken_back_and_done_again_with_its_ledger(tmp_path: Path) -> None:
+    session, _ = short_session(tmp_path)
+    given = session.model
+    session.tick('coulomb_friction')
+    assert session.adopt('payload_mass', force=True).result(300).adopted
+    adopted = session.model
+    assert session.history.undoes == 'payload_mass adopted'
+    session.back()
+    assert session.model is given
+    assert session.steps == []
+    assert set(session.view_state.ticks) == {'coulomb_friction'}
+    session.forward()
+    assert session.model is adopted
+    assert [step.effect for step in session.steps] == ['payload_mass']
+    session.undo()
+    session.back()
+    assert session.model is adopted
+
+
+def test_a_recording_is_let_go_of(tmp_path: Path) -> None:
+    session, other = short_session(tmp_path)
+    with pytest.raises(PprsError, match='at least one'):
+        session.remove(session.to_dict()['recordings'][0]['key'])
+    alone = session.before
+    session.add(other)
+    session.tick('payload_mass')
+    with pytest.raises(PprsError, match='no recording nothing'):
+        session.remove('nothing')
+    session.remove(str(other))
+    np.testing.assert_array_equal(session.before, alone)
+    assert set(session.view_state.ticks) == {'payload_mass'}
+    session.add(other, is_held_out=True)
+    fits = session.fits
+    session.remove(str(other))
+    assert session.to_dict()['held_out'] == []
+    assert session.fits is fits

@@ -33,6 +33,10 @@ export class Curves {
     this.drives = [];
     this.source = null;
     this.window = null; // what is seen; null is all
+    this.heights = new Map(); // of the error that is seen, by drive; those that are not: all
+    this.playhead = null; // [s]
+    this.moved = () => {}; // called with what is seen, when that is another
+    this.went = () => {}; // called with the time that was clicked on
     new ResizeObserver(() => this.resize()).observe(root);
     whenDark(() => this.build());
     root.addEventListener('keydown', (event) => this.key(event));
@@ -47,6 +51,7 @@ export class Curves {
     this.segment = segment;
     this.now = this.before;
     this.window = null;
+    this.heights.clear();
     this.build();
   }
 
@@ -75,7 +80,9 @@ export class Curves {
       padding: [8, 6, 0, 0], legend: {show: false},
       cursor: {sync: {key: 'time', setSeries: false, scales: ['x', null]}, points: {show: false},
                drag: {x: true, y: false, setScale: false}, y: false},
-      scales: {x: {time: false}},
+      scales: {x: {time: false},
+               y: {range: (u, min, max) => this.heights.get(drive)
+                 ?? uPlot.rangeNum(min ?? 0, max ?? 0, 0.1, true)}},
       axes: [{...axis, size: is_last ? 30 : 6,
               values: is_last ? (u, ticks) => ticks.map((t) => `${+t.toFixed(3)} s`)
                 : (u, ticks) => ticks.map(() => '')},
@@ -87,19 +94,26 @@ export class Curves {
       hooks: {
         setSelect: [(u) => this.select(u, d)],
         setCursor: [(u) => this.read(u, reading, drive)],
-        draw: [(u) => this.bands(u), (u) => this.levels(u, d)],
+        draw: [(u) => this.bands(u), (u) => this.levels(u, d), (u) => this.line(u)],
       },
     }, [this.times[d], this.before[d], this.now[d] || this.before[d]], place);
     plot.over.addEventListener('mousedown', () => { this.source = plot; });
     plot.over.addEventListener('dblclick', () => this.all());
     plot.over.addEventListener('wheel', (event) => {
-      if (!event.ctrlKey && !event.shiftKey) return; // the page scrolls
+      if (!event.ctrlKey && !event.shiftKey && !event.altKey) return; // the page scrolls
       event.preventDefault();
-      const at = plot.posToVal(event.offsetX, 'x');
-      const factor = event.deltaY > 0 ? 1.25 : 0.8;
-      const [a, b] = this.range();
-      this.zoom([at - (at - a) * factor, at + (b - at) * factor]);
+      const factor = (event.deltaY || event.deltaX) > 0 ? 1.25 : 0.8;
+      const around = (at, [a, b]) => [at - (at - a) * factor, at + (b - at) * factor];
+      if (event.altKey) {
+        const seen = [plot.scales.y.min, plot.scales.y.max];
+        const [min, max] = around(plot.posToVal(event.offsetY, 'y'), seen);
+        this.heights.set(drive, [min, max]);
+        plot.setScale('y', {min, max});
+      } else this.zoom(around(plot.posToVal(event.offsetX, 'x'), this.range()));
     }, {passive: false});
+    plot.over.addEventListener('click', (event) => {
+      if (plot.select.width < 3) this.went(plot.posToVal(event.offsetX, 'x'));
+    });
     return plot;
   }
 
@@ -137,10 +151,32 @@ export class Curves {
     for (const plot of this.plots) plot.setScale('x', {min, max});
     // The places of marks follow once the scales are in force.
     queueMicrotask(() => this.show());
+    this.moved(range);
   }
 
   all() {
+    this.heights.clear();
     this.zoom(null);
+  }
+
+  /* Draw a line where the robot is. */
+  goTo(time) {
+    this.playhead = time;
+    for (const plot of this.plots) plot.redraw(false);
+  }
+
+  line(u) {
+    if (this.playhead === null) return;
+    const x = u.valToPos(this.playhead, 'x', true);
+    if (x < u.bbox.left || x > u.bbox.left + u.bbox.width) return;
+    u.ctx.save();
+    u.ctx.strokeStyle = css('--chosen');
+    u.ctx.lineWidth = 1.5;
+    u.ctx.beginPath();
+    u.ctx.moveTo(x, u.bbox.top);
+    u.ctx.lineTo(x, u.bbox.top + u.bbox.height);
+    u.ctx.stroke();
+    u.ctx.restore();
   }
 
   select(u, d) {

@@ -19,8 +19,11 @@ export const button = (text, work, kind = '') => {
 export const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name)
   .trim();
 
-export const whenDark = (work) => matchMedia('(prefers-color-scheme: dark)')
-  .addEventListener('change', work);
+/* Call what draws with these colours when they are others: the system's, or chosen on the page. */
+export const whenDark = (work) => {
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', work);
+  document.addEventListener('scheme', work);
+};
 
 export const afterPaint = (work) => requestAnimationFrame(() => {
   const channel = new MessageChannel();

@@ -40,6 +40,10 @@ export class Live {
       'live/restore', 'Set this machine back to what it had?', 'Restore'));
     $('live-no').addEventListener('click', () => $('live-confirm').close());
     $('live-yes').addEventListener('click', () => this.set());
+    $('live-pause').addEventListener('click', () => { // what comes in meanwhile is kept
+      this.isPaused = !this.isPaused;
+      $('live-pause').setAttribute('aria-pressed', String(this.isPaused));
+    });
     $('live-take').addEventListener('click', () => server.run(
       'live/take', {}, 'What came in last is a recording of this session now.'));
   }
@@ -78,7 +82,7 @@ export class Live {
 
   async show() {
     const {state} = this.server;
-    if (!this.isSeen() || !state?.has_live) return;
+    if (!this.isSeen() || !state?.has_live || this.isPaused) return;
     let found;
     try {
       found = await this.server.ask('live');

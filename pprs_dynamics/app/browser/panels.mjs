@@ -83,19 +83,36 @@ export const showLedger = (state) => {
     return item;
   }));
   $('undo').disabled = state.steps.length === 0;
+  for (const [id, verb, deed] of [['back', 'Undo', state.undoes], ['forward', 'Redo',
+                                                                   state.redoes]]) {
+    $(id).disabled = !deed;
+    $(id).title = deed ? `${verb}: ${deed}` : '';
+  }
 };
 
-export const showRecordings = (state, see) => {
+export const showRecordings = (state, see, remove) => {
+  const without = (one) => {
+    const gone = button('×', () => remove(one.key), 'gone');
+    gone.setAttribute('aria-label', `Remove ${one.name}`);
+    gone.title = 'Remove this recording from the session';
+    return gone;
+  };
   $('strip').replaceChildren(...state.recordings.map((one) => {
     const item = make('li');
     const place = button('', () => see([one.start, one.end]));
     place.append(make('b', one.name), make('div', fall(one.before, one.now, state)),
                  make('div', `${(one.end - one.start).toFixed(1)} s`, 'quiet'));
     item.append(place);
+    if (state.recordings.length > 1) item.append(without(one));
+    return item;
+  }));
+  $('held-out-list').replaceChildren(...state.held_out.map((one) => {
+    const item = make('li', `judged on: ${one.name} `);
+    item.append(without(one));
     return item;
   }));
   $('held-out').textContent = state.held_out.length
-    ? `Adoptions are judged on ${state.held_out.join(', ')}.`
+    ? `Adoptions are judged on ${state.held_out.map((one) => one.name).join(', ')}.`
     : 'Adoptions are judged on blocks of the same recordings: weak evidence. Add one of another '
       + 'motion to judge them on.';
   const findings = state.recordings.flatMap((one) => one.findings.map(

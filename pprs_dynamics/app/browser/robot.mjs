@@ -71,6 +71,15 @@ export class Robot {
     this.draw();
   }
 
+  /* Go to the frame nearest to a time [s]. */
+  goTo(time) {
+    let nearest = 0;
+    this.time?.forEach((t, k) => {
+      if (Math.abs(t - time) < Math.abs(this.time[nearest] - time)) nearest = k;
+    });
+    if (this.time) this.go(nearest);
+  }
+
   go(frame) {
     this.frame = frame;
     this.draw();

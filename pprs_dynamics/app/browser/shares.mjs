@@ -1,7 +1,7 @@
 /* Where a marked error is from: the shares of effects that are not ticked. */
 
 import {$, button, css, make} from './dom.mjs';
-import {titleOf} from './format.mjs';
+import {amount, titleOf} from './format.mjs';
 
 const LEAST = 0.005; // of the squared error, that is listed
 const MOST = 8;
@@ -21,15 +21,16 @@ export const placeOf = (asked) => (asked.time
   : `a region of ${asked.drive}`);
 
 /* `tick` is called with an effect and when; `see` with the spans in which a region's samples lie. */
-export const showShares = (asked, found, tick, see) => {
+export const showShares = (asked, found, tick, see, unit = '') => {
   $('spans').replaceChildren();
   if (!asked) {
     $('shares-of').textContent = 'Drag over a curve or a scatter.';
     $('share-list').replaceChildren();
     return;
   }
-  $('shares-of').textContent = `Of the squared error now in ${placeOf(asked)} (${
-    found.samples} samples), less the price of each effect:`;
+  $('shares-of').textContent = `${found.samples} samples in ${placeOf(asked)}: error ${
+    amount(found.before)} → ${amount(found.now)} ${unit}. Of the squared error now, less the price
+ of each effect:`;
   const told = found.shares.filter((one) => one.net > LEAST).slice(0, MOST).map((one) => {
     const item = make('li');
     const place = button('', (event) => tick(one.effect, event.timeStamp));

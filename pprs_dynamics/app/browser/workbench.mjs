@@ -1,5 +1,6 @@
 /* The workbench's page: asks, shows what is answered, and says when it has been painted. */
 
+import {read, written} from './address.mjs';
 import {csvOf, save, svgOf} from './curve_files.mjs';
 import {Curves} from './curves.mjs';
 import {$, afterPaint, make, whenDark} from './dom.mjs';
@@ -11,6 +12,7 @@ import {adoptionSaid, showExperiment, showFiles, showJobs, showLedger, showRecor
         showVerdict} from './panels.mjs';
 import {drawScale, Robot} from './robot.mjs';
 import {Scatter} from './scatter.mjs';
+import {followScheme, switchScheme} from './scheme.mjs';
 import {rowsOf, Server} from './server.mjs';
 import {showShares} from './shares.mjs';
 
@@ -26,6 +28,7 @@ let latest = []; // what is left now, by drive
 let pending; // when the tick was made whose fit is awaited
 let isPressed = false; // whether something that can be clicked is
 let held = null; // what came meanwhile
+let wanted = null; // what the address asks to see, until it is seen
 
 const unit = (drive, quantity) => unitOf(server.state, drive, quantity);
 const tabs = [...document.querySelectorAll('[role=tab]')];
@@ -66,7 +69,7 @@ const show = (last, state, arrays) => {
   showRecordings(state, (span) => {
     open('curves');
     curves.zoom(span);
-  });
+  }, (name) => server.run('remove', {name}));
   const said = adoptionSaid(last, state);
   if (said) tell(...said);
   if (last?.revision !== state.revision || (state.is_settled && !last?.is_settled)) {
@@ -103,6 +106,19 @@ const begin = async (generation) => {
   if (worst) $('scatter-drive').value = worst[0];
   [$('from').value, $('to').value] = [time[0].toFixed(2), time[time.length - 1].toFixed(2)];
   setMark(null);
+  if (wanted) {
+    const {window: seen, mark: marked, axes, view: chosen} = wanted;
+    wanted = null;
+    const scatterOf = {x: 'scatter-x', y: 'scatter-y', drive: 'scatter-drive'};
+    for (const [key, value] of Object.entries(axes)) {
+      if ([...$(scatterOf[key]).options].some((one) => one.value === value)) {
+        $(scatterOf[key]).value = value;
+      }
+    }
+    if (seen) curves.zoom(seen);
+    if (marked && (!marked.drive || header.drives.includes(marked.drive))) askAbout(marked);
+    if (chosen) open(chosen);
+  }
   afterPaint(() => { bench.first = performance.now(); });
 };
 
@@ -110,6 +126,7 @@ const begin = async (generation) => {
 
 const setMark = (asked) => {
   mark = asked;
+  tellAddress();
   curves.setSpans(null);
   curves.mark(asked?.time ?? null, asked?.drive);
   if (asked?.time) {
@@ -138,7 +155,7 @@ const where = async (asked, began) => {
     const margin = Math.max(0.5, b - a);
     curves.setSpans(spans);
     curves.zoom([a - margin, b + margin]);
-  });
+  }, unit(asked.drive));
   if (began !== undefined) noted(bench.shares, began);
 };
 
@@ -149,8 +166,16 @@ const askAbout = (asked, began = performance.now()) => {
 
 /* -- views -------------------------------------------------------------------------------- */
 
+/* A link shows what is seen here; going back in the browser leaves the page as ever. */
+const tellAddress = () => {
+  if (wanted || !curves.before) return;
+  history.replaceState(null, '', written({view, window: curves.window, mark, axes: {
+    x: $('scatter-x').value, y: $('scatter-y').value, drive: $('scatter-drive').value}}));
+};
+
 const open = (name) => {
   view = name;
+  tellAddress();
   for (const tab of tabs) {
     const chosen = tab.dataset.view === name;
     tab.setAttribute('aria-selected', String(chosen));
@@ -182,6 +207,7 @@ const loadRobot = async () => {
     const {header, arrays} = await server.ask('robot');
     $('robot-time').max = arrays.time.values.length - 1;
     robot.use(header, arrays);
+    if (curves.playhead !== null) robot.goTo(curves.playhead);
     $('robot-most').textContent = `0 to ${amount(robot.most)} ${unit()}`;
     robot.moved(robot.frame);
   } catch (error) {
@@ -214,7 +240,13 @@ const scatter = new Scatter($('scatter'), (region) => {
 const robot = new Robot($('robot'), (frame) => {
   $('robot-time').value = frame;
   $('robot-clock').textContent = `${robot.time[frame].toFixed(2)} s`;
+  curves.goTo(robot.time[frame]);
 });
+curves.moved = () => tellAddress();
+curves.went = (time) => {
+  curves.goTo(time);
+  robot.goTo(time);
+};
 const live = new Live(server, () => view === 'live');
 Object.assign(bench, {scatter, robot});
 
@@ -225,12 +257,15 @@ const span = () => [Number($('from').value), Number($('to').value)];
 
 for (const tab of tabs) {
   tab.setAttribute('aria-controls', `view-${tab.dataset.view}`);
+  tab.id ||= `tab-${tab.dataset.view}`;
   tab.addEventListener('click', () => open(tab.dataset.view));
   tab.addEventListener('keydown', (event) => {
-    const step = {ArrowLeft: -1, ArrowRight: 1}[event.key];
-    if (!step) return;
     const seen = seenTabs();
-    const next = seen[(seen.indexOf(tab) + step + seen.length) % seen.length];
+    const at = seen.indexOf(tab);
+    const next = {ArrowLeft: seen.at(at - 1), ArrowRight: seen[(at + 1) % seen.length],
+                  Home: seen[0], End: seen.at(-1)}[event.key];
+    if (!next) return;
+    event.preventDefault();
     open(next.dataset.view);
     next.focus();
   });
@@ -250,6 +285,7 @@ for (const id of ['scatter-x', 'scatter-y', 'scatter-drive']) {
   on(id, 'change', () => {
     setMark(null);
     loadScatter();
+    tellAddress();
   });
 }
 on('play', 'click', () => {
@@ -267,25 +303,51 @@ on('robot-error', 'change', () => {
   robot.draw();
 });
 on('undo', 'click', () => server.change('undo', {}));
+for (const id of ['back', 'forward']) on(id, 'click', () => server.change(id, {}));
+on('scheme', 'click', switchScheme);
 on('design', 'click', () => server.run('experiment', {
   duration: Number($('experiment-duration').value)}));
 on('invite', 'click', async () => tell(
   `For one more browser, good once: ${(await server.ask('invite', {})).address}`, true));
-on('upload', 'change', async () => {
-  const [file] = $('upload').files;
-  if (!file) return;
-  try {
-    server.take(await server.upload(file, {
-      name: file.name, held_out: $('upload-held-out').checked ? '1' : '0'}));
-    tell('');
-  } catch (error) {
-    tell(error.message);
+const upload = async (files) => {
+  for (const file of files) {
+    try {
+      server.take(await server.upload(file, {
+        name: file.name, held_out: $('upload-held-out').checked ? '1' : '0'}));
+      tell('');
+    } catch (error) {
+      tell(`${file.name}: ${error.message}`);
+    }
   }
+};
+on('upload', 'change', async () => {
+  await upload($('upload').files);
   $('upload').value = '';
+});
+document.addEventListener('dragover', (event) => {
+  if (!event.dataTransfer.types.includes('Files')) return;
+  event.preventDefault();
+  document.body.classList.add('dropping');
+});
+document.addEventListener('dragleave', (event) => {
+  if (!event.relatedTarget) document.body.classList.remove('dropping');
+});
+document.addEventListener('drop', (event) => {
+  if (!event.dataTransfer.files.length) return;
+  event.preventDefault();
+  document.body.classList.remove('dropping');
+  upload([...event.dataTransfer.files]);
 });
 on('help', 'click', () => $('keys').showModal());
 on('close-keys', 'click', () => $('keys').close());
 document.addEventListener('keydown', (event) => {
+  const deed = (event.ctrlKey || event.metaKey) && !event.target.matches('input:not([type=checkbox])')
+    && {z: event.shiftKey ? 'forward' : 'back', y: 'forward'}[event.key.toLowerCase()];
+  if (deed && !$(deed).disabled) {
+    event.preventDefault();
+    server.change(deed, {});
+    return;
+  }
   if (event.target.matches('input:not([type=checkbox]), select') || event.ctrlKey
       || event.metaKey || event.altKey) return;
   const tab = seenTabs()[Number(event.key) - 1];
@@ -310,6 +372,9 @@ for (const end of ['pointerup', 'pointercancel']) {
 }
 whenDark(() => { if (server.state?.errors) showErrors($('errors'), server.state); });
 drawScale($('robot-scale'));
+followScheme();
+wanted = read(location.hash, tabs.map((tab) => tab.dataset.view));
+addEventListener('hashchange', () => location.reload());
 const events = new EventSource('/api/events');
 events.onmessage = (event) => server.hear(Number(event.data));
 events.onerror = () => tell('The workbench does not answer: was it stopped?');

@@ -167,6 +167,22 @@ class Inputs:
         return replace(self, recordings={**self.recordings, **more.recordings},
                        paths=self.paths | more.paths)
 
+    def without(self, name: str) -> Inputs:
+        """Return this with one recording fewer.
+
+        Raises
+        ------
+        InputError
+            For one that is not there, or the last one to fit to.
+        """
+        if name not in {**self.recordings, **self.validation}:
+            raise InputError(f'no recording {displayed(name)}, must be one of '
+                             f'{", ".join(map(displayed, (*self.recordings, *self.validation)))}')
+        fewer, held_out = ({key: one for key, one in given.items() if key != name}
+                           for given in (self.recordings, self.validation))
+        return replace(self, recordings=fewer, validation=held_out,
+                       paths=self.paths - {name}).require_recordings()
+
     def since(self, reference: Given | None) -> Inputs:
         """Return this with reference runs, () for the model's own; as it is for None.
 

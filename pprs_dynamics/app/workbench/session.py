@@ -18,9 +18,10 @@ from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench import views
 from pprs_dynamics.app.workbench.background import Cancelled, Job, run_in_process
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
+from pprs_dynamics.app.workbench.history import History, Moment
 from pprs_dynamics.app.workbench.long_work import DesignedMotion, designed, diagnosed
 from pprs_dynamics.app.workbench.masks import Mask, quantity, region_mask, shares_in, span_mask
-from pprs_dynamics.app.workbench.tick_fits import Tick, TickFits
+from pprs_dynamics.app.workbench.tick_fits import Place, Tick, TickFits
 from pprs_dynamics.app.workbench.views import DriveError, Share, ViewState
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
@@ -72,8 +73,12 @@ class Session:
         Design, regression and library of the model.
     view_state : ViewState
         Fit, values and evidence of one moment.
+    history : History
+        What somebody did, for `back` and `forward`.
     revision : int
         Counts what somebody changed.
+    generation : int
+        Counts the fits; ticks belong to one of them.
     version : int
         Counts every change of what is shown.
 
@@ -95,7 +100,8 @@ class Session:
         self.last_adoption: Adoption | None = None
         self.experiment: DesignedMotion | None = None
         self.jobs: dict[str, Job[Any]] = {}
-        self.revision = self.version = 0
+        self.revision = self.version = self.generation = 0
+        self.history = History()
         self._lock, self._settling, self._reading = RLock(), RLock(), Lock()
         self._listeners: list[Callable[[], None]] = []
         self._use(TickFits(model, list(recordings.values()), reference))
@@ -141,10 +147,11 @@ class Session:
             self.fits = fits
             self.noise_floors: dict[str, float] | None = None
             self.revision += 1
+            self.generation += 1
             self.view_state = views.without_ticks(fits, self.revision)
             for name, tick in (ticks or {}).items():
                 with suppress(PprsError):  # what cannot act under this model is ticked no more
-                    self.tick(name, views.names_of(tick.best, fits.drives))
+                    self._tick(name, views.names_of(tick.best, fits.drives), tick.chosen)
             self.notify()
 
     def add(self, path: str | PathLike[str], is_held_out: bool = False) -> None:
@@ -162,8 +169,23 @@ class Session:
                 pass  # the model was changed meanwhile
         self.notify()
 
+    def remove(self, name: str) -> None:
+        """Let go of a recording, fitted or held out; ticks and the model stay.
+
+        Raises
+        ------
+        InputError
+            For one that is not there, or the last one that is fitted.
+        """
+        with self._reading:
+            fewer = self.inputs.without(name)
+            while not self._take(fewer, self.fits if name in self.inputs.validation
+                                 else TickFits(self.model, fewer.fitted)):
+                pass  # the model was changed meanwhile
+        self.notify()
+
     def _take(self, inputs: Inputs, fits: TickFits) -> bool:
-        """Go on with more recordings; False where their fits are of another model than this."""
+        """Go on with other recordings; False where their fits are of another model than this."""
         with self._lock:
             if fits.model is not self.model:
                 return False
@@ -275,25 +297,30 @@ class Session:
         StaleError
             Where the session is at another revision.
         """
+        on = f' on {", ".join(drives)}' if drives else ''
+        with self._changing(revision, f'{effect} ticked{on}'):
+            return self._tick(effect, drives)
+
+    def _tick(self, effect: str, drives: Sequence[str] | None,
+              chosen: Mapping[Place, float] | None = None) -> ViewState:
         request = EffectRequest.named(effect, drives, self.drives).placed(self.model)
-        with self._changing(revision):
-            view = self.view_state
-            offer = next((one.candidate for one in view.offers
-                          if one.candidate.effect is request.effect), None)
-            asked = None if request.drives is None else tuple(
-                self.drives.index(name) for name in request.drives)
-            if offer is None or (asked is not None and offer.drives != asked):
-                rest = [tick.best for name, tick in view.ticks.items() if name != effect]
-                offer = self.fits.offered(request.effect, asked, self.fits.at(rest, view.free))
-            if offer is None:
-                on = f' on {", ".join(drives)}' if drives else ''
-                raise SessionError(f'{effect}{on} has nothing to act on in these recordings, or '
-                                   'the model has it already')
-            return self._linear({**view.ticks, effect: Tick(offer)})
+        view = self.view_state
+        offer = next((one.candidate for one in view.offers
+                      if one.candidate.effect is request.effect), None)
+        asked = None if request.drives is None else tuple(
+            self.drives.index(name) for name in request.drives)
+        if offer is None or (asked is not None and offer.drives != asked):
+            rest = [tick.best for name, tick in view.ticks.items() if name != effect]
+            offer = self.fits.offered(request.effect, asked, self.fits.at(rest, view.free))
+        if offer is None:
+            on = f' on {", ".join(drives)}' if drives else ''
+            raise SessionError(f'{effect}{on} has nothing to act on in these recordings, or '
+                               'the model has it already')
+        return self._linear({**view.ticks, effect: Tick(offer, chosen or {})})
 
     def untick(self, effect: str, revision: int | None = None) -> ViewState:
         """Let an effect take no part."""
-        with self._changing(revision):
+        with self._changing(revision, f'{effect} unticked'):
             self._ticked(effect)
             return self._linear({name: tick for name, tick in self.view_state.ticks.items()
                                  if name != effect})
@@ -310,7 +337,7 @@ class Session:
         ModelError
             For a value that the parameter may not have.
         """
-        with self._changing(revision):
+        with self._changing(revision, f'{effect}: {key} chosen'):
             tick, view = self._ticked(effect), self.view_state
             known = view.estimates.get(effect, {})
             if key not in known:
@@ -325,7 +352,7 @@ class Session:
 
     def release(self, effect: str, revision: int | None = None) -> ViewState:
         """Let the fit decide about an effect's parameters again."""
-        with self._changing(revision):
+        with self._changing(revision, f'{effect}: best values'):
             return self._linear({**self.view_state.ticks, effect: replace(
                 self._ticked(effect), chosen={})})
 
@@ -360,13 +387,56 @@ class Session:
         return ticks[effect]
 
     @contextmanager
-    def _changing(self, revision: int | None) -> Iterator[None]:
-        """Keep others from changing anything; raise StaleError where somebody did before."""
+    def _changing(self, revision: int | None, deed: str) -> Iterator[None]:
+        """Keep others from changing anything, and note the deed where it changed something.
+
+        Raises StaleError where somebody changed something before.
+        """
         with self._lock:
-            if revision is not None and revision != self.revision:
-                raise StaleError(f'revision is {revision}, must be {self.revision}: something '
-                                 'was changed elsewhere')
+            self._require(revision)
+            before = self._moment()
             yield
+            if not self._moment().is_as(before):
+                self.history.note(deed, before)
+
+    def _require(self, revision: int | None) -> None:
+        if revision is not None and revision != self.revision:
+            raise StaleError(f'revision is {revision}, must be {self.revision}: something '
+                             'was changed elsewhere')
+
+    def _moment(self) -> Moment:
+        return Moment(self.model, self.view_state.ticks, self.generation)
+
+    def back(self, revision: int | None = None) -> ViewState:
+        """Take back what was done last: a tick, a value, an adoption, a step of the ledger.
+
+        Raises
+        ------
+        SessionError
+            Where nothing was done.
+        StaleError
+            Where the session is at another revision.
+        """
+        return self._move(revision, self.history.back, 'nothing was done that could be taken back')
+
+    def forward(self, revision: int | None = None) -> ViewState:
+        """Do again what was taken back last; errors as `back`."""
+        return self._move(revision, self.history.forward, 'nothing was taken back')
+
+    def _move(self, revision: int | None, to: Callable[[Moment], Moment | None], none: str,
+              ) -> ViewState:
+        with self._lock:
+            self._require(revision)
+            moment = to(self._moment())
+            if moment is None:
+                raise SessionError(none)
+            if moment.generation == self.generation:
+                return self._linear(dict(moment.ticks))
+            self.diagnosis = self.diagnosis if moment.model is self.model else None
+            fits = (self.fits if moment.model is self.model
+                    else TickFits(moment.model, self.fits.recordings))
+            self._use(fits, moment.ticks)
+            return self.view_state
 
     def _linear(self, ticks: dict[str, Tick]) -> ViewState:
         self.revision += 1
@@ -428,7 +498,8 @@ class Session:
         StaleError
             Where the session is at another revision.
         """
-        with self._changing(revision):
+        with self._lock:
+            self._require(revision)
             tick = self.view_state.ticks.get(effect)
             on = drives or (views.names_of(tick.best, self.drives) if tick else None)
             request = EffectRequest.named(effect, on or None, self.drives).placed(self.model)
@@ -453,9 +524,10 @@ class Session:
             with self._lock:
                 if fits is not self.fits:
                     raise SessionError('the model was changed while the effect was judged')
-                self.diagnosis = None
-                self._use(after, {name: tick for name, tick in self.view_state.ticks.items()
-                                  if name != request.name})
+                with self._changing(None, f'{request.name} adopted'):
+                    self.diagnosis = None
+                    self._use(after, {name: tick for name, tick in self.view_state.ticks.items()
+                                      if name != request.name})
         self.last_adoption = answer
         return answer
 
@@ -508,7 +580,7 @@ class Session:
         StaleError
             Where the session is at another revision.
         """
-        with self._changing(revision):
+        with self._changing(revision, 'last step of the ledger taken back'):
             values, step = without_last_step(self.model.values)
             model = replace(build_model(values), source=self.model.source)
             self.diagnosis = None
@@ -565,8 +637,10 @@ class Session:
                 'little': word_little(little_explained(
                     self.model, self.fits.fits.design.residuals, self.now)),
                 'steps': [step.to_dict() for step in self.steps],
+                'undoes': self.history.undoes, 'redoes': self.history.redoes,
                 'jobs': {kind: job.to_dict() for kind, job in self.jobs.items()},
                 'adoption': for_json(adoption.to_dict()) if adoption else None,
                 'experiment': for_json(self.experiment.promise) if self.experiment else None,
-                'recordings': views.recordings_to_dict(self.inputs.fitted, self.fits, self.now),
-                'held_out': [one.name for one in self.inputs.held_out]}
+                'recordings': views.recordings_to_dict(self.inputs.recordings, self.fits, self.now),
+                'held_out': [{'key': key, 'name': one.name}
+                             for key, one in self.inputs.validation.items()]}

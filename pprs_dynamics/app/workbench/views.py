@@ -260,16 +260,17 @@ def _parameters(view: ViewState, effect: type[CatalogueEffect], model: ForceMode
     return rows
 
 
-def recordings_to_dict(recordings: Sequence[Recording], fits: TickFits, now: Array,
+def recordings_to_dict(recordings: Mapping[str, Recording], fits: TickFits, now: Array,
                        ) -> list[dict[str, Any]]:
     """Return every recording with its times and its error before and now."""
     found, first = [], 0
     time = fits.design.residuals.time
-    for recording, one in zip(recordings, fits.design.reconstructions, strict=True):
+    for (key, recording), one in zip(recordings.items(), fits.design.reconstructions, strict=True):
         part = slice(first, first + len(one.treat.starts))
         first = part.stop
         found.append({
-            'name': recording.name, 'start': float(time[part][0]), 'end': float(time[part][-1]),
+            'key': key, 'name': recording.name,
+            'start': float(time[part][0]), 'end': float(time[part][-1]),
             'before': finite(root_mean_square(fits.before[part])),
             'now': finite(root_mean_square(now[part])),
             'findings': [finding.text for finding in recording.findings]})

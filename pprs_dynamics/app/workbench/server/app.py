@@ -34,8 +34,10 @@ from pprs_dynamics.app.workbench.server.offered import index_of
 from pprs_dynamics.app.workbench.server.wire import BadRequestError, Fields, attached, binary
 from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.app.workbench.views import units_to_dict
+from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
+from pprs_dynamics.system.numbers import finite
 
 UPLOAD = '/api/upload'
 MOST_UPLOADED = 256_000_000  # bytes: an hour of six drives at 500 Hz as CSV
@@ -52,6 +54,9 @@ CHANGES: dict[str, Callable[[Session, Fields], object]] = {
     'adopt': lambda session, body: session.adopt(body.text('effect'), revision=body.revision()),
     'cancel': lambda session, body: session.cancel(body.text('kind')),
     'undo': lambda session, body: session.undo(body.revision()),
+    'back': lambda session, body: session.back(body.revision()),
+    'forward': lambda session, body: session.forward(body.revision()),
+    'remove': lambda session, body: session.remove(body.text('name')),
     'experiment': lambda session, body: session.next_experiment(body.number('duration')),
 }
 
@@ -191,6 +196,8 @@ class Api:
             drive = body.get('drive')
             mask = session.span(*body.range('time'), None if drive is None else [str(drive)])
         return JSONResponse({'shares': [asdict(one) for one in session.shares(mask)],
+                             'before': finite(root_mean_square(session.before[mask])),
+                             'now': finite(root_mean_square(session.now[mask])),
                              'spans': spans_of(session.data, mask),
                              'samples': int(mask.sum()), 'revision': session.revision})
 
