@@ -166,7 +166,9 @@ class PrescribedPlant:
                 _at(motion, values, time, CubicSpline)
                 for values in (position, velocity, acceleration))
         warm = next((one for one in effects if isinstance(one, FrictionTemperature)), None)
-        return Readings(position + faults.zero, velocity, acceleration, effort,
+        # What a play does to recorded rates is left to those who differentiate positions.
+        return Readings(position + faults.zero + faults.lead(velocity), velocity, acceleration,
+                        effort,
                         {} if warm is None else warm.measured(motion.time, motion.velocity))
 
     def _bodies_with(self, changes: Sequence[BodyChange]) -> BodyForces:
