@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ast
 from dataclasses import replace
-from itertools import combinations
+from itertools import chain, combinations, repeat
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +31,7 @@ from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.ranking import select
 from pprs_dynamics.inference.search.relinearisation import (
     ExactSet,
+    linearised,
     next_operating_point,
     search_around_fitted,
 )
@@ -198,6 +199,26 @@ def test_what_a_set_costs_by_its_exact_forces_does_not_depend_on_where_it_was_fo
     assert costs[0] == pytest.approx(costs[1], abs=1)
     # That of the true set is below its linear cost, of which tilts by 6 degrees are no small part.
     assert costs[0] < tilted.total
+
+
+def test_a_set_of_which_no_step_lowers_the_exact_error_stands_for_the_best_model_so_far(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    fits = FittedSets(Design.of(MODEL, [recording_of({'base_tilt': {'x': 0.1, 'y': -0.05}})]),
+                      DECISIONS)
+    point = next_operating_point(fits, fits.evaluate((TILTED,)))
+    assert point is not None
+    around = FittedSets(fits.design.around(point), DECISIONS, fits.regression.error_scale)
+    free = around.evaluate((TILTED,))
+    # Far from linear, and every step leaves more than the point does.
+    losses = chain([100.0, 100.0, 0.0], repeat(100.0))
+    monkeypatch.setattr(relinearisation, 'squared', lambda *given: next(losses))
+    last, held = linearised(around, free)
+    assert last is around
+    assert not np.allclose(exact_forces(fits.design, fitted_model(around, free)),
+                           around.design.forces, atol=1e-3)
+    np.testing.assert_allclose(exact_forces(fits.design, fitted_model(around, held)),
+                               around.design.forces, atol=1e-6)
+    assert held.total > free.total
 
 
 def test_a_relinearised_set_is_on_the_drives_where_it_costs_least() -> None:

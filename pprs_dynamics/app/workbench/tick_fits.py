@@ -22,7 +22,6 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
-from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
 from pprs_dynamics.inference.search.fitted_model import exact_forces, fitted_model, linear_residual
@@ -240,10 +239,7 @@ class TickFits:
                 values += [wanted[name] for name in placement.names]
         if not blocks:
             return found
-        fit = self.fits.regression.held(self.fits.regression.stated(found.fit),
-                                        found.fit.index_of(blocks), np.array(values))
-        held = CostTerms(fit=fit.deviance - found.fit.deviance)
-        return replace(found, fit=fit, terms=found.terms + held)
+        return self.fits.held(found, found.fit.index_of(blocks), np.array(values))
 
     # What a set says
 

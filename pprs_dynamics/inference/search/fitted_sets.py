@@ -15,7 +15,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import units_of
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.joint_fit import Integers, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.body_centres import centre_of
 from pprs_dynamics.inference.search.candidates import (
@@ -224,6 +224,15 @@ class FittedSets:
         c, covariance = found.fit.coefficients[place], found.fit.covariance[place, place]
         return float(c @ np.linalg.solve(covariance, c) + np.linalg.slogdet(covariance)[1]
                      + np.linalg.slogdet(block.precision)[1])
+
+    def held(self, found: CandidateSet, index: Integers, values: Array) -> CandidateSet:
+        """Return a set with some coefficients (k,) as given, all else fitted beside them.
+
+        At the noise of the set, so that a bad value cannot hide in it.
+        """
+        fit = self.regression.held(self.regression.stated(found.fit), index, values)
+        return replace(found, fit=fit, terms=found.terms + CostTerms(
+            fit=fit.deviance - found.fit.deviance))
 
     def refined(self, found: CandidateSet) -> CandidateSet:
         """Return the set with all shapes moved by Gauss-Newton steps that lower the cost.

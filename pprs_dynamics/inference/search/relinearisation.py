@@ -152,7 +152,8 @@ def linearised(fits: FittedSets, found: CandidateSet, alone: bool = False,
     """Return a set around its own fitted model, and the fitted sets that it is of.
 
     Those given where nothing would change. Gauss-Newton steps with the set as it is, each
-    halved until the exact error falls. `alone`: nothing is to be added, see `Design.around`.
+    halved until the exact error falls; where none does, the set stays where columns
+    hold. `alone`: nothing is to be added, see `Design.around`.
 
     Raises
     ------
@@ -163,6 +164,8 @@ def linearised(fits: FittedSets, found: CandidateSet, alone: bool = False,
         point = next_operating_point(fits, found)
         if point is None:
             break
+        if point is fits.design.point:
+            return fits, _held_at(fits, found, point)
         fits = FittedSets(fits.design.around(point, alone), fits.decisions,
                           fits.regression.error_scale)
         found = fits.refined(fits.evaluate(found.candidates))
@@ -173,7 +176,8 @@ def next_operating_point(fits: FittedSets, found: CandidateSet) -> OperatingPoin
     """Return where to expand next: towards a set's fitted model, as far as the exact error falls.
 
     None where the exact forces of the fitted model are those of the linear fit, and columns were
-    computed with every effect that bends them.
+    computed with every effect that bends them; the point where columns hold where no step from it
+    lowers the exact error.
     """
     design = fits.design
     base, effects = parts_of(fits, found)
@@ -197,8 +201,22 @@ def next_operating_point(fits: FittedSets, found: CandidateSet) -> OperatingPoin
             target = model_at(design, base, effects)
             loss = squared(fits, found, measured - exact_forces(design, target))
         else:
-            return None
+            return before
     return OperatingPoint(target, base, effects)
+
+
+def _held_at(fits: FittedSets, found: CandidateSet, point: OperatingPoint) -> CandidateSet:
+    """Return a set with the numbers and coefficients of a point, all else fitted beside them."""
+    known = {(one.effect, one.drive): one.coefficients for one in point.effects}
+    index = [np.flatnonzero([column.in_model for column in fits.design.base])]
+    values = [point.base[index[0]]]
+    for one, block in found.blocks.items():
+        names = one.names or [c.name for c in one.effect.coefficients]
+        index.append(found.fit.index_of([block])[:len(names)])
+        values.append(np.array([known[one.effect, one.drive].get(name, 0.0) for name in names]))
+    at, wanted = np.concatenate(index), np.concatenate(values)
+    moves = wanted != found.fit.coefficients[at]  # numbers that are certain do not
+    return fits.held(found, at[moves], wanted[moves])
 
 
 def _is_bent_by(point: OperatingPoint | None, effects: Sequence[PlacedEffect]) -> bool:
@@ -217,15 +235,14 @@ def _between(a: PlacedEffect, b: PlacedEffect) -> PlacedEffect:
 
 
 def relinearised(fits: FittedSets, found: CandidateSet) -> tuple[FittedSets, CandidateSet]:
-    """Return what `linearised` does, shapes refined until they stand still.
+    """Return what `linearised` does of a set whose shapes were refined until they stand still.
 
     Raises
     ------
     ModelError
         For values that no model may have.
     """
-    fits, found = linearised(fits, found, alone=True)
-    return fits, fits.refined(found)
+    return linearised(fits, fits.refined(found), alone=True)
 
 
 @dataclass(frozen=True)
