@@ -210,7 +210,8 @@ class Evaluation:
         return found
 
     def found(self, motion: tuple[Array, Array, Array], inertial: Array, gravity: Array,
-              friction: JointFriction, nearby: Array | None = None) -> Found | None:
+              friction: JointFriction, start: Array | None = None,
+              nearby: Array | None = None) -> Found | None:
         """Return what is needed for a motion, with nothing kept of the way there.
 
         Parameters
@@ -220,7 +221,7 @@ class Evaluation:
         inertial : (J + 1, 10) array
         gravity : (3,) array
         friction : JointFriction
-        nearby : (C,) array, optional
+        start, nearby : (C,) arrays, optional
             See `follow`.
 
         Returns
@@ -233,7 +234,8 @@ class Evaluation:
         count = len(self.home)
         table = np.empty((samples, count + 2 * drives))
         rows = np.empty((1, self._lengths[0]))
-        if self._run(given, nearby, rows, MOTION | FORCES, gravity, nearby is not None, inertial,
+        if self._run(given, start if nearby is None else nearby, rows, MOTION | FORCES, gravity,
+                     nearby is not None, inertial,
                      np.empty((1, self._lengths[1])), friction, table) >= 0:
             return None
         return Found(table[:, :count], table[:, count:count + drives], table[:, count + drives:])

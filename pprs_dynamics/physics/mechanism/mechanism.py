@@ -369,8 +369,8 @@ class LinkageState(JointMotion):
         The motion of all links, where it is there.
     friction : JointFriction
         The model's own, which is found with the efforts.
-    nearby : (C,) array, optional
-        See `Evaluation.found`.
+    start, nearby : (C,) arrays, optional
+        See `Evaluation.follow`.
     """
 
     robot: Mechanism = field(kw_only=True)
@@ -378,11 +378,12 @@ class LinkageState(JointMotion):
     load: StructureLoad | None = field(default=None, kw_only=True)
     known: Linkage | None = field(default=None, kw_only=True)
     friction: JointFriction = field(default=NO_FRICTION, kw_only=True)
+    start: Array | None = field(default=None, kw_only=True)
     nearby: Array | None = field(default=None, kw_only=True)
 
     def __getitem__(self, samples: Any) -> Self:
         """Return the samples that a slice, a mask or indices select, with their load."""
-        return replace(super().__getitem__(samples), known=None, nearby=None,
+        return replace(super().__getitem__(samples), known=None, start=None, nearby=None,
                        load=None if self.load is None else self.load.at(samples))
 
     @property
@@ -398,7 +399,7 @@ class LinkageState(JointMotion):
         robot = self.robot
         return robot.structure.evaluation.found(
             (self.position, self.velocity, self.acceleration), robot.by_joint, robot.gravity_row,
-            self.friction, self.nearby)
+            self.friction, self.start, self.nearby)
 
     @lazy
     def linkage(self) -> Linkage:
@@ -408,7 +409,7 @@ class LinkageState(JointMotion):
             return self.known
         found = vars(self).get('found')
         if found is None or not len(found.q):
-            return Linkage.of(self.robot.structure, *motion, nearby=self.nearby)
+            return Linkage.of(self.robot.structure, *motion, self.start, self.nearby)
         return Linkage.of(self.robot.structure, *motion, found.q[0])
 
     @property

@@ -92,7 +92,7 @@ class ToolPose:
         Returns
         -------
         moved : JointMotion
-        nearby : (C,) array
+        start : (C,) array
             Closed coordinates of the robot at the first sample.
 
         Raises

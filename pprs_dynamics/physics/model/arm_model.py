@@ -259,12 +259,14 @@ class ArmModel(ForceModel):
                   closed: dict[Any, Array] | None = None) -> LinkageState:
         """Return what effects take of a motion; see `drive_forces` and `ModelState.closed`."""
         closed = {} if closed is None else closed
-        nearby = closed.get(self.robot.structure)
+        start, nearby = None, closed.get(self.robot.structure)
         if isinstance(motion, PlatformMotion):
-            motion, nearby = self.tool_pose.drives(motion, closed)
+            # The assembly is that of the pose, whichever the same drives would find from home.
+            motion, start = self.tool_pose.drives(motion, closed)
+            nearby = None
         return LinkageState(motion.position, motion.velocity, motion.acceleration, motion.time,
                             channels=motion.channels, robot=self.robot, reversal=self.reversal,
-                            nearby=nearby, friction=self._joint_friction)
+                            start=start, nearby=nearby, friction=self._joint_friction)
 
     @cached_property
     def _joint_friction(self) -> JointFriction:
