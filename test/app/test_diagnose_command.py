@@ -87,12 +87,13 @@ def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> No
     promised = {'verdict', 'effects', 'indistinguishable', 'candidates', 'depends_on', 'suspects'}
     added = {'above_noise', 'barred', 'calibrated', 'effort_looks_like', 'explained',
              'explained_after', 'held_out_on', 'little_explained', 'noise_floor',
-             'noise_floors', 'sets', 'stick_slip', 'unconfirmed', 'warnings'}
+             'noise_floors', 'reference', 'changed_since', 'sets', 'stick_slip', 'unconfirmed',
+             'warnings'}
     assert set(result) == promised | added
     for effect in result['effects']:
         assert set(effect) == {'name', 'drives', 'alike', 'parameters', 'error_before',
                                'error_after', 'held_out_before', 'held_out_after', 'evidence',
-                               'without', 'since', 'course'}
+                               'without', 'since', 'course', 'held_out_certainty'}
         assert effect['without']['cost'] == pytest.approx(effect['evidence'])
         assert set(effect['drives']) <= set(DRIVES)
         for parameter in effect['parameters'].values():

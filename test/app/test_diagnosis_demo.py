@@ -28,7 +28,7 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import read_recording
 
 DEMO = Path(diagnosis_demo.__file__)
-SEED, DURATION = 20, 8.0  # [s]
+SEED, DURATION = 26, 8.0  # [s]
 REVEALED = 'What was hidden'
 
 

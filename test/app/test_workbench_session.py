@@ -261,11 +261,11 @@ def test_a_model_that_changes_while_a_recording_is_added_is_kept(
     changed = build_model({**session.model.values, 'masses.payload': 0.1})
     began: list[None] = []
 
-    def overtaken(model: Any, recordings: Any) -> TickFits:
+    def overtaken(model: Any, recordings: Any, *given: Any) -> TickFits:
         if not began:
             began.append(None)
             session._use(TickFits(changed, session.fits.recordings))  # as an adoption ends
-        return TickFits(model, recordings)
+        return TickFits(model, recordings, *given)
 
     monkeypatch.setattr(session_module, 'TickFits', overtaken)
     session.add(other)

@@ -151,7 +151,9 @@ class Session:
             self.view_state = views.without_ticks(fits, self.revision)
             for name, tick in (ticks or {}).items():
                 with suppress(PprsError):  # what cannot act under this model is ticked no more
-                    self._tick(name, views.names_of(tick.best, fits.drives), tick.chosen)
+                    self._tick(EffectRequest.named(
+                        name, views.names_of(tick.best, fits.drives), fits.drives).placed(
+                            fits.model), tick.chosen)
             self.notify()
 
     def add(self, path: str | PathLike[str], is_held_out: bool = False) -> None:
@@ -297,14 +299,14 @@ class Session:
         StaleError
             Where the session is at another revision.
         """
+        request = EffectRequest.named(effect, drives, self.drives).placed(self.model)
         on = f' on {", ".join(drives)}' if drives else ''
         with self._changing(revision, f'{effect} ticked{on}'):
-            return self._tick(effect, drives)
+            return self._tick(request)
 
-    def _tick(self, effect: str, drives: Sequence[str] | None,
-              chosen: Mapping[Place, float] | None = None) -> ViewState:
-        request = EffectRequest.named(effect, drives, self.drives).placed(self.model)
-        view = self.view_state
+    def _tick(self, request: EffectRequest, chosen: Mapping[Place, float] | None = None,
+              ) -> ViewState:
+        effect, view = request.name, self.view_state
         offer = next((one.candidate for one in view.offers
                       if one.candidate.effect is request.effect), None)
         asked = None if request.drives is None else tuple(
@@ -313,7 +315,7 @@ class Session:
             rest = [tick.best for name, tick in view.ticks.items() if name != effect]
             offer = self.fits.offered(request.effect, asked, self.fits.at(rest, view.free))
         if offer is None:
-            on = f' on {", ".join(drives)}' if drives else ''
+            on = f' on {", ".join(request.drives)}' if request.drives else ''
             raise SessionError(f'{effect}{on} has nothing to act on in these recordings, or '
                                'the model has it already')
         return self._linear({**view.ticks, effect: Tick(offer, chosen or {})})
