@@ -403,11 +403,11 @@ def test_a_link_shows_what_is_seen(page: Page, browser: Any, bench: Workbench) -
     second = Page(browser, bench)
     second.settled()
     second.tab.evaluate('hash => { location.hash = hash; }', page.tab.evaluate('location.hash'))
-    second.tab.wait_for_function('bench.curves?.span && bench.curves.window')
+    second.tab.wait_for_function('window.bench?.curves?.span && bench.curves.window')
     assert second.tab.evaluate('[bench.curves.range(), bench.curves.span, bench.curves.on]') == [
         pytest.approx(seen[0], abs=1e-3), pytest.approx(seen[1], abs=1e-3), seen[2]]
     second.tab.evaluate("location.hash = '#view=robot'")
-    second.tab.wait_for_function('bench.robot?.time')
+    second.tab.wait_for_function('window.bench?.robot?.time')
     second.tab.locator('#view-robot').wait_for()
     assert second.complaints == []
     second.context.close()
