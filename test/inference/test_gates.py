@@ -362,7 +362,7 @@ DECIDED = Decisions(form_share=0.1, exact_share=0.02, own_form_share=0.05)
 
 def share(found: Any, which: int, parts: dict[str, np.ndarray] | None = None,
           model: Any = PLAIN) -> tuple[float, tuple[str, ...]]:
-    design: Any = SimpleNamespace(given=model)
+    design: Any = SimpleNamespace(given=model, carried=None)
     regression: Any = Rows(parts or {})
     return discrepancy_ratio(design, regression, DECIDED, found, found.candidates[which])
 

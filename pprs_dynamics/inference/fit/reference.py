@@ -52,7 +52,7 @@ from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.residuals.measuring import MOTION, join_tables, treated_table
 from pprs_dynamics.inference.residuals.reconstruction import Reconstruction, reconstruct
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.arm_model import ArmModel
@@ -215,6 +215,7 @@ class Reference:
     regression, fit : Regression, JointFit
     names : tuple of str
         Of the recordings, as they were given.
+    decisions : Decisions
     """
 
     model: ForceModel
@@ -228,6 +229,7 @@ class Reference:
     regression: Regression
     fit: JointFit
     names: tuple[str, ...] = ()
+    decisions: Decisions = DECISIONS
 
     @classmethod
     def of(cls, model: ForceModel, recordings: Sequence[Recording], kept: str = '') -> Reference:
@@ -367,7 +369,7 @@ class Reference:
                 np.sqrt(1 - repeats ** 2) * sizes * known, new), axis=1))
         return CarriedOver(mean, self._directions(replace(
             residuals, measured=residuals.measured - mean), together, apart), float(np.mean(
-                (shared[0] ** 2).sum(axis=1) > DECISIONS.reference_known)))
+                (shared[0] ** 2).sum(axis=1) > self.decisions.reference_known)))
 
     def _directions(self, residuals: Residuals, together: Sequence[Array],
                     apart: Sequence[Array]) -> tuple[ReferenceDirection, ...]:
@@ -381,7 +383,7 @@ class Reference:
         together, apart : sequence of (M, k) array
             Of every drive; columns of unit variance, the first ones shared by all drives.
         """
-        regression = Regression(residuals)
+        regression, least = Regression(residuals), self.decisions.reference_direction
         spectra = regression.fit(()).spectra
         of_all, of_each = [], {}
         for k, d in enumerate(regression.drives):
@@ -394,10 +396,11 @@ class Reference:
             white = series.spread(np.sqrt(1 / spectra[k]))
             of_all.append(series.transform(together[d][series.index].T) * white)
             # What is of one drive alone has few directions.
-            values, axes = _principal(series.transform(apart[d][series.index].T) * white)
+            values, axes = _principal(
+                series.transform(apart[d][series.index].T) * white, least)
             of_each[d] = [(value, apart[d] @ axis) for value, axis in zip(
                 values, axes.T, strict=True)]
-        values, axes = _principal(np.concatenate(of_all, axis=1))
+        values, axes = _principal(np.concatenate(of_all, axis=1), least)
         found = [(value, {d: one @ axis for d, one in enumerate(together)})
                  for value, axis in zip(values, axes.T, strict=True)]
         found += [(value, {d: row}) for d, each in of_each.items() for value, row in each]
@@ -405,10 +408,10 @@ class Reference:
         return tuple(ReferenceDirection(rows, 1.0) for _, rows in found[:MOST_DIRECTIONS])
 
 
-def _principal(rows: Array) -> tuple[Array, Array]:
-    """Return squares and axes of whitened rows (k, n) that count, the largest first."""
+def _principal(rows: Array, least: float) -> tuple[Array, Array]:
+    """Return squares, of `least` at least, and axes of whitened rows (k, n), the largest first."""
     values, axes = np.linalg.eigh(rows @ rows.T)
-    count = int(np.sum(values > DECISIONS.reference_direction))
+    count = int(np.sum(values > least))
     return values[::-1][:count], axes[:, ::-1][:, :count]
 
 
@@ -543,7 +546,8 @@ def _parts(residuals: Residuals) -> Integers:
     return np.minimum(np.arange(len(residuals)) * BLOCKS // len(residuals), BLOCKS - 1)
 
 
-def _repeats(regression: Regression, fit: JointFit, told: int, parts: Integers) -> Array:
+def _repeats(regression: Regression, fit: JointFit, told: int, parts: Integers,
+             decisions: Decisions = DECISIONS) -> Array:
     """Return the correlation of the process in two runs of each drive, (D,).
 
     Each part is predicted from the others. What its errors are from that, beyond noise and what
@@ -575,9 +579,9 @@ def _repeats(regression: Regression, fit: JointFit, told: int, parts: Integers) 
             process = part[told:-1]
             known[d] += (np.sum(process ** 2 / precision[index[told:], None]),
                          left @ left - expected)
-    weight = (DECISIONS.run_repeats_spread * 2) ** -2
-    apart = (known[:, 1] + weight * 2 * (1 - DECISIONS.run_repeats)) / (known[:, 0] + weight)
+    weight = (decisions.run_repeats_spread * 2) ** -2
+    apart = (known[:, 1] + weight * 2 * (1 - decisions.run_repeats)) / (known[:, 0] + weight)
     found = np.clip(1 - apart / 2, 0.0, 1.0)
     # Parts of a single run say nothing of another day.
     return found if regression.residuals.record[-1] else np.minimum(
-        found, DECISIONS.one_run_repeats)
+        found, decisions.one_run_repeats)

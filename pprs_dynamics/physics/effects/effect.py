@@ -200,6 +200,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     ----------------
     card, arm_card : Card
         The latter where an arm needs other words.
+    needs_several_drives : bool
+        Whether a single drive feels it as it feels another effect, always.
     acts_in : set of {'platform', 'axis', 'arm'}
         The kinds of models in which it can act: a 3-PPRS, a single axis, a serial arm.
     linear, shape : tuple of Parameter
@@ -238,6 +240,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
 
     card: ClassVar[Card]
     arm_card: ClassVar[Card | None] = None
+    needs_several_drives: ClassVar[bool] = False
     acts_in: ClassVar[frozenset[str]] = frozenset({PLATFORM})
     linear: ClassVar[tuple[Parameter, ...]]
     shape: ClassVar[tuple[Parameter, ...]] = ()

@@ -78,10 +78,14 @@ class ArmModel(ForceModel):
         See `ForceModel`; friction and offset are the first effects.
     """
 
-    motions: ClassVar[tuple[type, ...]] = (JointMotion, PlatformMotion)
     takes_long: ClassVar[bool] = True
 
     robot: Mechanism
+
+    @property
+    def motions(self) -> tuple[type, ...]:  # type: ignore[override]
+        """What it has forces for; poses of the tool where it has loops."""
+        return (JointMotion, PlatformMotion) if self.robot.structure.loops else (JointMotion,)
 
     @property
     def kind(self) -> str:

@@ -320,7 +320,8 @@ class ForceModel(ABC):
 
     def offers(self, effect: type[CatalogueEffect]) -> bool:
         """Return whether an effect of the catalogue can act in what this is a model of."""
-        return self.kind in effect.acts_in
+        return self.kind in effect.acts_in and (
+            len(self.drives) > 1 or not effect.needs_several_drives)
 
     @property
     def mechanism_of_effects(self) -> Any:

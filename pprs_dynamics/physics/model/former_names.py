@@ -24,7 +24,8 @@ def with_general_names(parameters: Mapping[str, Any]) -> dict[str, Any]:
         name = _key(key)
         if name == key or name not in parameters:
             found[name] = _value(key, value, parameters)
-    for name in parameters.get(ACTIVE) or ():
+    active = parameters.get(ACTIVE)
+    for name in active if isinstance(active, (list, tuple)) else ():
         if isinstance(name, str):
             told_general_name(name)
     return found

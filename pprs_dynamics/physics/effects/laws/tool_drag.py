@@ -25,6 +25,7 @@ class ToolDrag(BodyEffect):
     name: ClassVar[str] = 'tool_drag'
     acts_in = frozenset({PLATFORM, ARM})
     is_friction: ClassVar[bool] = True
+    needs_several_drives: ClassVar[bool] = True  # of a single one it is viscous friction
     linear = (
         Parameter('coefficient', 'c', 'N s/m', 'force per velocity of the tool', -1e6, 1e6,
                   scale=1.0),
