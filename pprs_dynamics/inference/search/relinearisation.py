@@ -69,6 +69,9 @@ class ExactSet:
             for _ in range(MOST_STEPS):
                 last, moved = linearised(last, moved, alone=True)
                 before, moved = moved, on_best_drives(last, moved)
+                if moved.barred and len(moved.effects) < len(moved.candidates):
+                    # What a pattern stood for is explained around the model: its effects count.
+                    moved = last.refined(last.evaluate(moved.effects))
                 if moved is before:
                     break
             one = settled(last, moved)
