@@ -232,11 +232,11 @@ class Evaluation:
         given = np.array(motion)
         samples, drives = given.shape[1:]
         count = len(self.home)
-        table = np.empty((samples, count + 2 * drives))
-        rows = np.empty((1, self._lengths[0]))
+        table = np.zeros((samples, count + 2 * drives))
+        rows = np.zeros((1, self._lengths[0]))
         if self._run(given, start if nearby is None else nearby, rows, MOTION | FORCES, gravity,
                      nearby is not None, inertial,
-                     np.empty((1, self._lengths[1])), friction, table) >= 0:
+                     np.zeros((1, self._lengths[1])), friction, table) >= 0:
             return None
         return Found(table[:, :count], table[:, count:count + drives], table[:, count + drives:])
 
@@ -259,11 +259,11 @@ class Evaluation:
         """Evaluate stages, and return the first sample that fails or -1; see `_evaluate`."""
         drives = len(self.tables.drives)
         if found is None:
-            found = np.empty((len(rows), len(self.home) + 2 * drives))
+            found = np.zeros((len(rows), len(self.home) + 2 * drives))
         if given is None:
             given = np.empty((3, 0, drives))
         if loads is None or inertial is None:
-            loads, inertial = np.empty((len(rows), self._lengths[1])), self._no_bodies
+            loads, inertial = np.zeros((len(rows), self._lengths[1])), self._no_bodies
         last = self._friction
         if friction is not last[0]:
             last = self._friction = friction, np.array(friction[:2]), np.array(friction[2:])
