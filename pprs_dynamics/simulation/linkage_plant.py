@@ -238,7 +238,7 @@ class LinkagePlant:
     def _linkage(self, position: Array, velocity: Array, acceleration: Array, start: Array,
                  ) -> Linkage:
         return Linkage.of(self.structure, position[None], velocity[None], acceleration[None],
-                          start)
+                          start[None])
 
     def _equations(self, position: Array, velocity: Array, acceleration: Array,
                    ) -> tuple[Array, Array, Linkage]:

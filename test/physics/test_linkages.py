@@ -154,7 +154,7 @@ def test_a_state_of_the_other_assembly_is_not_gone_on_from(tmp_path: Path) -> No
         arm, elbow = (int(structure.tables.coordinate[structure.rows[name]])
                       for name in (side, f'{side}_elbow'))
         ends[elbow] = 2 * (heading - home[arm]) - home[elbow]
-    rows, failed = evaluation.follow(motion.position, rest, rest, ends)
+    rows, failed = evaluation.follow(motion.position, rest, rest, ends[None])
     assert failed < 0
     flipped = evaluation.motion(rows)
     assert flipped.state[0, 1] * evaluation.at_home[1] < 0
@@ -489,6 +489,33 @@ def test_a_tools_poses_give_the_legs_that_geometry_gives(tmp_path: Path) -> None
         assert moved.velocity[:, d] == pytest.approx(rate, abs=1e-11)
         assert moved.acceleration[:, d] == pytest.approx(
             (np.sum(x_dot ** 2 + x * x_ddot, axis=1) - rate ** 2) / length, abs=1e-10)
+
+
+@pytest.mark.parametrize('compiled', [True, False])
+@pytest.mark.parametrize('samples', [1, 8])
+def test_a_pose_past_a_singularity_is_not_answered_with_another_pose_of_the_same_legs(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: int, compiled: bool) -> None:
+    model = ArmModel.load(robots.hexapod().write(tmp_path))
+    home = model.tool_pose.home
+    turned = (Rotation.from_matrix(home.R) * Rotation.from_rotvec([0.0, 0.0, 1.7])).as_quat()
+    if not compiled:
+        monkeypatch.setattr(linkage, 'compiled_or_none', lambda function, samples: None)
+    with pytest.raises(SingularityError):
+        model.drive_forces(PlatformMotion.at_rest(np.tile(home.p, (samples, 1)),
+                                                  np.tile(turned, (samples, 1))))
+
+
+def test_friction_of_joints_leaves_loads_as_they_are_that_others_read(tmp_path: Path) -> None:
+    """Columns of several threads share one state."""
+    model = ArmModel.load(robots.hexapod().write(tmp_path))
+    state = model.mechanism(states(model, SIZES['hexapod']))
+    loads = {name: each.copy() for name, each in state.reactions._asdict().items()}
+    joints = np.arange(3)
+    numbers = [np.full(3, value) for value in (0.3, 0.2, 0.01, 0.1)]
+    efforts = state.against_friction(linkage.JointFriction(joints, joints, *numbers))
+    assert np.abs(efforts).max() > 0
+    for name, each in state.reactions._asdict().items():
+        np.testing.assert_array_equal(each, loads[name])
 
 
 def test_a_delta_follows_places_and_refuses_what_it_cannot_turn(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@
 
 One function goes through the samples, from each to the next; it is compiled, or runs as it is on
 Python's floats. Of many samples without a compiler NumPy takes all at once, each walked to from
-home. All end on the branch that home is on.
+home, or from where it is known to be. All end on the branch that home is on.
 """
 
 from __future__ import annotations
@@ -163,8 +163,9 @@ class Evaluation:
         Parameters
         ----------
         q, v, a : (N, D) arrays
-        start : (C,) array, optional
-            Closed coordinates from which the first sample is walked to, instead of home.
+        start : (N, C) array, optional
+            Closed coordinates from which the samples are walked to, instead of home: the first
+            one where each goes on from the last, each of its own where all are taken at once.
         nearby : (C,) array, optional
             Closed coordinates of another motion: used where the first sample is within a stride
             of them and the loops stay assembled as at home, so that nothing depends on them.
@@ -176,8 +177,7 @@ class Evaluation:
             The first sample at which the loops do not close, or -1.
         """
         rows = np.zeros((len(q), self._lengths[0]))
-        failed = self._run(np.array((q, v, a)), start if nearby is None else nearby, rows,
-                           MOTION | KEPT, np.zeros(3), nearby is not None)
+        failed = self._run(np.array((q, v, a)), start, rows, MOTION | KEPT, np.zeros(3), nearby)
         return rows, failed
 
     def forces(self, rows: Array, inertial: Array, gravity: Array,
@@ -198,15 +198,17 @@ class Evaluation:
         for joint, (force, moment) in (wrenches or {}).items():
             o.f[:, joint] += force
             o.n[:, joint] += moment
-        self._run(None, None, rows, FORCES | KEPT, gravity, False, inertial, loads)
+        self._run(None, None, rows, FORCES | KEPT, gravity, None, inertial, loads)
         return loads
 
     def friction(self, rows: Array, loads: Array, friction: JointFriction) -> Array:
         """Return the drives' efforts (N, D) against friction of joints, for rows of both."""
         found = np.zeros((len(rows), len(self.tables.drives)))
-        m, o = self.motion(rows), self.loads(loads)
+        m, o = samples_last(self.motion(rows)), samples_last(self.loads(loads))
+        # Loads are everybody's: what is of one friction alone does not go through them.
+        o = o._replace(rubbed=np.empty_like(o.rubbed))
         with np.errstate(all='ignore'):
-            joint_friction(self.tables, samples_last(m), samples_last(o), friction, found.T)
+            joint_friction(self.tables, m, o, friction, found.T)
         return found
 
     def found(self, motion: tuple[Array, Array, Array], inertial: Array, gravity: Array,
@@ -221,7 +223,7 @@ class Evaluation:
         inertial : (J + 1, 10) array
         gravity : (3,) array
         friction : JointFriction
-        start, nearby : (C,) arrays, optional
+        start, nearby : (N, C) and (C,) arrays, optional
             See `follow`.
 
         Returns
@@ -232,11 +234,10 @@ class Evaluation:
         given = np.array(motion)
         samples, drives = given.shape[1:]
         count = len(self.home)
-        table = np.zeros((samples, count + 2 * drives))
-        rows = np.zeros((1, self._lengths[0]))
-        if self._run(given, start if nearby is None else nearby, rows, MOTION | FORCES, gravity,
-                     nearby is not None, inertial,
-                     np.zeros((1, self._lengths[1])), friction, table) >= 0:
+        table = np.empty((samples, count + 2 * drives))
+        rows = np.empty((1, self._lengths[0]))
+        if self._run(given, start, rows, MOTION | FORCES, gravity, nearby, inertial,
+                     np.empty((1, self._lengths[1])), friction, table) >= 0:
             return None
         return Found(table[:, :count], table[:, count:count + drives], table[:, count + drives:])
 
@@ -253,24 +254,27 @@ class Evaluation:
         return W.reshape(shape), U.reshape(shape)
 
     def _run(self, given: Array | None, start: Array | None, rows: Array, stages: int,
-             gravity: Array, warm: bool, inertial: Array | None = None,
+             gravity: Array, nearby: Array | None, inertial: Array | None = None,
              loads: Array | None = None, friction: JointFriction = NO_FRICTION,
              found: Array | None = None) -> int:
         """Evaluate stages, and return the first sample that fails or -1; see `_evaluate`."""
         drives = len(self.tables.drives)
         if found is None:
-            found = np.zeros((len(rows), len(self.home) + 2 * drives))
+            found = np.empty((len(rows), len(self.home) + 2 * drives))
         if given is None:
             given = np.empty((3, 0, drives))
         if loads is None or inertial is None:
-            loads, inertial = np.zeros((len(rows), self._lengths[1])), self._no_bodies
+            loads, inertial = np.empty((len(rows), self._lengths[1])), self._no_bodies
         last = self._friction
         if friction is not last[0]:
             last = self._friction = friction, np.array(friction[:2]), np.array(friction[2:])
+        warm = nearby is not None
         at_home = self.at_home if warm or not stages & KEPT else NOWHERE
+        first = (nearby if nearby is not None else
+                 self.home if start is None or not len(start) else start[0])
         arguments = (
-            *self.packed, self.home, at_home, np.array(self.home if start is None else start),
-            given, rows, inertial, gravity, loads, last[1], last[2], found, stages, warm)
+            *self.packed, self.home, at_home, np.array(first), given, rows, inertial, gravity,
+            loads, last[1], last[2], found, stages, warm)
         loop = compiled_or_none(_evaluate, len(found))
         if loop is not None:
             return int(loop(*arguments))
@@ -280,19 +284,19 @@ class Evaluation:
             except (ZeroDivisionError, OverflowError, ValueError):
                 pass  # arrays answer with infinities instead
         with np.errstate(all='ignore'):
-            return self._run_on_arrays(given, rows, stages, gravity, at_home, inertial, loads,
-                                       friction, found)
+            return self._run_on_arrays(given, start, rows, stages, gravity, at_home, inertial,
+                                       loads, friction, found)
 
-    def _run_on_arrays(self, given: Array, rows: Array, stages: int, gravity: Array,
-                       at_home: Array, inertial: Array, loads: Array, friction: JointFriction,
-                       found: Array) -> int:
+    def _run_on_arrays(self, given: Array, start: Array | None, rows: Array, stages: int,
+                       gravity: Array, at_home: Array, inertial: Array, loads: Array,
+                       friction: JointFriction, found: Array) -> int:
         t, count, drives = self.tables, len(self.home), len(self.tables.drives)
         if not stages & KEPT:
             rows, loads = (np.zeros((len(found), each.shape[1])) for each in (rows, loads))
         m, o = samples_last(self.motion(rows)), samples_last(self.loads(loads))
         if stages & MOTION:
             q, v, a = np.moveaxis(given, 1, -1)
-            if not reach(t, m, self.home, q):
+            if not reach(t, m, self.home if start is None else start.T, q):
                 size = m.state[0]
                 return int(np.argmax(~(size < np.inf) | (size == np.max(size))))
             follow(t, m, v, a)

@@ -677,7 +677,7 @@ class Loads(NamedTuple):
     loops : (L OF_FORCES, 3) array
         What the link of A does to that of B in each closure: force and moment.
     coordinates, rubbed : (C,) arrays
-        Efforts of the tree's coordinates, and against friction of joints.
+        Efforts of the tree's coordinates; scratch, for those against friction of joints.
     efforts : (D,) array
         Of the drives.
     """

@@ -369,7 +369,7 @@ class LinkageState(JointMotion):
         The motion of all links, where it is there.
     friction : JointFriction
         The model's own, which is found with the efforts.
-    start, nearby : (C,) arrays, optional
+    start, nearby : (N, C) and (C,) arrays, optional
         See `Evaluation.follow`.
     """
 
@@ -408,9 +408,8 @@ class LinkageState(JointMotion):
         if self.known is not None and self.known.is_of(*motion):
             return self.known
         found = vars(self).get('found')
-        if found is None or not len(found.q):
-            return Linkage.of(self.robot.structure, *motion, self.start, self.nearby)
-        return Linkage.of(self.robot.structure, *motion, found.q[0])
+        start, nearby = (self.start, self.nearby) if found is None else (found.q, None)
+        return Linkage.of(self.robot.structure, *motion, start, nearby)
 
     @property
     def closed(self) -> Array:

@@ -92,8 +92,8 @@ class ToolPose:
         Returns
         -------
         moved : JointMotion
-        start : (C,) array
-            Closed coordinates of the robot at the first sample.
+        start : (N, C) array
+            Closed coordinates of the robot.
 
         Raises
         ------
@@ -123,7 +123,7 @@ class ToolPose:
             np.ascontiguousarray(each[:, drives]) for each in (found.q, found.v, found.a))
         return (JointMotion(position, velocity, acceleration, motion.time,
                             channels=motion.channels),
-                found.q[0, :count] if len(motion) else self.structure.home)
+                found.q[:, :count])
 
     def _coordinates(self, motion: PlatformMotion) -> tuple[Array, Array, Array]:
         """Return the six coordinates of the motion with their derivatives, (N, 6) each.

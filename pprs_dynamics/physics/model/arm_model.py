@@ -78,7 +78,7 @@ class ArmModel(ForceModel):
         See `ForceModel`; friction and offset are the first effects.
     """
 
-    takes_long: ClassVar[bool] = False  # its compiled pass is not for several threads
+    takes_long: ClassVar[bool] = True
 
     robot: Mechanism
 
