@@ -229,44 +229,9 @@ class AddedBody(BodyEffect):
             robot = robot.with_body(link, body)
         return robot
 
-    @classmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
-        """Build the effect from `{parameter: value}`, or from blocks by link."""
-        return cls(cls._checked(f'effects.{cls.name}', flattened(values), complete))
-
-    def to_file(self) -> dict[str, Any]:
-        """Return the bodies that are there."""
-        return nested({name: value for name, value in self.values.items()
-                       if value or not name.count('.')})
-
 
 def _turned(centre: Array, moment: Array) -> Array:
     """Return by how much an inertia about a point grows as a first moment is added, (3, 3)."""
     both = np.outer(centre, moment)
     grown: Array = 2 * np.trace(both) * np.eye(3) - both - both.T
     return grown
-
-
-def flattened(values: Any) -> Any:
-    """Return `{name.parameter: value}` of blocks by name, one level deep."""
-    if not isinstance(values, Mapping):
-        return values
-    flat = {}
-    for name, block in values.items():
-        if isinstance(block, Mapping):
-            flat.update({f'{name}.{last}': value for last, value in block.items()})
-        else:
-            flat[name] = block
-    return flat
-
-
-def nested(values: Mapping[str, float]) -> dict[str, Any]:
-    """Return blocks by name of `{name.parameter: value}`; names without a dot stay."""
-    blocks: dict[str, Any] = {}
-    for key, value in values.items():
-        name, dot, last = key.rpartition('.')
-        if dot:
-            blocks.setdefault(name, {})[last] = value
-        else:
-            blocks[key] = value
-    return blocks

@@ -11,12 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.added_body import flattened, nested
 from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
@@ -49,15 +48,6 @@ class CoupledDrives(StructureEffect):
         return cls if robot is None else _in_motors(tuple(
             (name, ratios) for name, ratios in robot.motors.items()
             if np.count_nonzero(ratios) > 1))
-
-    @classmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
-        """Build the effect from blocks by motor."""
-        return cls(cls._checked(f'effects.{cls.name}', flattened(values), complete))
-
-    def to_file(self) -> dict[str, Any]:
-        """Return blocks of the motors that it is in."""
-        return nested({name: value for name, value in self.values.items() if value})
 
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""

@@ -16,10 +16,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.added_body import flattened, nested
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 from pprs_dynamics.physics.mechanism.alike import alike_joints
@@ -68,19 +67,9 @@ class JointFrictionEffect(PassiveJointEffect):
             tuple((one.name, one.radius or RADIUS) for one in robot.passive_joints),
             alike_joints(robot))
 
-    @classmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
-        """Build the effect from blocks by joint."""
-        return cls(cls._checked(f'effects.{cls.name}', flattened(values), complete))
-
-    def to_file(self) -> dict[str, Any]:
-        """Return blocks of the joints that it is in."""
-        return nested({name: value for name, value in self.values.items() if value})
-
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
-        blocks: dict[str, dict[str, float]] = nested(
-            {name: value for name, value in self.values.items() if value})
+        blocks: dict[str, dict[str, float]] = self.to_file()
         for name, block in blocks.items():
             block['radius'] = self.radii[name]
         force: Array = state.against_friction(state.robot.friction_table(blocks, state.reversal))

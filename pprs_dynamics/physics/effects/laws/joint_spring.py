@@ -16,7 +16,6 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from pprs_dynamics.physics.effects.added_body import flattened, nested
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
 from pprs_dynamics.physics.effects.relaxed_position import FARTHEST, relaxed_position
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
@@ -59,15 +58,6 @@ class JointSpring(BodyEffect):
         return cls if robot is None else _in_joints(
             tuple((one.name, one.turns) for one in robot.passive_joints if one.has_position),
             alike_joints(robot))
-
-    @classmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
-        """Build the effect from blocks by joint."""
-        return cls(cls._checked(f'effects.{cls.name}', flattened(values), complete))
-
-    def to_file(self) -> dict[str, Any]:
-        """Return blocks of the joints that it is in."""
-        return nested({name: value for name, value in self.values.items() if value})
 
     @classmethod
     def at(cls, coefficients: Mapping[str, float]) -> Self:
