@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Random motions of the platform: sums of sines within the robot's limits."""
+"""Random motions: sums of sines, of the platform within the robot's limits, and of an arm."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.paths import HOME
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 
@@ -133,3 +134,17 @@ def _is_allowed(model: DriveModel, motion: PlatformMotion) -> bool:
     return bool(np.abs(mechanism.velocity).max() < FASTEST
                 and np.abs(mechanism.acceleration).max() < STRONGEST
                 and np.abs(mechanism.chains.sin_u).min() > ROD_SINE and condition < CONDITION)
+
+
+def joint_motion(duration: float = 30.0, rate: float = 100.0, seed: int = 0) -> JointMotion:
+    """Return Fourier series of two turning joints and a sliding one."""
+    time = np.arange(0, duration, 1 / rate)
+    random, base = np.random.default_rng(seed), 2 * np.pi / 10.0
+    q = np.zeros((3, len(time), 3))
+    for joint, size in enumerate((0.5, 0.4, 0.12)):
+        for k in range(1, 6):
+            a, b = random.normal(size=2) * size / k
+            w = k * base
+            s, c = np.sin(w * time), np.cos(w * time)
+            q[:, :, joint] += (a * s + b * c, w * (a * c - b * s), -w * w * (a * s + b * c))
+    return JointMotion(*q, time)

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.hidden.motions import joint_motion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.fit.reference import Reference
@@ -30,7 +31,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.model_file import build_model, load_model
 
-NOISE, RATE, DURATION, PERIOD = 0.2, 100.0, 20.0, 10.0
+NOISE, DURATION = 0.2, 20.0
 FORCES = np.array([2.0, 1.5, 2.5])  # [N m, N], of what no effect explains
 LINK = ('<link name="{0}"><inertial><mass value="{1}"/><origin xyz="{2} 0.02 0.03"/><inertia '
         'ixx="{3}" iyy="{3}" izz="{3}" ixy="0" ixz="0" iyz="0"/></inertial></link>')
@@ -86,20 +87,6 @@ CHANGES = (Change('', '', 0.0),
            *(Change('time_delay', 'turn.delay', delay) for delay in (0.0005, 0.001, 0.004)))
 
 
-def motion() -> JointMotion:
-    """Return Fourier series on all joints."""
-    time = np.arange(0, DURATION, 1 / RATE)
-    random, base = np.random.default_rng(0), 2 * np.pi / PERIOD
-    q = np.zeros((3, len(time), 3))
-    for joint, size in enumerate((0.5, 0.4, 0.12)):
-        for k in range(1, 6):
-            a, b = random.normal(size=2) * size / k
-            w = k * base
-            s, c = np.sin(w * time), np.cos(w * time)
-            q[:, :, joint] += (a * s + b * c, w * (a * c - b * s), -w * w * (a * s + b * c))
-    return JointMotion(*q, time)
-
-
 def unknown_forces(moved: JointMotion, drift: Array) -> Array:
     """Return what cables and worn guides do, by places and by directions at places, (N, 3)."""
     q, v = moved.position, np.tanh(moved.velocity / 0.05)
@@ -110,7 +97,7 @@ def unknown_forces(moved: JointMotion, drift: Array) -> Array:
 
 def record(machine: ArmModel, seed: int, drift: float) -> Recording:
     """Return a run of a machine, its drift and noise of a seed."""
-    moved, random = motion(), np.random.default_rng(seed)
+    moved, random = joint_motion(DURATION), np.random.default_rng(seed)
     state = machine.initial_state(0.0)
     forces = machine.measured(machine.drive_forces(moved, state), state).total
     effort = (forces + unknown_forces(moved, drift * random.normal(size=(2, 3)))

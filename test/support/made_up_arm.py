@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.hidden.motions import joint_motion
 from pprs_dynamics import ArmModel, JointMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.recording import Recording
@@ -22,6 +23,7 @@ BODIES = {  # mass, centre, moments and products of inertia about it
     'slider': (1.5, (0.05, -0.02, 0.04), (0.01, 0.012, 0.009, 0.001, 0.0, 0.0005))}
 FRICTION = {'friction.viscous': (8.0, 5.0, 20.0), 'friction.coulomb': (6.0, 4.0, 9.0),
             'friction.offset': (0.3, -0.2, 0.5)}
+motion = joint_motion
 
 
 def urdf(kind: str = 'revolute', more: str = '', mimic: str = '') -> str:
@@ -63,23 +65,6 @@ def real_arm(folder: Path, **changes: Any) -> ArmModel:
     real = build_model({**model.values, **FRICTION, **changes}, model.source)
     assert isinstance(real, ArmModel)
     return real
-
-
-def motion(duration: float = 30.0, rate: float = 100.0, seed: int = 0) -> JointMotion:
-    """Return Fourier series on all joints, at rest at both ends."""
-    time = np.arange(0, duration, 1 / rate)
-    random = np.random.default_rng(seed)
-    base = 2 * np.pi / 10.0
-    q = np.zeros((3, len(time), 3))
-    for joint, size in enumerate((0.5, 0.4, 0.12)):
-        for k in range(1, 6):
-            a, b = random.normal(size=2) * size / k
-            w = k * base
-            s, c = np.sin(w * time), np.cos(w * time)
-            q[0, :, joint] += a * s + b * c
-            q[1, :, joint] += w * (a * c - b * s)
-            q[2, :, joint] -= w * w * (a * s + b * c)
-    return JointMotion(*q, time)
 
 
 def record(model: ArmModel, moved: JointMotion, noise: float = 0.2, seed: int = 0,
