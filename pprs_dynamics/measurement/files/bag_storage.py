@@ -13,6 +13,7 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from heapq import merge
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -93,6 +94,20 @@ class Bag:
                     types.ros1_to_cdr(data, connection.msgtype))
         except Exception as error:
             raise UnreadableFileError(self.path, damaged(error)) from None
+
+    def decoded(self, connections: Collection[Connection], most: int | None = None,
+                ) -> Iterator[tuple[Connection, int, Any]]:
+        """Yield as `messages`, of the first ones or all, messages themselves.
+
+        Bytes that are no message of their type are left out.
+        """
+        types = self.types(connections)
+        for connection, received, data in islice(self.messages(connections), most):
+            try:
+                message = types.deserialize_cdr(data, connection.msgtype)
+            except Exception:  # of any kind, as the bytes are
+                continue
+            yield connection, received, message
 
     def types(self, connections: Collection[Connection]) -> Any:
         """Return what ROS 2 itself defines, and what the bag defines beside it."""

@@ -60,12 +60,7 @@ def read_channels(bag: Bag, joints: tuple[str, ...], stamps: Indices) -> dict[st
     order = np.argsort(stamps, kind='stable')
     times: dict[tuple[str, str], list[int]] = defaultdict(list)
     values: dict[tuple[str, str], list[float]] = defaultdict(list)
-    types = bag.types(chosen)
-    for connection, received, data in bag.messages(chosen):
-        try:
-            message = types.deserialize_cdr(data, connection.msgtype)
-        except Exception:  # bytes that are no such message
-            continue
+    for connection, received, message in bag.decoded(chosen):
         for channel, joint, value in _told(connection.topic, connection.msgtype, message, joints):
             times[channel, joint].append(stamp_of(message) or received)
             values[channel, joint].append(value)
@@ -84,14 +79,8 @@ def read_channels(bag: Bag, joints: tuple[str, ...], stamps: Indices) -> dict[st
 
 def _has_channels(bag: Bag, connection: Connection) -> bool:
     """Return whether the first message of dynamic joint states has more than motion and effort."""
-    for _, _, data in bag.messages([connection]):
-        try:
-            message = bag.types([connection]).deserialize_cdr(data, connection.msgtype)
-        except Exception:  # bytes that are no such message
-            return False
-        return any(name in CHANNELS for state in message.interface_values
-                   for name in state.interface_names)
-    return False
+    return any(name in CHANNELS for *_, message in bag.decoded([connection], 1)
+               for state in message.interface_values for name in state.interface_names)
 
 
 def _told(topic: str, kind: str, message: Any, joints: tuple[str, ...],

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -132,14 +131,7 @@ def _topics(bag: Bag, kinds: tuple[str, ...]) -> Iterator[tuple[str, str, list[A
     """Yield topics of some types: name, type, first messages."""
     for topic in sorted({one.topic for one in bag.connections if one.msgtype in kinds}):
         own = [one for one in bag.connections if one.topic == topic and one.msgtype in kinds]
-        types = bag.types(own)
-        messages = []
-        for _, _, data in islice(bag.messages(own), MESSAGES):
-            try:
-                messages.append(types.deserialize_cdr(data, own[0].msgtype))
-            except Exception:  # bytes that are no such message
-                continue
-        yield topic, own[0].msgtype, messages
+        yield topic, own[0].msgtype, [message for *_, message in bag.decoded(own, MESSAGES)]
 
 
 def _elements(table: ArrayTable) -> Iterator[Series]:

@@ -122,16 +122,11 @@ def read_merged(bag: Bag, connections: list[Connection], drives: tuple[str, ...]
     fields : sequence of Field
         Of messages of any type.
     """
-    typestore = bag.types(connections)
     times: dict[tuple[str, str], list[int]] = defaultdict(list)
     values: dict[tuple[str, str], list[float]] = defaultdict(list)
     named = {(one.joint, one.quantity) for one in fields}
     commanded = False
-    for connection, received, data in bag.messages(connections):
-        try:
-            message = typestore.deserialize_cdr(data, connection.msgtype)
-        except Exception:  # bytes that are no such message
-            continue
+    for connection, received, message in bag.decoded(connections):
         stamp = stamp_of(message) or received
         states = [(one.joint, one.quantity, _value(message, one.way), False)
                   for one in fields if one.topic == connection.topic]
