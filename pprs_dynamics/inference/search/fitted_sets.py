@@ -9,6 +9,7 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
 from itertools import chain
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -69,7 +70,7 @@ class FittedSets:
         self.regression = Regression(design.residuals, design.base, error_scale=error_scale)
         self.prices = Prices.of(self.regression, decisions, design.given)
         self.library = Library(design, self.regression, self.prices)
-        self.settled: dict[Hashable, object] = {}
+        self.settled: dict[Hashable, Any] = {}
         self._evaluated: dict[Hashable, CandidateSet] = {}
         self._nuisance: dict[Hashable, tuple[Block, ...]] = {}
 

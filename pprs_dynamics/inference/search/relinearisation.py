@@ -289,7 +289,8 @@ def settled(fits: FittedSets, found: CandidateSet) -> SettledSet:
     """
     if found.key not in fits.settled:
         fits.settled[found.key] = _settled(fits, found)
-    return fits.settled[found.key]  # type: ignore[return-value]
+    kept: SettledSet = fits.settled[found.key]
+    return kept
 
 
 def _settled(fits: FittedSets, found: CandidateSet) -> SettledSet:

@@ -83,7 +83,7 @@ class ArmModel(ForceModel):
     robot: Mechanism
 
     @property
-    def motions(self) -> tuple[type, ...]:  # type: ignore[override]
+    def motions(self) -> tuple[type, ...]:
         """What it has forces for; poses of the tool where it has loops."""
         return (JointMotion, PlatformMotion) if self.robot.structure.loops else (JointMotion,)
 

@@ -143,8 +143,6 @@ class ForceModel(ABC):
 
     Class attributes
     ----------------
-    motions : tuple of type
-        Kinds of motion that it has forces for.
     takes_long : bool
         Whether forces take so long that several are evaluated in threads.
     default_file : str
@@ -154,12 +152,13 @@ class ForceModel(ABC):
     ----------
     kind : {'platform', 'axis', 'arm'}
         Effects say in which kinds they act.
+    motions : tuple of type
+        Kinds of motion that it has forces for.
     drives : tuple of D str
     keys : dict of str to Key
         Of its files.
     """
 
-    motions: ClassVar[tuple[type, ...]]
     default_file: ClassVar[str] = ''
     takes_long: ClassVar[bool] = False
 
@@ -204,6 +203,11 @@ class ForceModel(ABC):
     @abstractmethod
     def kind(self) -> str:
         """One of 'platform', 'axis', 'arm'."""
+
+    @property
+    @abstractmethod
+    def motions(self) -> tuple[type, ...]:
+        """Kinds of motion that it has forces for."""
 
     @property
     @abstractmethod
