@@ -90,9 +90,6 @@ class CurveRequest:
         """Of the model file."""
         return MeasuredCurve
 
-    def require_place(self, model: ForceModel) -> None:
-        """Accept every model: a curve acts in each of them."""
-
     @property
     def name(self) -> str:
         """As in results and ledgers."""

@@ -115,6 +115,7 @@ def compiled_largest(x: Any) -> int:
 # A pivot smaller than this, of the largest number below it, is not taken: errors would grow by its
 # inverse. Elimination then goes on with all rows and columns that are left.
 STEADY = 0.05
+SWAP, BELOW, RIGHT = 0, 1, 2  # columns of an order's `starts`
 
 
 def compiled_solve(A: Any, B: Any, order: Any) -> Any:
@@ -125,10 +126,10 @@ def compiled_solve(A: Any, B: Any, order: Any) -> Any:
     for k in range(size):
         pivot = k
         if sparse == size:
-            for i in range(starts[k, 0], starts[k + 1, 0]):
+            for i in range(starts[k, SWAP], starts[k + 1, SWAP]):
                 if abs(A[swap[i], k]) > abs(A[pivot, k]):
                     pivot = swap[i]
-            for i in range(starts[k, 1], starts[k + 1, 1]):
+            for i in range(starts[k, BELOW], starts[k + 1, BELOW]):
                 if STEADY * abs(A[below[i], k]) > abs(A[pivot, k]):
                     sparse = k
         if sparse < size:
@@ -144,10 +145,10 @@ def compiled_solve(A: Any, B: Any, order: Any) -> Any:
         determinant *= A[k, k]
         scale = 1.0 / A[k, k]
         if sparse == size:
-            for i in range(starts[k, 1], starts[k + 1, 1]):
+            for i in range(starts[k, BELOW], starts[k + 1, BELOW]):
                 r = below[i]
                 share = A[r, k] * scale
-                for n in range(starts[k, 2], starts[k + 1, 2]):
+                for n in range(starts[k, RIGHT], starts[k + 1, RIGHT]):
                     A[r, right[n]] -= share * A[k, right[n]]
                 for c in range(columns):
                     B[r, c] -= share * B[k, c]
@@ -161,7 +162,7 @@ def compiled_solve(A: Any, B: Any, order: Any) -> Any:
     for k in range(size - 1, -1, -1):
         scale = 1.0 / A[k, k]
         if k < sparse:
-            for n in range(starts[k, 2], starts[k + 1, 2]):
+            for n in range(starts[k, RIGHT], starts[k + 1, RIGHT]):
                 for c in range(columns):
                     B[k, c] -= A[k, right[n]] * B[right[n], c]
         else:

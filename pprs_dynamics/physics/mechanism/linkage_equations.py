@@ -62,7 +62,6 @@ PASSIVE_OF, DRIVE_OF = 0, 1
 LOOP_A, LOOP_B, PATH_START, PATH_END = 0, 1, 2, 3
 LOOP, KIND, AXES = 0, 1, 2
 JOINT, SIGN = 0, 1
-SWAP, BELOW, RIGHT = 0, 1, 2
 UNIT = 2  # column of `row_reals`
 
 
