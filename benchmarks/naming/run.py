@@ -35,6 +35,7 @@ from benchmarks.naming.problems import Answer, Problem, Truth
 from benchmarks.naming.scoring import Judged, figures, judge, seconds
 
 PROBLEMS, TRUTH, ANSWERS = 'problems', 'truth', 'answers'
+FILES = ('recording.csv', 'model.yaml', 'columns.npz', 'columns.json')  # an answer depends on them
 
 
 def make_all(folder: Path, seed: int, count: int, workers: int) -> int:
@@ -117,8 +118,11 @@ def _enter(folder: Path, entrants: Mapping[str, Entrant], problem: str, missing:
 
 
 def _key_of_problem(folder: Path, problem: str) -> str:
-    data = (folder / PROBLEMS / problem / 'recording.csv').read_bytes()
-    return hashlib.sha256(data).hexdigest()[:16]
+    found = hashlib.sha256()
+    for name in FILES:
+        file = folder / PROBLEMS / problem / name
+        found.update(file.read_bytes() if file.exists() else b'')
+    return found.hexdigest()[:16]
 
 
 def _key_of_answer(file: Path) -> str:
