@@ -35,6 +35,7 @@ STRENGTHS = ((0.5, 1.0), (2.0,), (5.0, 20.0))  # of the three pictures
 SHORT = {'pprs diagnose': 'pprs', 'adaptive group LASSO': 'group LASSO', 'Bayesian averaging, AR':
          'averaging', 'block cross-validation': 'block c.v.', 'held-out F-test (LISDD)': 'LISDD',
          'least squares (FIGAROH)': 'FIGAROH', 'stepwise BIC, AR': 'BIC, AR',
+         'stepwise BIC, AR again': 'BIC, AR again',
          'stepwise BIC, white': 'BIC, white', 'spike and slab, AR': 'spike and slab'}
 
 
