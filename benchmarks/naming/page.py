@@ -28,6 +28,7 @@ LIBRARIES = ('pprs_dynamics', 'numpy', 'scipy', 'scikit-learn', 'skglm', 'pysind
 BEGIN, END = '<!-- figures: made by make naming -->', '<!-- end of figures -->'
 MAIN = ('right', 'first', 'named', 'exact', 'wrong alone', 'false alarms', 'unknown',
         'right drives', 'intervals hold')
+ASKED_OF_SOME = ('right drives', 'intervals hold')  # of those that an entrant tells
 TOLD = 4  # entrants whose answers on real machines are printed
 LESS_IS_BETTER = ('wrong alone', 'false alarms')
 MARKERS = 'os^vDPX'
@@ -53,7 +54,7 @@ def write_page(scored: Mapping[str, Scored], real: Mapping[str, Scored], page: P
 def tables(scored: Mapping[str, Scored]) -> str:
     """Return all tables in Markdown: the main one, and what it is made of, folded."""
     best = {name: scored[name] for name in best_of_settings(scored)}
-    parts = {name: scored[name] for name in ordered(scored) if sort_of(name) in (OURS, PART)}
+    parts = alike({name: scored[name] for name in ordered(scored) if sort_of(name) in (OURS, PART)})
     lines = [*main_table(best), '', better_than_ours(best), '',
              '![Right against false, weak, middle and strong effects](images/naming.png)', '',
              *(['This package without each of its parts:', '', *main_table(parts), '']
@@ -69,11 +70,18 @@ def tables(scored: Mapping[str, Scored]) -> str:
     return '\n'.join(lines) + '\n'
 
 
+def alike(scored: Mapping[str, Scored]) -> dict[str, Scored]:
+    """Return the answers to the problems that all have answered."""
+    count = Counter(truth.problem for answers in scored.values() for truth, *_ in answers)
+    return {name: [one for one in answers if count[one[0].problem] == len(scored)]
+            for name, answers in scored.items()}
+
+
 def of_real_machines(scored: Mapping[str, Scored]) -> str:
     """Return their table in Markdown, and what the first few entrants said of each recording."""
     if not scored:
         return ''
-    best = {name: scored[name] for name in best_of_settings(scored)}
+    best = alike({name: scored[name] for name in best_of_settings(scored)})
     shown = [name for name in best if sort_of(name) != CONTROL][:TOLD]
     lines = ['| machine | lacks | ' + ' | '.join(shown) + ' |', '|---' * (len(shown) + 2) + '|']
     for answers in zip(*(best[name] for name in shown), strict=True):
@@ -101,11 +109,13 @@ def main_table(scored: Mapping[str, Scored]) -> list[str]:
     every = {name: all_figures(answers) for name, answers in scored.items()}
     counts = {figure: {found[figure].count for found in every.values()} for figure in MAIN}
     shown = [figure for figure in MAIN if counts[figure] != {0}]
-    heads = [figure if len(counts[figure]) > 1 else f'{figure}, of {max(counts[figure])}'
+    heads = [f'{figure}, of {max(counts[figure])}' if figure not in ASKED_OF_SOME else figure
              for figure in shown]
     lines = ['| entrant | ' + ' | '.join((*heads, 's')) + ' |', '|---' * (len(shown) + 2) + '|']
+    most = max(len(answers) for answers in scored.values())
     for name, found in every.items():
-        lines.append(f'| {name} | ' + ' | '.join(
+        part = '' if len(scored[name]) == most else f', on {len(scored[name])}'
+        lines.append(f'| {name}{part} | ' + ' | '.join(
             (*(_cell(found[figure]) for figure in shown), f'{seconds(scored[name]):.1f}')) + ' |')
     return lines
 
@@ -129,11 +139,14 @@ def better_than_ours(scored: Mapping[str, Scored]) -> str:
     if ours is None:
         return ''
     mine, said = all_figures(scored[ours]), []
+    pairs = {name: alike({ours: scored[ours], name: answers}) for name, answers in scored.items()
+             if sort_of(name) == PEER}
+    rates = {name: tuple(all_figures(pair[one]) for one in (name, ours))
+             for name, pair in pairs.items()}
     for figure in MAIN:
         sign = -1 if figure in LESS_IS_BETTER else 1
-        ahead = [f'{name} ({_cell(rate)})' for name, answers in scored.items()
-                 if sort_of(name) == PEER and (rate := all_figures(answers)[figure]).count
-                 and sign * (rate.share - mine[figure].share) > 0]
+        ahead = [f'{name} ({_cell(its[figure])})' for name, (its, own) in rates.items()
+                 if its[figure].count and sign * (its[figure].share - own[figure].share) > 0]
         if ahead:
             said.append(f'*{figure}* ({_cell(mine[figure])} here): {", ".join(ahead)}')
     faster = [name for name in scored if sort_of(name) == PEER

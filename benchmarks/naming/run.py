@@ -133,25 +133,23 @@ def _answer_file(folder: Path, name: str, problem: str) -> Path:
     return folder / ANSWERS / name / f'{problem}.json'
 
 
-def score_all(folder: Path, by_all: bool = False) -> dict[str, list[tuple[Truth, Answer, Judged]]]:
+def score_all(folder: Path, answered: bool = False,
+              ) -> dict[str, list[tuple[Truth, Answer, Judged]]]:
     """Return every entrant's answers with what is right about them; none counts as silence.
 
-    `by_all`: of a run that was stopped, the problems that every entrant has answered.
+    `answered`: of a run that was stopped, of each entrant what it has answered.
     """
-    entrants = sorted(path.name for path in (folder / ANSWERS).glob('*'))
     truths = [Truth.from_dict(json.loads(file.read_text()))
-              for file in sorted((folder / TRUTH).glob('*.json'))
-              if not by_all or all(_answer_file(folder, entrant, file.stem).exists()
-                                   for entrant in entrants)]
-    found = {}
-    for entrant in entrants:
-        scored = []
+              for file in sorted((folder / TRUTH).glob('*.json'))]
+    found: dict[str, list[tuple[Truth, Answer, Judged]]] = {}
+    for entrant in sorted(path.name for path in (folder / ANSWERS).glob('*')):
+        found[entrant] = []
         for truth in truths:
             file = _answer_file(folder, entrant, truth.problem)
-            answer = (Answer.from_dict(json.loads(file.read_text())) if file.exists()
-                      else Answer('none'))
-            scored.append((truth, answer, judge(truth, answer)))
-        found[entrant] = scored
+            if file.exists() or not answered:
+                answer = (Answer.from_dict(json.loads(file.read_text())) if file.exists()
+                          else Answer('none'))
+                found[entrant].append((truth, answer, judge(truth, answer)))
     return found
 
 
@@ -196,8 +194,8 @@ def main() -> int:
     parser.add_argument('--page', type=Path, help='write the table and its picture')
     parser.add_argument('--part', type=_part, default=(1, 1), metavar='K/N',
                         help='of N parts of the problems the K-th, for machines that share them')
-    parser.add_argument('--by-all', action='store_true',
-                        help='score what every entrant has answered, of a run that was stopped')
+    parser.add_argument('--answered', action='store_true',
+                        help='score each entrant by what it has answered, of a run that was stopped')
     parser.add_argument('--real', type=Path, metavar='FOLDER', help='of real machines, see real.py')
     options = parser.parse_args()
     if options.step == 'make':
@@ -209,10 +207,10 @@ def main() -> int:
                              options.part), 1)
     if options.step == 'reveal':
         return reveal(options.folder, options.problem or '')
-    scored = score_all(options.folder, options.by_all)
+    scored = score_all(options.folder, options.answered)
     if options.page:
         there = options.real is not None and options.real.exists()
-        real = score_all(options.real, options.by_all) if there else {}
+        real = score_all(options.real, options.answered) if there else {}
         write_page(scored, real, options.page)
     for entrant, answers in scored.items():
         print(entrant, *(f'{name} {rate}' for name, rate in figures(answers).items()),
