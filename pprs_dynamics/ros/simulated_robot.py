@@ -41,7 +41,7 @@ from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effects
-from pprs_dynamics.simulation.linkage_plant import LinkagePlant
+from pprs_dynamics.simulation.mechanism_plant import MechanismPlant
 from pprs_dynamics.simulation.sensors import SensorSettings
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
@@ -219,8 +219,8 @@ def _platform(model: ForceModel, own: dict[str, Any], effects: Sequence[HiddenEf
 
 
 def _mechanism(model: ArmModel, own: dict[str, Any]) -> SimulatedRobot:
-    plant = LinkagePlant(model, own['hidden_effects'], own['seed'], own['hidden_scale'],
-                         own['rate'])
+    plant = MechanismPlant(model, own['hidden_effects'], own['seed'], own['hidden_scale'],
+                           own['rate'])
     return SimulatedRobot(
         plant, seed=own['seed'], rate=own['rate'],
         control=plant.gains(own['bandwidth'], own['damping_ratio'], **_behaviour(own)),

@@ -19,7 +19,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
-from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.closures import ROWS
 from pprs_dynamics.physics.mechanism.description import (
     Frame,
@@ -28,10 +28,10 @@ from pprs_dynamics.physics.mechanism.description import (
 )
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
-from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Motion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Motion
 from pprs_dynamics.physics.mechanism.urdf import expanded
 from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.simulation.arm_forms import (
@@ -517,7 +517,7 @@ def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Ar
         + np.asarray(model.friction.coulomb) * np.tanh(v / np.asarray(model.reversal.velocity))
         + np.asarray(model.offset.value))
     for effect in model.effects:
-        if isinstance(effect, LinkageFriction):
+        if isinstance(effect, ModelJointFriction):
             state = model.mechanism(motion).loaded(
                 replace(engine.robot, gravity=tuple(engine.gravity.tolist())),
                 StructureLoad(np.tile(engine.wrench, (len(motion), 1))))

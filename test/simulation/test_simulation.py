@@ -788,10 +788,10 @@ CONTAINERS = (
 # equations they share one: the friction that the model file itself gives passive joints, which
 # hides nothing. All that is hidden, and the rigid body, is the engine's or a form of its own.
 DESCRIPTION = tuple(f'pprs_dynamics.physics.mechanism.{name}' for name in (
-    'description', 'urdf', 'structure', 'closures', 'mechanism', 'linkage_equations',
+    'description', 'urdf', 'structure', 'closures', 'mechanism', 'tree_equations',
     'passive_joints'))
 OF_ARMS = {'engine_state.py': DESCRIPTION,
-           **dict.fromkeys(('arm_run.py', 'linkage_plant.py'), (
+           **dict.fromkeys(('arm_run.py', 'mechanism_plant.py'), (
                *DESCRIPTION, 'pprs_dynamics.physics.effects.laws.joint_friction'))}
 
 

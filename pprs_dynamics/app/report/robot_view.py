@@ -89,7 +89,7 @@ def _weakness(model: DriveModel | ArmModel, motion: Any) -> tuple[Array | None, 
     if not model.robot.structure.loops:
         return None, [''] * len(motion)
     return None, [f'condition number {number:.1f} times that at home'
-                  for number in model.mechanism(motion).linkage.condition]
+                  for number in model.mechanism(motion).links.condition]
 
 
 def _moving(go: Any, drawn: Skeleton, sines: Array | None, k: int) -> list[Any]:

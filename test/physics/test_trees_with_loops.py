@@ -20,12 +20,12 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import ArmModel, DriveModel, JointMotion, PlatformMotion, load_model
 from pprs_dynamics.errors import ModelError, PprsError, SingularityError, WorkspaceError
-from pprs_dynamics.physics.mechanism import linkage
-from pprs_dynamics.physics.mechanism.linkage_equations import Motion
-from pprs_dynamics.physics.mechanism.mechanism import Linkage
+from pprs_dynamics.physics.mechanism import tree_evaluation
+from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.tree_equations import Motion
 from pprs_dynamics.physics.model.model_file import build_model
 
 SAMPLES = 30
@@ -49,7 +49,7 @@ def test_efforts_are_those_of_mujoco(tmp_path: Path, name: str) -> None:
     model = ArmModel.load(text.write(tmp_path))
     motion = states(model, SIZES[name])
     found = model.drive_forces(motion).total
-    moved = model.mechanism(motion).linkage
+    moved = model.mechanism(motion).links
     engine = MujocoLoops(text)
     expected = np.empty_like(found)
     for k in range(len(motion)):
@@ -76,7 +76,7 @@ def test_numpy_without_a_compiler_is_the_same(tmp_path: Path, name: str,
     model = ArmModel.load(ROBOTS[name]().write(tmp_path, {'joints': joints}))
     motion = states(model, SIZES[name])
     compiled = model.drive_forces(motion).parts
-    monkeypatch.setattr(linkage, 'compiled_or_none', lambda function, samples: None)
+    monkeypatch.setattr(tree_evaluation, 'compiled_or_none', lambda function, samples: None)
     on_arrays, on_floats = (model.drive_forces(motion[part]).parts
                             for part in (slice(None), slice(3, 5)))
     assert set(on_arrays) == set(compiled)
@@ -146,7 +146,7 @@ def test_a_state_of_the_other_assembly_is_not_gone_on_from(tmp_path: Path) -> No
     rest = np.zeros((1, len(structure.drives)))
     motion = JointMotion(home[None, structure.tables.drives], rest, rest)
     ends = home.copy()
-    points = {name: Linkage.of(structure, motion.position, rest, rest).frame_of(name).p[0, :2]
+    points = {name: LinkMotion.of(structure, motion.position, rest, rest).frame_of(name).p[0, :2]
               for name in ('left_rod', 'right_rod')}
     # Both rods mirrored at the line through the elbows.
     heading = np.arctan2(*(points['right_rod'] - points['left_rod'])[::-1])
@@ -329,7 +329,7 @@ def test_a_loop_that_opens_in_motion_is_refused_although_it_closed_at_home(tmp_p
     assert 0 < error.value.sample < 50
     # A coupler that leaves the links out of line closes all the way, redundant rows and all.
     model = ArmModel.load(four_bar(0.3).write(tmp_path))
-    moved = model.mechanism(JointMotion(turn, rest, rest)).linkage
+    moved = model.mechanism(JointMotion(turn, rest, rest)).links
     ends = [moved.frame_of(link) for link in ('rod', 'rocker')]
     tips = [end.p + end.R @ np.array([x, 0, 0])
             for end, x in zip(ends, (0.3, 0.2), strict=True)]
@@ -367,7 +367,7 @@ def test_power_of_the_drives_is_energy_and_what_joints_rub(tmp_path: Path, name:
     swing = SIZES[name][0] * np.sin(np.outer(time, w) + np.arange(len(home)))
     rate = SIZES[name][0] * w * np.cos(np.outer(time, w) + np.arange(len(home)))
     motion = JointMotion(home + swing, rate, -w ** 2 * swing)
-    m = plain.mechanism(motion).linkage.motion
+    m = plain.mechanism(motion).links.motion
     stored = energy(plain, m)
     weights = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280]) / h
     forces = model.drive_forces(motion)
@@ -499,7 +499,7 @@ def test_a_pose_past_a_singularity_is_not_answered_with_another_pose_of_the_same
     home = model.tool_pose.home
     turned = (Rotation.from_matrix(home.R) * Rotation.from_rotvec([0.0, 0.0, 1.7])).as_quat()
     if not compiled:
-        monkeypatch.setattr(linkage, 'compiled_or_none', lambda function, samples: None)
+        monkeypatch.setattr(tree_evaluation, 'compiled_or_none', lambda function, samples: None)
     with pytest.raises(SingularityError):
         model.drive_forces(PlatformMotion.at_rest(np.tile(home.p, (samples, 1)),
                                                   np.tile(turned, (samples, 1))))
@@ -512,7 +512,7 @@ def test_friction_of_joints_leaves_loads_as_they_are_that_others_read(tmp_path: 
     loads = {name: each.copy() for name, each in state.reactions._asdict().items()}
     joints = np.arange(3)
     numbers = [np.full(3, value) for value in (0.3, 0.2, 0.01, 0.1)]
-    efforts = state.against_friction(linkage.JointFriction(joints, joints, *numbers))
+    efforts = state.against_friction(tree_evaluation.JointFriction(joints, joints, *numbers))
     assert np.abs(efforts).max() > 0
     for name, each in state.reactions._asdict().items():
         np.testing.assert_array_equal(each, loads[name])
@@ -522,9 +522,9 @@ def test_a_delta_follows_places_and_refuses_what_it_cannot_turn(tmp_path: Path) 
     model = ArmModel.load(robots.delta().write(tmp_path))
     assert model.tool_pose.chosen.tolist() == [0, 1, 2]
     motion = states(model, SIZES['delta'])
-    linkage = model.mechanism(motion).linkage
+    links = model.mechanism(motion).links
     row, _ = model.robot.structure.links['platform']
-    frame, m = linkage.frame_of('platform'), linkage.motion
+    frame, m = links.frame_of('platform'), links.motion
     found = model.mechanism(PlatformMotion(
         frame.p, Rotation.from_matrix(frame.R).as_quat(), m.u[:, row], m.w[:, row], m.ud[:, row],
         m.wd[:, row]))
@@ -598,7 +598,7 @@ def test_a_robot_from_mjcf_is_that_of_mujoco(tmp_path: Path) -> None:
     engine.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     data = mujoco.MjData(engine)
     motion = states(model, (0.2, 2.0, 10.0))
-    found, m = model.drive_forces(motion).total, model.mechanism(motion).linkage.motion
+    found, m = model.drive_forces(motion).total, model.mechanism(motion).links.motion
     for k in range(len(motion)):
         order = [model.robot.structure.tables.coordinate[model.robot.structure.rows[name]]
                  for name in 'acbd']

@@ -7,7 +7,7 @@
 closing of loops, no reactions, no friction. Rounds as in `benchmarks.speed.model`, which take turns
 so that a busy machine slows all alike; of each the best and the median are printed.
 
-    python -m benchmarks.speed.linkage [rounds]
+    python -m benchmarks.speed.tree [rounds]
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import pinocchio as pin
 from benchmarks import ROOT
 from benchmarks.speed.model import CALLS, _print, _rounds
 from pprs_dynamics import ArmModel
-from pprs_dynamics.physics.mechanism.linkage import NO_FRICTION, Evaluation
+from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, Evaluation
 from pprs_dynamics.simulation.arm_run import draw_motion
 
 BATCH = 5000
