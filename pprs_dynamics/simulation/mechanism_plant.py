@@ -27,7 +27,7 @@ from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
 from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
-from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, draw_form, truth
 from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion, one_able_joint
 from pprs_dynamics.simulation.drive_control import ControlSettings
@@ -55,7 +55,7 @@ class MechanismPlant:
 
     Parameters
     ----------
-    model : ArmModel
+    model : MechanismModel
         Of which the mechanism and its own friction count, and no added effects.
     names : sequence of str
         Of `HIDDEN`, or 'random': physics that the model lacks.
@@ -88,7 +88,7 @@ class MechanismPlant:
         For a name of none.
     """
 
-    def __init__(self, model: ArmModel, names: Sequence[str] = (), seed: int = 0,
+    def __init__(self, model: MechanismModel, names: Sequence[str] = (), seed: int = 0,
                  scale: float = 1.0, rate: float = 500.0) -> None:
         self.time_step = 1 / (rate * math.ceil(1 / (rate * LONGEST_STEP)))
         self.model, self.engine = model, ArmEngine(model)

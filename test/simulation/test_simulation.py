@@ -782,7 +782,7 @@ CONTAINERS = (
     'pprs_dynamics.drives', 'pprs_dynamics.physics.effects.former_names',
     'pprs_dynamics.physics.mechanism.motion', 'pprs_dynamics.physics.mechanism.joint_motion',
     'pprs_dynamics.physics.mechanism.structure_load',
-    'pprs_dynamics.physics.mechanism.joint_series', 'pprs_dynamics.physics.model.arm_model',
+    'pprs_dynamics.physics.mechanism.joint_series', 'pprs_dynamics.physics.model.mechanism_model',
     'pprs_dynamics.physics.model.limits')
 # Robots by URDF are built in MuJoCo from what was read of their file: joints, loops and names. Of
 # equations they share one: the friction that the model file itself gives passive joints, which

@@ -12,8 +12,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.tree_equations import WORST_CONDITION
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.passive_friction import IndependentChainsFriction
 from pprs_dynamics.physics.three_pprs.state import ThreePprsState
@@ -44,12 +44,12 @@ class Margins:
     drive: str
 
 
-def margins(model: DriveModel | ArmModel, mechanism: Any) -> Margins:
+def margins(model: DriveModel | MechanismModel, mechanism: Any) -> Margins:
     """Return the margins of a motion that the model has accepted.
 
     Parameters
     ----------
-    model : DriveModel or ArmModel
+    model : DriveModel or MechanismModel
     mechanism : ThreePprsState or MechanismState
         What `model.drive_forces` returned with the forces.
     """

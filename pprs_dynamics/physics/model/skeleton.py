@@ -13,8 +13,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import joint_positions
 
 LINK, DRIVE, GUIDE = 'link', 'drive', 'guide'
@@ -68,9 +68,10 @@ class Skeleton:
     labels: dict[str, int]
 
     @classmethod
-    def of(cls, model: DriveModel | ArmModel, motion: PlatformMotion | JointMotion) -> Skeleton:
+    def of(cls, model: DriveModel | MechanismModel, motion: PlatformMotion | JointMotion,
+           ) -> Skeleton:
         """Return the poses of a motion of a model."""
-        if isinstance(model, ArmModel):
+        if isinstance(model, MechanismModel):
             return _of_links(model, model.mechanism(motion).links)
         assert isinstance(motion, PlatformMotion)
         return _of_platform(model, motion)
@@ -102,7 +103,7 @@ def _of_platform(model: DriveModel, motion: PlatformMotion) -> Skeleton:
                     tuple(joints[f'A_{i}'] for i in (1, 2, 3)), joints, {}, labels)
 
 
-def _of_links(model: ArmModel, links: LinkMotion) -> Skeleton:
+def _of_links(model: MechanismModel, links: LinkMotion) -> Skeleton:
     s, m = model.robot.structure, links.motion
     t, size = s.tables, s.size
     count = len(t.parent)

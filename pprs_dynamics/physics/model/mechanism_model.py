@@ -68,7 +68,7 @@ TO_FILES = [OF_MECHANISM.index(axes) for axes in OF_FILES]
 
 
 @dataclass(frozen=True, kw_only=True)
-class ArmModel(ForceModel):
+class MechanismModel(ForceModel):
     """The inverse dynamic model of a mechanism.
 
     Parameters
@@ -188,7 +188,7 @@ class ArmModel(ForceModel):
             structure.lower, structure.upper, structure.effort)
 
     @classmethod
-    def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> ArmModel:
+    def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> MechanismModel:
         """Build the model from flat keys and values; see `ForceModel.from_parameters`."""
         with source_of_errors(source):
             block = mechanism_block(parameters)
@@ -221,7 +221,7 @@ class ArmModel(ForceModel):
                        values=values, source=source)
 
     @classmethod
-    def _axis(cls, parameters: Mapping[str, Any], source: str) -> ArmModel:
+    def _axis(cls, parameters: Mapping[str, Any], source: str) -> MechanismModel:
         """Build the model of an axis."""
         values = checked_values(parameters)
         robot = axis_mechanism(values['axis.mass'], gravity_in_efforts(values, 'axis.gravity'))
