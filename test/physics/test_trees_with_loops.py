@@ -298,7 +298,7 @@ def test_a_gear_does_not_carry_its_rotor(tmp_path: Path) -> None:
     with_rotor = MechanismModel.from_parameters(
         {**model.values, 'robot.armature': (0.5, 0.8)}, model.source)
     before, after = model.mechanism(motion), with_rotor.mechanism(motion)
-    assert after.guide_load == pytest.approx(before.guide_load, abs=1e-12)
+    assert after.friction_load == pytest.approx(before.friction_load, abs=1e-12)
     assert after.rigid_force - before.rigid_force == pytest.approx(
         motion.acceleration * np.array([0.5, 0.8]), abs=1e-9)
 

@@ -442,7 +442,7 @@ class MechanismState(JointMotion):
         return efforts
 
     @lazy
-    def guide_load(self) -> Array:
+    def friction_load(self) -> Array:
         """What a drive's gear carries [N m, N]: the size of what it passes on; 0 if not known."""
         load: Array = np.abs(self.transmitted) * self.robot.load_is_known
         return load
