@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where all joints and free bodies of a robot are, prepared beside a node that goes on answering."""
+"""Where all joints and free bodies of a robot are, prepared beside a node that answers."""
 
 from __future__ import annotations
 
