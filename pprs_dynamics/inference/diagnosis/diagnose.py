@@ -588,7 +588,7 @@ class _Answer:
             # Those of the search are of constant forms.
             return (RankedSet(tuple((c.name, self.design.named(c.drives))
                                     for c in self.dated.candidates), CostTerms()),)
-        # Of a set that bends nothing the cost is that in the first design.
+        # Of a linear set the cost is that in the first design.
         best, *others = self._of_each_name(self.ranking.sets, MOST_SETS)
         return (best, *sorted(others, key=lambda one: one.cost))
 
