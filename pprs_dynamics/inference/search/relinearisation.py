@@ -28,7 +28,7 @@ from pprs_dynamics.inference.search.fitted_model import (
     squared,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.neighbours import on_best_drives
+from pprs_dynamics.inference.search.neighbours import of_same_claims
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -42,7 +42,7 @@ SHORTLIST = 4  # sets of different claims of a search that are ranked by exact f
 
 @dataclass(frozen=True)
 class ExactSet:
-    """A set around its own fitted model, on the drives and in the variants of least cost there.
+    """A set around its own fitted model, moved to where it costs least there.
 
     Parameters
     ----------
@@ -68,10 +68,7 @@ class ExactSet:
         try:
             for _ in range(MOST_STEPS):
                 last, moved = linearised(last, moved, alone=True)
-                before, moved = moved, on_best_drives(last, moved)
-                if moved.barred and len(moved.effects) < len(moved.candidates):
-                    # What a pattern stood for is explained around the model: its effects count.
-                    moved = last.refined(last.evaluate(moved.effects))
+                before, moved = moved, of_same_claims(last, moved)
                 if moved is before:
                     break
             one = settled(last, moved)
