@@ -32,7 +32,7 @@ from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJo
 from pprs_dynamics.physics.mechanism.evaluation import PLAIN, is_compiled
 from pprs_dynamics.physics.model.one_pass import forces_kernel
 from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
-from pprs_dynamics.physics.three_pprs.state import MechanismState
+from pprs_dynamics.physics.three_pprs.state import ThreePprsState
 
 ROUNDS = 25
 CALLS = 200  # of one sample, per round
@@ -133,7 +133,7 @@ def _regressors(model: DriveModel, motion: PlatformMotion) -> int:
     return len(columns)
 
 
-def _total(model: DriveModel, state: MechanismState) -> np.ndarray:
+def _total(model: DriveModel, state: ThreePprsState) -> np.ndarray:
     """Return rigid body and friction, which follows the loads of other bodies."""
     return sum((effect.force(state) for effect in model.effects), state.rigid_body.force)
 

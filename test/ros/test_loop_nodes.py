@@ -23,7 +23,7 @@ from trajectory_msgs.msg import (
     MultiDOFJointTrajectory,
 )
 
-from pprs_dynamics import ArmModel, JointMotion, PlatformMotion
+from pprs_dynamics import JointMotion, MechanismModel, PlatformMotion
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.ros.monitor import MonitorNode
@@ -50,7 +50,7 @@ def node() -> Iterator[FeedforwardBench]:
         yield running
 
 
-def drives_message(model: ArmModel, position: np.ndarray) -> JointTrajectory:
+def drives_message(model: MechanismModel, position: np.ndarray) -> JointTrajectory:
     zero = np.zeros(len(position)).tolist()
     return JointTrajectory(joint_names=list(model.drives), points=[JointTrajectoryPoint(
         positions=position.tolist(), velocities=zero, accelerations=zero,
@@ -58,7 +58,7 @@ def drives_message(model: ArmModel, position: np.ndarray) -> JointTrajectory:
 
 
 def test_efforts_are_the_models_and_what_cannot_be_is_refused(node: FeedforwardBench) -> None:
-    model = ArmModel.load(FILE)
+    model = MechanismModel.load(FILE)
     home = model.robot.structure.home[model.robot.structure.tables.drives]
     near = home + 0.01 * np.arange(6)
     rest = np.zeros((1, 6))
@@ -83,7 +83,7 @@ def poses(rng: np.random.Generator, points: int = 1) -> PlatformMotion:
 
 
 def test_poses_of_the_tool_are_answered_or_refused_as_those_of_a_platform() -> None:
-    model, motion = ArmModel.load(FILE), poses(np.random.default_rng(4), 3)
+    model, motion = MechanismModel.load(FILE), poses(np.random.default_rng(4), 3)
     forces = model.drive_forces(motion)
     with feedforward_bench(MultiDOFJointTrajectory, 'pose_trajectory', **parameters()) as node:
         np.testing.assert_allclose(node.answer(message_of(motion)), forces.total[0], rtol=0,
@@ -122,7 +122,7 @@ def given(**own: Any) -> list[Parameter]:
 
 def test_the_simulated_robot_holds_moves_and_refuses() -> None:
     """How it follows a whole path is tested in simulated time."""
-    model = ArmModel.load(FILE)
+    model = MechanismModel.load(FILE)
     home, _ = model.robot.structure.room(np.pi)
     with bench() as running:
         states = running.listen(JointState, '/joint_states', 1000)
@@ -153,7 +153,7 @@ def test_the_simulated_robot_holds_moves_and_refuses() -> None:
 
 
 def test_the_path_is_an_excitation_of_the_drives_from_rest_to_rest() -> None:
-    model = ArmModel.load(FILE)
+    model = MechanismModel.load(FILE)
     home, room = model.robot.structure.room(np.pi)
     with bench() as running:
         heard = running.listen(JointTrajectory, '/feedforward/trajectory', 1000)

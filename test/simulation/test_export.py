@@ -17,7 +17,7 @@ import pinocchio
 import pytest
 from robots_with_loops import five_bar
 
-from pprs_dynamics import ArmModel, DriveModel
+from pprs_dynamics import DriveModel, MechanismModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.paths import Excitation
@@ -197,7 +197,7 @@ def test_robots_with_loops(name: str, kind: str, tmp_path: Path) -> None:
     file, result = exported(f'config/{name}.yaml', kind, tmp_path)
     assert result['replay_error'] == pytest.approx(result['expected_error'], abs=1e-8)
     model = load_model(f'config/{name}.yaml')
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     # Read as any robot's file, it moves as the model's bodies do.
     own = {key: value for key, value in model.values.items()
            if not key.startswith(('robot.urdf', 'friction.joints'))
@@ -206,7 +206,7 @@ def test_robots_with_loops(name: str, kind: str, tmp_path: Path) -> None:
     again = build_model({**own, f'robot.{kind}': str(file), 'robot.base': base})
     motion = draw_motion(model, 3.0, 1)
     expected = model.drive_forces(motion).parts['rigid_body']
-    assert isinstance(again, ArmModel)
+    assert isinstance(again, MechanismModel)
     assert again.drive_forces(motion).parts['rigid_body'] == pytest.approx(
         expected, abs=1e-8 * np.abs(expected).max())
     if kind == URDF:
@@ -245,7 +245,7 @@ def test_an_arm_in_another_library(tmp_path: Path) -> None:
     path = arm.write_arm(tmp_path, friction__viscous=[8.0, 5.0, 20.0],
                          friction__coulomb=[6.0, 4.0, 9.0])
     model = load_model(path)
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     file, result = exported(path, URDF, tmp_path)
     assert result['not_expressed'] == []
     assert result['replay_error'] == pytest.approx(result['expected_error'], abs=1e-9)
@@ -309,7 +309,7 @@ def test_a_body_that_cannot_be_is_refused_and_nothing_is_written(
 
 def test_a_closure_that_mujoco_lacks_is_refused() -> None:
     model = load_model('config/delta.yaml')
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     structure = model.robot.structure
     other = replace(structure, loops=tuple(
         replace(loop, kind='universal') for loop in structure.loops))

@@ -782,16 +782,16 @@ CONTAINERS = (
     'pprs_dynamics.drives', 'pprs_dynamics.physics.effects.former_names',
     'pprs_dynamics.physics.mechanism.motion', 'pprs_dynamics.physics.mechanism.joint_motion',
     'pprs_dynamics.physics.mechanism.structure_load',
-    'pprs_dynamics.physics.mechanism.joint_series', 'pprs_dynamics.physics.model.arm_model',
+    'pprs_dynamics.physics.mechanism.joint_series', 'pprs_dynamics.physics.model.mechanism_model',
     'pprs_dynamics.physics.model.limits')
 # Robots by URDF are built in MuJoCo from what was read of their file: joints, loops and names. Of
 # equations they share one: the friction that the model file itself gives passive joints, which
 # hides nothing. All that is hidden, and the rigid body, is the engine's or a form of its own.
 DESCRIPTION = tuple(f'pprs_dynamics.physics.mechanism.{name}' for name in (
-    'description', 'urdf', 'structure', 'closures', 'mechanism', 'linkage_equations',
+    'description', 'urdf', 'structure', 'closures', 'mechanism', 'tree_equations',
     'passive_joints'))
 OF_ARMS = {'engine_state.py': DESCRIPTION,
-           **dict.fromkeys(('arm_run.py', 'linkage_plant.py'), (
+           **dict.fromkeys(('arm_run.py', 'mechanism_plant.py'), (
                *DESCRIPTION, 'pprs_dynamics.physics.effects.laws.joint_friction'))}
 
 

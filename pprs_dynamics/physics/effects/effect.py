@@ -120,7 +120,7 @@ class Effect(ABC):
 
         Parameters
         ----------
-        state : MechanismState or LinkageState
+        state : ThreePprsState or MechanismState
         memory : object, optional
             What `initial_memory` returned, advanced in place to the last sample.
         """

@@ -15,8 +15,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.linkage import survey
-from pprs_dynamics.physics.mechanism.linkage_equations import (
+from pprs_dynamics.physics.mechanism.tree_equations import (
     ANGLE,
     AXES,
     KIND,
@@ -25,6 +24,7 @@ from pprs_dynamics.physics.mechanism.linkage_equations import (
     Integers,
     Tables,
 )
+from pprs_dynamics.physics.mechanism.tree_evaluation import survey
 
 X, Y, Z = range(3)
 Row = tuple[int, tuple[int, int, int, int], tuple[float, float]]

@@ -34,9 +34,9 @@ from pprs_dynamics.physics.mechanism.description import (
     principal_inertia,
     rotation_of,
 )
-from pprs_dynamics.physics.mechanism.linkage import survey
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.structure import build_structure
+from pprs_dynamics.physics.mechanism.tree_evaluation import survey
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.three_pprs.robot import Robot
