@@ -128,7 +128,7 @@ def _regressors(model: DriveModel, motion: PlatformMotion) -> int:
                 change = small.force(state)
             columns.append(change / coefficient.scale)
     columns += [state.velocity, state.direction, np.abs(state.direction),
-                state.velocity * np.abs(state.velocity), state.guide_load * state.direction,
+                state.velocity * np.abs(state.velocity), state.friction_load * state.direction,
                 np.ones_like(state.velocity), reference, state.position, state.acceleration]
     return len(columns)
 

@@ -457,7 +457,7 @@ def _hidden_joint(model: MechanismModel, motion: JointMotion, plain: Array,
     m = model.robot.at(motion.position, motion.velocity, motion.acceleration).motion
     row = structure.rows[name]
     c, ratio = structure.tables.coordinate[row], structure.tables.ratio[row]
-    rate, felt = ratio * m.v[:, c], np.abs(ratio * m.T[:, c]).max(axis=0)
+    rate, felt = ratio * m.v[:, c], np.abs(ratio * m.drive_to_joint[:, c]).max(axis=0)
     # As large on the drive that feels it most as a hidden force on a drive is.
     d = int(np.argmax(felt))
     torque = scale * SIZE(random) * float(np.abs(plain[:, d]).max()) / float(felt[d])

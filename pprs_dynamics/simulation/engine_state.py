@@ -105,7 +105,7 @@ class EngineState:
         t, m = self.structure.tables, links.motion
         T = np.zeros((self.model.nv, len(t.drives)))
         _, dofs, rows = self._hinged
-        T[dofs] = t.ratio[rows, None] * m.T[0, t.coordinate[rows]]
+        T[dofs] = t.ratio[rows, None] * m.drive_to_joint[0, t.coordinate[rows]]
         for _, v, row in self._free:
             W, U = (each[0, row] for each in links.twists)
             T[v:v + 3], T[v + 3:v + 6] = self.root.R.T @ U, m.R[0, row].T @ W

@@ -317,7 +317,7 @@ def _relative(t: Any, m: Any, table: JointFriction, W: Array) -> Array:
     """Return relative rates per rate of drives, (K, 3, D); a hinge's stand in the first row."""
     rates = np.zeros((len(table.joint), 3, W.shape[-1]))
     hinges, loops = table.joint[table.joint >= 0], table.loop[table.loop >= 0]
-    rates[table.joint >= 0, 0] = t.ratio[hinges, None] * m.T[0, t.coordinate[hinges]]
+    rates[table.joint >= 0, 0] = t.ratio[hinges, None] * m.drive_to_joint[0, t.coordinate[hinges]]
     rates[table.loop >= 0] = W[t.loop_b[loops]] - W[t.loop_a[loops]]
     return rates
 

@@ -25,7 +25,7 @@ from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.mechanism.tree_equations import Motion
+from pprs_dynamics.physics.mechanism.tree_equations import DETERMINANT, Motion
 from pprs_dynamics.physics.model.model_file import build_model
 
 SAMPLES = 30
@@ -158,7 +158,7 @@ def test_a_state_of_the_other_assembly_is_not_gone_on_from(tmp_path: Path) -> No
     rows, failed = evaluation.follow(motion.position, rest, rest, ends[None])
     assert failed < 0
     flipped = evaluation.motion(rows)
-    assert flipped.state[0, 1] * evaluation.at_home[1] < 0
+    assert flipped.solution[0, DETERMINANT] * evaluation.at_home[DETERMINANT] < 0
     state = model.initial_state()
     state.closed[structure] = flipped.q[0]
     found = model.drive_forces(motion, state).total
@@ -298,7 +298,7 @@ def test_a_gear_does_not_carry_its_rotor(tmp_path: Path) -> None:
     with_rotor = MechanismModel.from_parameters(
         {**model.values, 'robot.armature': (0.5, 0.8)}, model.source)
     before, after = model.mechanism(motion), with_rotor.mechanism(motion)
-    assert after.guide_load == pytest.approx(before.guide_load, abs=1e-12)
+    assert after.friction_load == pytest.approx(before.friction_load, abs=1e-12)
     assert after.rigid_force - before.rigid_force == pytest.approx(
         motion.acceleration * np.array([0.5, 0.8]), abs=1e-9)
 

@@ -117,7 +117,7 @@ def test_the_model_explains_other_robots_too(change: dict[str, object]) -> None:
 
 def test_guide_loads_come_out_as_in_the_model(plain: SimulatedRun) -> None:
     assert plain.truth is not None
-    loads = MODEL.drive_forces(plain.platform_motion()).mechanism.guide_load
+    loads = MODEL.drive_forces(plain.platform_motion()).mechanism.friction_load
     assert np.abs(plain.truth.guide_load - loads).max() < 1e-4
 
 
@@ -448,7 +448,7 @@ def test_the_drives_give_the_power_that_the_effect_takes(name: str, power: objec
 def test_forces_on_the_platform_raise_the_friction_of_the_guides() -> None:
     effect = drawn('external_wrench')
     run = simulate(MODEL.values, wave(0.3), [effect], control=WEIGHT_HELD, sensors=QUIET)
-    loads = MODEL.drive_forces(run.platform_motion()).mechanism.guide_load
+    loads = MODEL.drive_forces(run.platform_motion()).mechanism.friction_load
     assert np.abs(run.truth.guide_load - loads).max() > 0.1
 
 

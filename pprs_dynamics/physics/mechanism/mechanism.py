@@ -27,6 +27,8 @@ from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.tree_equations import (
+    CONDITION,
+    DETERMINANT,
     KIND,
     LOOP,
     OPEN_IN_MOTION,
@@ -231,12 +233,13 @@ class LinkMotion:
     @property
     def condition(self) -> Array:
         """Condition number of the loops over that at home, (N,); 0 without loops."""
-        home = self.structure.evaluation.at_home[2]
-        condition: Array = self.motion.state[:, 2] / home if home else self.motion.state[:, 2]
+        home = self.structure.evaluation.at_home[CONDITION]
+        condition: Array = self.motion.solution[:, CONDITION] / (home or 1.0)
         return condition
 
     def _require_regular(self) -> None:
-        lost = ~(self.motion.state[:, 1] * self.structure.evaluation.at_home[1] > 0)
+        home = self.structure.evaluation.at_home[DETERMINANT]
+        lost = ~(self.motion.solution[:, DETERMINANT] * home > 0)
         if lost.any():
             raise SingularityError(
                 int(np.argmax(lost)), 'the motion leaves the assembly of home through a '
@@ -259,15 +262,16 @@ class LinkMotion:
         if not len(implied):
             return
         m = samples_last(self.motion)
-        gaps = np.stack([residual(t, m, int(r)) for r in implied], axis=-1)
-        size = np.abs(gaps) / t.row_unit[implied]
+        residuals = np.stack([residual(t, m, int(r)) for r in implied], axis=-1)
+        size = np.abs(residuals) / t.row_unit[implied]
         if np.all(size < OPEN_IN_MOTION):
             return
         sample = int(np.argmax(~np.all(size < OPEN_IN_MOTION, axis=1)))
         worst = int(np.argmax(size[sample]))
         row = implied[worst]
-        amount = (f'{1e3 * abs(gaps[sample, worst]):.3g} mm' if t.rows[row, KIND] == TRANSLATION
-                  else f'{np.degrees(abs(gaps[sample, worst])):.3g} degrees')
+        by = abs(residuals[sample, worst])
+        amount = (f'{1e3 * by:.3g} mm' if t.rows[row, KIND] == TRANSLATION
+                  else f'{np.degrees(by):.3g} degrees')
         raise WorkspaceError(
             sample, f'the loop {self.structure.loops[t.rows[row, LOOP]].name} is open by {amount}',
             'must close as at home, where it follows from the other loops and joints alone: name a '
@@ -438,7 +442,7 @@ class MechanismState(JointMotion):
         return efforts
 
     @lazy
-    def guide_load(self) -> Array:
+    def friction_load(self) -> Array:
         """What a drive's gear carries [N m, N]: the size of what it passes on; 0 if not known."""
         load: Array = np.abs(self.transmitted) * self.robot.load_is_known
         return load

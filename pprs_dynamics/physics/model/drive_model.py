@@ -194,7 +194,7 @@ class DriveModel(ForceModel):
         """Return loads of the guides, rod angles, and where the platform is."""
         motion = state.motion
         x, y, z = motion.position.T
-        return {'load': state.guide_load, 'rod_angle': np.tile(state.chains.rod_angle, 2),
+        return {'load': state.friction_load, 'rod_angle': np.tile(state.chains.rod_angle, 2),
                 'platform_x': x, 'platform_y': y, 'platform_z': z,
                 'platform_tilt': motion.tilt, 'platform_turn': motion.turn}
 

@@ -284,7 +284,7 @@ class MechanismModel(ForceModel):
 
     def variables(self, state: MechanismState) -> dict[str, Array]:
         """Return the loads of the gears, where they are known."""
-        return {'load': state.guide_load} if self.robot.load_is_known else {}
+        return {'load': state.friction_load} if self.robot.load_is_known else {}
 
 
 def inertial_values(inertial: Array) -> dict[str, tuple[float, ...]]:

@@ -41,9 +41,9 @@ class ActiveFriction(Effect):
     def force(self, state: ThreePprsState, memory: Any = None) -> Array:
         """Return Delta Q^m, (N, 6) [N]."""
         Q_m: Array = drive_friction(np.asarray(self.viscous), np.asarray(self.coulomb),
-                                    state.velocity, state.guide_load, state.direction)
+                                    state.velocity, state.friction_load, state.direction)
         return Q_m
 
-    def dry(self, guide_load: Array) -> Array:
+    def dry(self, friction_load: Array) -> Array:
         """Return the dry friction in full motion [N], for loads of the guides (N, 6) [N]."""
-        return np.asarray(self.coulomb) * guide_load
+        return np.asarray(self.coulomb) * friction_load

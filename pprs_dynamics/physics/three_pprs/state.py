@@ -92,7 +92,7 @@ class MechanismKinematics:
 class ThreePprsState:
     """Motion, Jacobians and frictionless forces at N samples.
 
-    Drive quantities (`position`, `velocity`, `acceleration`, `guide_load`) are (N, 6) in drive
+    Drive quantities (`position`, `velocity`, `acceleration`, `friction_load`) are (N, 6) in drive
     order; chain quantities (N, 3).
     """
 
@@ -155,7 +155,7 @@ class ThreePprsState:
         return self.kinematics.drive_motion[2]
 
     @property
-    def guide_load(self) -> Array:
+    def friction_load(self) -> Array:
         """Normal forces on the drives' guides [N]."""
         return self.rigid_body.guide_load
 
