@@ -72,7 +72,8 @@ def tables(scored: Mapping[str, Scored]) -> str:
 
 def alike(scored: Mapping[str, Scored]) -> dict[str, Scored]:
     """Return the answers to the problems that all have answered."""
-    count = Counter(truth.problem for answers in scored.values() for truth, *_ in answers)
+    count = Counter(problem for answers in scored.values()
+                    for problem in {truth.problem for truth, *_ in answers})
     return {name: [one for one in answers if count[one[0].problem] == len(scored)]
             for name, answers in scored.items()}
 

@@ -195,7 +195,7 @@ def main() -> int:
     parser.add_argument('--part', type=_part, default=(1, 1), metavar='K/N',
                         help='of N parts of the problems the K-th, for machines that share them')
     parser.add_argument('--answered', action='store_true',
-                        help='score each entrant by what it has answered, of a run that was stopped')
+                        help='score each entrant by what it answered, of a run that was stopped')
     parser.add_argument('--real', type=Path, metavar='FOLDER', help='of real machines, see real.py')
     options = parser.parse_args()
     if options.step == 'make':
