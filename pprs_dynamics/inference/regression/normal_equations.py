@@ -187,8 +187,8 @@ class Fitted(Protocol):
     base_index: dict[int, np.typing.NDArray[np.int_]]
     base_products: dict[int, Array]
 
-    def products(self, a: Block, b: Block | None, d: int) -> Array:
-        """Return band sums of products of two blocks' rows on a drive."""
+    def products(self, a: Block, others: Sequence[Block | None], d: int) -> list[Array]:
+        """Return band sums of products of a block's rows with others' on a drive."""
 
     def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
         """Return those of a drive and the blocks that it feels."""
@@ -219,15 +219,14 @@ class DriveEquations:
         spots: list[tuple[Block, slice]] = []
         for block in acting:
             spot = slice(at, at + block.size)
-            with_base = regression.products(block, None, d)
+            spots.append((block, spot))
+            with_base, *pairs = regression.products(block, [None, *(b for b, _ in spots)], d)
             gram[:, spot, :first] = with_base[:, :, :-1]
             gram[:, :first, spot] = with_base[:, :, :-1].transpose(0, 2, 1)
             side[:, spot] = with_base[:, :, -1]
-            for other, place in [*spots, (block, spot)]:
-                pair = regression.products(block, other, d)
+            for (_, place), pair in zip(spots, pairs, strict=True):
                 gram[:, spot, place] = pair
                 gram[:, place, spot] = pair.transpose(0, 2, 1)
-            spots.append((block, spot))
             at += block.size
         self.gram, self.side, self.squares = gram, side, base[:, -1, -1]
         self._flat = gram.reshape(count, -1)
