@@ -260,7 +260,7 @@ def test_what_may_be_lack_of_fit_is_told_once_it_stands_out_of_the_noise(
     ranking = select(MODEL, [recording], DECISIONS)
     assert names(ranking.map_set) == ['joint_friction', 'tool_drag']
     assert ('joint_friction' in names(ranking.reported)) is stands_out
-    assert [one.candidate.name for one in ranking.remainders] == [
+    assert [one.candidate.name for one in ranking.absorbed] == [
         'joint_friction'] * (not stands_out)
 
 

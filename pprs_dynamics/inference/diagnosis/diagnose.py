@@ -37,6 +37,7 @@ from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import paired_gain, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.search.absorbed import Absorbed
 from pprs_dynamics.inference.search.candidates import (
     DURING,
     SINCE,
@@ -67,7 +68,6 @@ from pprs_dynamics.inference.search.fitted_model import (
     parts_of,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.form import Remainder
 from pprs_dynamics.inference.search.held_out import hold_out
 from pprs_dynamics.inference.search.noise_floors import noise_floors
 from pprs_dynamics.inference.search.possible_totals import left_at_nothing
@@ -368,10 +368,10 @@ class _Answer:
                    else 'effect' if effects else 'adequate')
         moved = [one for one in calibrations(final.fits, final.found, final.widths)
                  if abs(one.after - one.before) > self.decisions.sure * one.std]
-        remainders = () if self.is_dated else self.ranking.remainders
+        absorbed = () if self.is_dated else self.ranking.absorbed
         return Diagnosis(
             verdict, tuple(effects), sets, unconfirmed, self._candidates(),
-            self._suspects(), depends, tuple(map(self._within_model_error, remainders)),
+            self._suspects(), depends, tuple(map(self._within_model_error, absorbed)),
             self._sets(), self._barred(), tuple(moved),
             find_cautions(self.fits, self.map_set, effects), first.notes,
             first.given, self.adopted, first.residuals, self.remaining, noise, floors,
@@ -620,12 +620,12 @@ class _Answer:
         names = tuple((c.name, self.design.named(c.drives)) for c in found.candidates)
         return RankedSet(names, self.ranking.difference(found, best), found.barred)
 
-    def _within_model_error(self, remainder: Remainder) -> WithinModelError:
-        force = self.fits.library.force(remainder.found, remainder.candidate,
+    def _within_model_error(self, absorbed: Absorbed) -> WithinModelError:
+        force = self.fits.library.force(absorbed.beside, absorbed.candidate,
                                         self.design.residuals.measured.shape)
         return WithinModelError(
-            remainder.candidate.name, self.design.named(remainder.candidate.drives),
-            float(np.sqrt(np.mean(force ** 2, axis=0)).max()), remainder.of)
+            absorbed.candidate.name, self.design.named(absorbed.candidate.drives),
+            float(np.sqrt(np.mean(force ** 2, axis=0)).max()), absorbed.of)
 
 
 def _for_json(shares: Mapping[str, float]) -> dict[str, float | None]:
