@@ -331,9 +331,9 @@ def test_every_decision_has_a_unit_and_a_reason() -> None:
 
 
 def test_no_number_decides_outside_the_table() -> None:
-    page = (Path(__file__).parents[2] / 'docs' / 'diagnosis.md').read_text()
+    page = (Path(__file__).parents[2] / 'docs' / 'decisions.md').read_text()
     told = {name for name, *_ in DECISIONS.table()}
-    bounds = page.partition('### Bounds of the effort and of the accuracy')[2].partition('##')[0]
+    bounds = page.partition('## Bounds of the effort and of the accuracy')[2].partition('##')[0]
     inference = Path(search_module.__file__).parents[1]
     found = set()
     for room in ('regression', 'search', 'diagnosis'):
