@@ -334,7 +334,7 @@ class Regression:
 
     def _beside(self, fit: JointFit, block: Block) -> tuple[Array, Array, Array]:
         """Return own sums of products, those with what is left, and full products of a block."""
-        taken, b = Columns(self, {d: [rows] for d, rows in block.rows.items()}).projected(fit)
+        taken, b = Columns(self, block.rows).projected(fit)
         S = np.sum([np.tensordot(self.weights(fit, d), self.products(block, [block], d)[0], 1)
                     for d in block.rows], axis=0)
         return S - taken @ fit.covariance @ taken.T, b, S
@@ -346,16 +346,16 @@ class Columns:
     Parameters
     ----------
     regression : Regression
-    rows : mapping of drive to sequence of (k, n) arrays
-        Transformed, R rows in all; products have their precision.
+    rows : mapping of drive to (R, n) array
+        Transformed; products have their precision.
     """
 
-    def __init__(self, regression: Regression, rows: Mapping[int, Sequence[Array]]) -> None:
+    def __init__(self, regression: Regression, rows: Mapping[int, Array]) -> None:
         self.regression, self.rows = regression, rows
         self._crosses: dict[tuple[int, Block | None], Array] = {}
 
     def __len__(self) -> int:
-        return max((sum(map(len, parts)) for parts in self.rows.values()), default=0)
+        return max((len(values) for values in self.rows.values()), default=0)
 
     def _cross(self, d: int, block: Block | None) -> Array:
         """Return band sums of all rows with a block's, or with base and error, (B, R, k)."""
@@ -364,11 +364,10 @@ class Columns:
             if len(self._crosses) > MOST_CROSSES * len(self.rows):
                 self._crosses = {one: cross for one, cross in self._crosses.items()
                                  if one[1] is None}
+            rows = self.rows[d]
             other = self.regression.base[d] if block is None else block.rows[d]
-            other = other.astype(self.rows[d][0].dtype)
-            self._crosses[key] = np.concatenate([
-                self.regression.series[d].products(rows, other).astype(other.dtype)
-                for rows in self.rows[d]], axis=1)
+            self._crosses[key] = self.regression.series[d].products(
+                rows, other.astype(rows.dtype)).astype(rows.dtype)
         return self._crosses[key]
 
     def projected(self, fit: JointFit) -> tuple[Array, Array]:
@@ -378,9 +377,9 @@ class Columns:
         covariance C (Schur's complement).
         """
         taken, side = np.zeros((len(self), len(fit.coefficients))), np.zeros(len(self))
-        for d, parts in self.rows.items():
+        for d, rows in self.rows.items():
             index, acting = self.regression.local(fit, d)
-            weights = self.regression.weights(fit, d).astype(parts[0].dtype)
+            weights = self.regression.weights(fit, d).astype(rows.dtype)
 
             def weighted(block: Block | None, d: int = d, weights: Array = weights) -> Array:
                 cross = self._cross(d, block)

@@ -73,8 +73,7 @@ class ScoreTest(Generic[Label]):
 
     def __init__(self, regression: Regression, rows: Mapping[int, Array],
                  entries: Sequence[Entry[Label]]) -> None:
-        self.regression, self._rows = regression, rows
-        self._columns = Columns(regression, {d: [values] for d, values in rows.items()})
+        self.regression, self._columns = regression, Columns(regression, rows)
         sizes: dict[int, list[Entry[Label]]] = {}
         for entry in entries:
             sizes.setdefault(len(entry.rows), []).append(entry)
@@ -84,7 +83,7 @@ class ScoreTest(Generic[Label]):
         places = np.array([entry.rows for entry in entries])
         size = places.shape[1]
         grams = {}
-        for d, rows in self._rows.items():
+        for d, rows in self._columns.rows.items():
             series = self.regression.series[d]
             gram = np.empty((len(entries), size, size, len(series.bands)))
             for i in range(size):

@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
-from itertools import accumulate, pairwise
 from threading import Lock
 from typing import Any
 
@@ -85,8 +84,8 @@ class _Scanned:
     Parameters
     ----------
     family : Family
-    place : slice
-        Of its C columns in those of all families.
+    columns : Columns
+        C rows.
     gram : (B, C, C) array
         Band sums.
     precision : (P, k, k) array
@@ -94,7 +93,7 @@ class _Scanned:
     """
 
     family: Family
-    place: slice
+    columns: Columns
     gram: Array
     precision: Array
 
@@ -109,17 +108,9 @@ class _Scanned:
         positive: Array = np.maximum(own, 0.0)[:, None, None]
         return positive
 
-    def gains(self, fit: JointFit, weights: Array, taken: Array, side: Array) -> Array:
-        """Return by how much the deviance falls with each pattern beside a fit, (P,).
-
-        Parameters
-        ----------
-        fit : JointFit
-        weights : (B,) array
-        taken, side : (R, P) and (R,) arrays
-            Of all families, see `Columns.projected`.
-        """
-        taken, side = taken[self.place], side[self.place]
+    def gains(self, fit: JointFit, weights: Array) -> Array:
+        """Return by how much the deviance falls with each pattern beside a fit, (P,)."""
+        taken, side = self.columns.projected(fit)
         S = np.tensordot(weights, self.gram, 1) - taken @ fit.covariance @ taken.T
         b = side.reshape(-1, 2) if self.family.paired else (self.family.weights @ side)[:, None]
         # A pattern that no sample shows has no scale, and gains nothing.
@@ -165,7 +156,7 @@ class PatternLibrary:
             return PatternLibrary(regression, self.prices, self.d, self.with_plain_forms)
         found = copy(self)
         found.regression, found.series = regression, series
-        found.release()
+        vars(found).pop('_scanned', None)
         return found
 
     @lazy
@@ -182,21 +173,15 @@ class PatternLibrary:
                 if self.with_plain_forms or not (family.paired or family.is_plain)]
 
     @lazy
-    def _columns(self) -> Columns:
-        return Columns(self.regression, {self.d: [one.rows for one in self._transformed]})
-
-    @lazy
     def _scanned(self) -> list[_Scanned]:
         scale = len(self.series) * max(self.regression.error_scale[self.d], 1e-12) ** 2
-        ends = accumulate((len(one.rows) for one in self._transformed), initial=0)
-        return [_Scanned(one.family, slice(*ends), one.gram,
+        return [_Scanned(one.family, Columns(self.regression, {self.d: one.rows}), one.gram,
                          _Scanned.of_patterns(one.family, one.gram.sum(axis=0)) / scale)
-                for one, ends in zip(self._transformed, pairwise(ends), strict=True)]
+                for one in self._transformed]
 
     def release(self) -> None:
         """Let go of products that only further scans would need."""
-        for name in ('_columns', '_scanned'):
-            vars(self).pop(name, None)
+        vars(self).pop('_scanned', None)
 
     @property
     def families(self) -> list[Family]:
@@ -257,10 +242,9 @@ class PatternLibrary:
             Beyond `count`, those for which there is a plain word: a constant, friction.
         """
         weights = self.regression.weights(fit, self.d)
-        taken, side = self._columns.projected(fit)
         scored: list[tuple[float, _Scanned, int]] = []
         for scanned in self._scanned:
-            gains = scanned.gains(fit, weights, taken, side)
+            gains = scanned.gains(fit, weights)
             best = int(np.argmax(gains))
             scored.append((float(gains[best]) - self.price(scanned.family).total, scanned, best))
         scored.sort(key=lambda one: -one[0])
@@ -342,7 +326,7 @@ class PatternLibrary:
             share = np.abs(rows).mean(axis=1)
             held = (share >= LEAST_SHARE) & (share <= MOST_SHARE)
             x = self.series.transform(rows)
-            taken, side = Columns(self.regression, {self.d: [x]}).projected(fit)
+            taken, side = Columns(self.regression, {self.d: x}).projected(fit)
             own = x ** 2 @ weights - np.einsum('ip,pq,iq->i', taken, fit.covariance, taken)
             gains = np.where(held, side ** 2 / np.maximum(own, 1e-9), -np.inf)
             top = int(np.argmax(gains))
