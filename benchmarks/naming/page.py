@@ -55,7 +55,12 @@ def tables(scored: Mapping[str, Scored]) -> str:
     """Return all tables in Markdown: the main one, and what it is made of, folded."""
     best = {name: scored[name] for name in best_of_settings(scored)}
     parts = alike({name: scored[name] for name in ordered(scored) if sort_of(name) in (OURS, PART)})
-    lines = [*main_table(best), '', better_than_ours(best), '',
+    most = max(len(answers) for answers in best.values())
+    whole = {name: answers for name, answers in best.items() if len(answers) == most}
+    lines = [*main_table(whole), '',
+             *([] if len(whole) == len(best) else [
+                 'On the problems that every entrant has answered:', '', *main_table(alike(best)),
+                 '']), better_than_ours(best), '',
              '![Right against false, weak, middle and strong effects](images/naming.png)', '',
              *(['This package without each of its parts:', '', *main_table(parts), '']
                if any(sort_of(name) == PART for name in parts) else []),
@@ -113,10 +118,8 @@ def main_table(scored: Mapping[str, Scored]) -> list[str]:
     heads = [f'{figure}, of {max(counts[figure])}' if figure not in ASKED_OF_SOME else figure
              for figure in shown]
     lines = ['| entrant | ' + ' | '.join((*heads, 's')) + ' |', '|---' * (len(shown) + 2) + '|']
-    most = max(len(answers) for answers in scored.values())
     for name, found in every.items():
-        part = '' if len(scored[name]) == most else f', on {len(scored[name])}'
-        lines.append(f'| {name}{part} | ' + ' | '.join(
+        lines.append(f'| {name} | ' + ' | '.join(
             (*(_cell(found[figure]) for figure in shown), f'{seconds(scored[name]):.1f}')) + ' |')
     return lines
 
@@ -264,11 +267,15 @@ def draw(scored: Mapping[str, Scored], picture: Path) -> None:
     mpl.use('Agg')
     import matplotlib.pyplot as plt
 
-    figure, panels = plt.subplots(1, len(STRENGTHS), figsize=(12, 4.8), layout='constrained',
-                                  sharex=True, sharey=True)
-    names = [name for name in best_of_settings(scored) if sort_of(name) != CONTROL]
+    scored = alike({name: scored[name] for name in best_of_settings(scored)})
+    names = [name for name in scored if sort_of(name) != CONTROL]
+    there = {truth.snr for answers in scored.values() for truth, *_ in answers
+             if truth.kind == 'single'}
+    shown = [one for one in STRENGTHS if there & set(one)] or STRENGTHS
+    figure, panels = plt.subplots(1, len(shown), figsize=(12, 4.8), layout='constrained',
+                                  sharex=True, sharey=True, squeeze=False)
     colours = plt.get_cmap('tab10')
-    for axes, strengths in zip(panels, STRENGTHS, strict=True):
+    for axes, strengths in zip(panels[0], shown, strict=True):
         for k, name in enumerate(names):
             answers = scored[name]
             here = [(t, j) for t, _, j in answers if t.kind == 'single' and t.snr in strengths]
@@ -287,8 +294,8 @@ def draw(scored: Mapping[str, Scored], picture: Path) -> None:
         axes.set(title='SNR ' + ', '.join(f'{one:g}' for one in strengths), xlim=(-3, 103),
                  ylim=(-3, 103), xlabel='claims that are wrong [%]')
         axes.grid(alpha=0.25)
-    panels[0].set_ylabel('one hidden effect, told exactly [%]')
-    panels[-1].legend(fontsize=8, loc='center left', bbox_to_anchor=(1.0, 0.5), frameon=False)
+    panels[0, 0].set_ylabel('one hidden effect, told exactly [%]')
+    panels[0, -1].legend(fontsize=8, loc='center left', bbox_to_anchor=(1.0, 0.5), frameon=False)
     figure.savefig(picture, dpi=100)
     plt.close(figure)
 
