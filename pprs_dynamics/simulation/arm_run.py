@@ -58,6 +58,9 @@ HARMONICS = 8
 FASTEST, WIDEST = 0.35, 1.5  # of the top speed; from the middle of the range [rad, m]
 QUICKEST = 3.0  # [rad/s^2, m/s^2]
 SHIFT_OF_SLIDE = 0.1  # [m/rad], zero errors of a robot's legs over those of turning joints
+# Of an encoder's radius, beside its axis; and the step for derivatives [rad].
+ON_JOINT, ON_MOTOR = (0.01, 0.03), (0.05, 0.2)
+ANGLE_STEP = 1e-3
 SHRINK, SHRINKS = 0.8, 20  # of a motion until its loops close throughout
 ENCODER = 2e-5  # [rad, m]
 COLOURED, CORRELATION = 0.36, 0.95  # share of the noise's variance, and from sample to sample
@@ -333,7 +336,7 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
         For another name.
     """
     random = np.random.default_rng(seed)
-    motion = draw_motion(model, duration, path_seed)
+    motion = read = draw_motion(model, duration, path_seed)
     choices = sorted((*(name for name in FORMS if able_joints(name, model, motion)),
                       'payload_mass'))
     chosen = tuple(str(random.choice(choices)) if name == 'random' else name for name in names)
@@ -341,8 +344,11 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
     engine = ArmEngine(model)
     if progress is not None:
         progress(0.1)
-    plain = engine.torques(motion)
     hidden: list[dict[str, Any]] = []
+    if 'eccentric_encoder' in chosen:
+        motion, drawn = _behind_encoder(model, read, random, scale)
+        hidden.append(drawn)
+    plain = engine.torques(motion)
     if 'payload_mass' in chosen:
         hidden.append(engine.hide_payload(random, scale, 0.05))
     if 'link_mass' in chosen:
@@ -417,12 +423,50 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
         hidden.append(truth('homing_error', [model.drives[joint]], {
             model.drives[joint]: {'zero': float(shift[joint])}}, 'positions shifted'))
     sigma = np.full(len(largest), noise) if noise is not None else 0.005 * largest
-    position = motion.position + lead + shift + ENCODER * random.uniform(
+    position = read.position + lead + shift + ENCODER * random.uniform(
         -0.5, 0.5, motion.position.shape)
     return ArmRun(motion, position, efforts + _noise(random, efforts.shape) * sigma,
                   tuple(hidden), {
                       'temperature': read_thermometers(motion.time, temperature)}
                   if thermometers or {*chosen} & {'friction_temperature', 'current_gain'} else {})
+
+
+def _behind_encoder(model: MechanismModel, read: JointMotion, random: np.random.Generator,
+                    scale: float) -> tuple[JointMotion, dict[str, Any]]:
+    """Return the motion of an arm one of whose encoders is beside its axis, and which.
+
+    Its control follows what the encoders say.
+    """
+    able = [j for j, unit in enumerate(model.units) if unit.turns or model.gear_ratios[j] > 1]
+    if not able:
+        raise HiddenEffectError('eccentric_encoder needs a joint that turns, or the gear_ratio of '
+                                'one that slides')
+    j = able[int(random.integers(len(able)))]
+    ratio = model.gear_ratios[j]
+    # On the motor, or on the joint behind its gear.
+    if ratio == 1 or (model.units[j].turns and random.random() < 0.5):
+        ratio = 1.0
+    beside = scale * float(random.uniform(*(ON_JOINT if ratio == 1 else ON_MOTOR)))
+    phase = float(random.uniform(-np.pi, np.pi))
+
+    def behind(q: Array) -> Array:
+        """Return the angles of the disc, of radius 1, of which the head reads q."""
+        x = ratio * q + phase
+        found: Array = q - np.arctan2(beside * np.sin(x), 1 + beside * np.cos(x)) / ratio
+        return found
+
+    position, velocity, acceleration = (
+        np.array(values) for values in (read.position, read.velocity, read.acceleration))
+    q, v, step = read.position[:, j], read.velocity[:, j], ANGLE_STEP / ratio
+    before, at, after = (behind(q + move) for move in (-step, 0.0, step))
+    slope = (after - before) / (2 * step)
+    position[:, j], velocity[:, j] = at, slope * v
+    acceleration[:, j] = (slope * read.acceleration[:, j]
+                          + (after - 2 * at + before) / step ** 2 * v ** 2)
+    moved = replace(read, position=position, velocity=velocity, acceleration=acceleration)
+    return moved, truth('eccentric_encoder', [model.drives[j]], {model.drives[j]: {
+        'amplitude': beside / ratio, 'phase': phase, 'pitch': 2 * np.pi / ratio}},
+        'q - atan(e sin(x) / (1 + e cos(x))) / n, x = n q + phi, behind what is read as q')
 
 
 def _lost_motion(model: MechanismModel, motion: JointMotion, loads: Array,
