@@ -172,7 +172,7 @@ def test_without_an_effect_that_bent_the_columns_the_search_begins_again() -> No
     # As if it had never been found.
     assert without.nothing.cost == pytest.approx(ranking.nothing.cost)
     assert without.last is not ranking.last
-    # One that bends none takes along what paid beside it, and the search stands.
+    # A linear one takes along what paid beside it, and the search stands.
     simpler = ranking.less(stribeck)
     assert simpler.last is ranking.last
     assert names(simpler.reported) == ['time_delay']
