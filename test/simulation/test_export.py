@@ -325,7 +325,7 @@ def test_joints_of_the_urdf_put_the_platform_where_it_is(motion: Any) -> None:
     position = model.drive_forces(motion).mechanism.position
     for k in range(0, len(motion), 20):
         q = pinocchio.neutral(robot)
-        for name, value in zip(tree.names, tree.at(position[k]), strict=True):
+        for name, value in zip(tree.names, tree.at(position[k]).joints, strict=True):
             joint = robot.joints[robot.getJointId(name)]
             # Joints without limits are a cosine and a sine there.
             q[joint.idx_q:joint.idx_q + joint.nq] = (
@@ -335,3 +335,30 @@ def test_joints_of_the_urdf_put_the_platform_where_it_is(motion: Any) -> None:
         assert platform.translation == pytest.approx(motion.position[k], abs=1e-9)
         turn = pinocchio.Quaternion(platform.rotation).coeffs()
         assert abs(turn @ motion.orientation[k]) == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize('name', ['hexapod', 'delta'])
+def test_joints_and_free_bodies_of_the_urdf_meet_at_every_closure(name: str) -> None:
+    model = load_model(f'config/{name}.yaml')
+    assert isinstance(model, MechanismModel)
+    structure = model.robot.structure
+    tree = TreePositions(model)
+    robot = pinocchio.buildModelFromXML(text_of(model, URDF))
+    data = robot.createData()
+    home = structure.home[structure.tables.drives]
+    for shift in np.random.default_rng(3).uniform(-0.03, 0.03, (5, len(home))):
+        pose = tree.at(home + shift)
+        q = pinocchio.neutral(robot)
+        for joint_name, value in zip(tree.names, pose.joints, strict=True):
+            joint = robot.joints[robot.getJointId(joint_name)]
+            q[joint.idx_q:joint.idx_q + joint.nq] = (
+                [value] if joint.nq == 1 else [np.cos(value), np.sin(value)])
+        pinocchio.framesForwardKinematics(robot, data, q)
+        place = {frame.name: data.oMf[k] for k, frame in enumerate(robot.frames)}
+        # What robot_state_publisher leaves out is put where tf says that it is.
+        for link, told in zip(tree.bodies, pose.bodies, strict=True):
+            place[link] = place[tree.base] * pinocchio.XYZQUATToSE3(told)
+        assert structure.loops
+        for loop in structure.loops:
+            np.testing.assert_allclose(place[loop.a].act(loop.frame_a.p),
+                                       place[loop.b].act(loop.frame_b.p), atol=1e-9)
