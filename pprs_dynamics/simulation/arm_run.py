@@ -59,7 +59,7 @@ FASTEST, WIDEST = 0.35, 1.5  # of the top speed; from the middle of the range [r
 QUICKEST = 3.0  # [rad/s^2, m/s^2]
 SHIFT_OF_SLIDE = 0.1  # [m/rad], zero errors of a robot's legs over those of turning joints
 # Of an encoder's radius, beside its axis; and the step for derivatives [rad].
-ON_JOINT, ON_MOTOR = (0.01, 0.03), (0.05, 0.2)
+ON_JOINT, ON_MOTOR = (0.01, 0.03), (0.02, 0.08)
 ANGLE_STEP = 1e-3
 SHRINK, SHRINKS = 0.8, 20  # of a motion until its loops close throughout
 ENCODER = 2e-5  # [rad, m]

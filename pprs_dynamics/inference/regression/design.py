@@ -533,11 +533,8 @@ class Design:
             rate = np.gradient(planned, recording.time)
             found = np.stack((planned, rate, np.gradient(rate, recording.time)))
         else:
-            position = read.recorded.position[:, [drive]]
-            error = effect.position_error(name, position)
             found = np.zeros((3, len(recording.time)))
-            found[0] = error[0, 0] if len(error) else 0.0
-            if np.ptp(error):  # what is constant needs no smoothing
+            if np.any(effect.position_error(name, read.recorded.position[:, [drive]])):
                 found = np.concatenate(
                     misread([effect], name, read.recorded, read.read, drive), axis=1).T
         found[0] += effect.loaded_position_error(name, recording.transmitted[:, [drive]])[:, 0]

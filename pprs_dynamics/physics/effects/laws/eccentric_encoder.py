@@ -33,7 +33,8 @@ class EccentricEncoder(MeasurementEffect):
     # Of a joint that turns, or of a drive whose motor is known to turn so often.
     acts_in = frozenset({ARM})
     idealised: ClassVar[bool] = False
-    bends_columns: ClassVar[bool] = True
+    nonlinear: ClassVar[bool] = True
+    is_of_position: ClassVar[bool] = True
     linear = (
         Parameter('amplitude', 'A', 'm', 'of the wave', 0.0, 0.1, scale=1e-4, turning=(0.0, 0.5)),
         Parameter('phase', 'phi', 'rad', 'phase at position 0', -TURN, TURN, is_angle=True))
