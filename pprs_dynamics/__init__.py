@@ -58,21 +58,20 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
     from pprs_dynamics.physics.mechanism.motion import PlatformMotion
     from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
-    from pprs_dynamics.physics.model.arm_model import ArmModel
     from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel, ModelState
+    from pprs_dynamics.physics.model.mechanism_model import MechanismModel
     from pprs_dynamics.physics.model.model_file import build_model, load_model
 
-__all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'ArmModel', 'Array',
-           'Card', 'CatalogueEffect', 'ChangeResult', 'ComparisonResult',
-           'ConvergenceError', 'DiagnosisResult', 'DriveEffect', 'DriveForces', 'DriveModel',
-           'DriveRange', 'DriveSamples', 'EffectError', 'Excitation', 'ExperimentResult',
-           'FitResult', 'GainEffect', 'HelicalPath', 'JointMotion', 'LimitError',
-           'MeasurementEffect', 'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError',
-           'MotionLimits', 'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session',
-           'SimulationResult', 'SingularityError', 'StructureEffect', 'UnknownNameError',
-           'UnreadableFileError', 'WorkspaceError', 'adopt', 'adopt_all', 'build_model', 'changed',
-           'compare', 'diagnose', 'fit', 'load_model', 'next_experiment', 'read_recording',
-           'simulate', 'write_recording']
+__all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'Array', 'Card', 'CatalogueEffect',
+           'ChangeResult', 'ComparisonResult', 'ConvergenceError', 'DiagnosisResult',
+           'DriveEffect', 'DriveForces', 'DriveModel', 'DriveRange', 'DriveSamples', 'EffectError',
+           'Excitation', 'ExperimentResult', 'FitResult', 'GainEffect', 'HelicalPath',
+           'JointMotion', 'LimitError', 'MeasurementEffect', 'MechanismModel',
+           'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError', 'MotionLimits',
+           'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session', 'SimulationResult',
+           'SingularityError', 'StructureEffect', 'UnknownNameError', 'UnreadableFileError',
+           'WorkspaceError', 'adopt', 'adopt_all', 'build_model', 'changed', 'compare', 'diagnose',
+           'fit', 'load_model', 'next_experiment', 'read_recording', 'simulate', 'write_recording']
 __version__ = '0.1.0'
 
 # Loaded at first use: `pprs --help` and a node's refusal need neither numpy nor a model.
@@ -100,7 +99,7 @@ _HOMES = {
     'physics.mechanism.joint_motion': ('JointMotion',),
     'physics.mechanism.motion': ('PlatformMotion',),
     'physics.mechanism.paths': ('Excitation', 'HelicalPath'),
-    'physics.model.arm_model': ('ArmModel',),
+    'physics.model.mechanism_model': ('MechanismModel',),
     'physics.model.drive_model': ('DriveForces', 'DriveModel', 'ModelState'),
     'physics.model.model_file': ('build_model', 'load_model'),
 }

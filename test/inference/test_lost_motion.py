@@ -19,8 +19,8 @@ from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.lost_motion import LostMotion, behind_play
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.model_file import build_model
 
 SWING = 1  # the joint that carries weight
@@ -41,7 +41,7 @@ def recorded(model: ForceModel, position: Array, effort: Array, time: Array) -> 
     return Recording.from_arrays('run', time, position + grain, None, effort + noise, model.drives)
 
 
-def with_play(model: ArmModel, play: float, width: float = 0.05) -> Recording:
+def with_play(model: MechanismModel, play: float, width: float = 0.05) -> Recording:
     """Record a motor that crosses a play while the link turns over: faster than the link."""
     moved = made_up_arm.motion(20.0)
     position = moved.position.copy()
@@ -97,7 +97,7 @@ def test_a_model_with_the_play_leaves_the_noise(tmp_path: Path, size: float) -> 
     recording = with_play(model, size)
 
     def left(one: object) -> float:
-        assert isinstance(one, ArmModel)
+        assert isinstance(one, MechanismModel)
         found = reconstruct(one, recording)
         error = found.treat(found.effort) - treated_forces(one, found)['total']
         return float(error[:, SWING].std())
@@ -132,7 +132,7 @@ def test_what_it_is_taken_for_stays_what_it_is(tmp_path: Path, name: str,
     other = build_model({**model.values, 'effects.active': [name],
                          **{f'effects.{name}.swing.{key}': one for key, one in values.items()}},
                         model.source)
-    assert isinstance(other, ArmModel)
+    assert isinstance(other, MechanismModel)
     moved = made_up_arm.motion(20.0)
     forces = other.measured(other.drive_forces(moved)).total
     recording = recorded(model, moved.position + other.position_error(moved.position), forces,

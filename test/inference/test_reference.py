@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import pprs_dynamics as pprs
-from pprs_dynamics import ArmModel, JointMotion
+from pprs_dynamics import JointMotion, MechanismModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MisreadError, ModelError, UnreadableFileError
@@ -38,7 +38,8 @@ def healthy(moved: JointMotion) -> Array:
     return force
 
 
-def run(model: ArmModel, seed: int, noise: int, change: float = 0.0, day: float = 0.0) -> Recording:
+def run(model: MechanismModel, seed: int, noise: int, change: float = 0.0, day: float = 0.0,
+        ) -> Recording:
     """Return a recording of a motion, with Coulomb friction of `swing` otherwise.
 
     On another day what no effect explains differs by a share of itself, from place to place.
@@ -61,12 +62,14 @@ def variance(carried: CarriedOver, drive: int) -> Array:
 
 
 @pytest.fixture(scope='module')
-def machine(tmp_path_factory: pytest.TempPathFactory) -> tuple[ArmModel, Reference]:
+def machine(tmp_path_factory: pytest.TempPathFactory) -> tuple[MechanismModel, Reference]:
     model = arm.real_arm(tmp_path_factory.mktemp('arm'))
     return model, Reference.of(model, [run(model, 0, 1)])
 
 
-def test_what_was_in_the_reference_has_not_changed(machine: tuple[ArmModel, Reference]) -> None:
+def test_what_was_in_the_reference_has_not_changed(
+    machine: tuple[MechanismModel, Reference],
+) -> None:
     model, _ = machine
     again = run(model, 0, 2)
     found = pprs.diagnose(model, again, reference=run(model, 0, 1))
@@ -80,7 +83,7 @@ def test_what_was_in_the_reference_has_not_changed(machine: tuple[ArmModel, Refe
     assert max(found.diagnosis.noise_floors.values()) < 2 * NOISE
 
 
-def test_a_change_of_friction_is_told_alone(machine: tuple[ArmModel, Reference]) -> None:
+def test_a_change_of_friction_is_told_alone(machine: tuple[MechanismModel, Reference]) -> None:
     model, _ = machine
     found = pprs.diagnose(model, run(model, 0, 3, change=0.4), reference=run(model, 0, 1))
     assert [one.name for one in found.effects] == ['coulomb_friction']
@@ -91,7 +94,7 @@ def test_a_change_of_friction_is_told_alone(machine: tuple[ArmModel, Reference])
 
 @pytest.mark.parametrize(('path', 'day'), [(0, 0.0), (0, 0.05), (5, 0.0), (5, 0.05)])
 def test_what_is_carried_over_is_as_uncertain_as_it_is_wrong(
-        machine: tuple[ArmModel, Reference], path: int, day: float) -> None:
+        machine: tuple[MechanismModel, Reference], path: int, day: float) -> None:
     model, reference = machine
     design = Design.of(model, [run(model, path, 4, day=day)])
     carried = reference.carried_over(design)
@@ -104,13 +107,15 @@ def test_what_is_carried_over_is_as_uncertain_as_it_is_wrong(
 
 @pytest.mark.parametrize(('path', 'day'), [(0, 0.1), (5, 0.0)])
 def test_what_a_reference_leaves_open_is_no_change(
-        machine: tuple[ArmModel, Reference], path: int, day: float) -> None:
+        machine: tuple[MechanismModel, Reference], path: int, day: float) -> None:
     model, _ = machine
     found = pprs.diagnose(model, run(model, path, 5, day=day), reference=run(model, 0, 1))
     assert found.verdict == 'adequate'
 
 
-def test_two_runs_tell_how_far_the_machine_repeats(machine: tuple[ArmModel, Reference]) -> None:
+def test_two_runs_tell_how_far_the_machine_repeats(
+    machine: tuple[MechanismModel, Reference],
+) -> None:
     model, _ = machine
     first, same = run(model, 0, 1), run(model, 0, 2)
     moved = arm.motion(20.0, seed=0)
@@ -126,7 +131,7 @@ def test_two_runs_tell_how_far_the_machine_repeats(machine: tuple[ArmModel, Refe
 
 
 def test_a_drive_that_stood_in_the_reference_is_told_of_by_nothing(
-        machine: tuple[ArmModel, Reference]) -> None:
+        machine: tuple[MechanismModel, Reference]) -> None:
     model, _ = machine
     whole = run(model, 0, 1)
     effort = whole.effort.copy()
@@ -140,7 +145,9 @@ def test_a_drive_that_stood_in_the_reference_is_told_of_by_nothing(
     assert 0.8 < left[2] < 1.2
 
 
-def test_on_another_path_a_reference_does_no_harm(machine: tuple[ArmModel, Reference]) -> None:
+def test_on_another_path_a_reference_does_no_harm(
+    machine: tuple[MechanismModel, Reference],
+) -> None:
     model, reference = machine
     design = Design.of(model, [run(model, 5, 4)])
     before = design.residuals.error
@@ -150,7 +157,7 @@ def test_on_another_path_a_reference_does_no_harm(machine: tuple[ArmModel, Refer
 
 
 def test_far_from_its_states_a_reference_knows_less(
-        machine: tuple[ArmModel, Reference]) -> None:
+        machine: tuple[MechanismModel, Reference]) -> None:
     model, reference = machine
     near, far = (reference.carried_over(Design.of(model, [run(model, seed, 4)]))
                  for seed in (0, 5))
@@ -189,7 +196,7 @@ def test_a_fit_names_its_runs_and_a_diagnosis_takes_them(tmp_path: Path) -> None
 
 
 def test_a_model_file_that_keeps_the_residual_stands_alone(
-        machine: tuple[ArmModel, Reference], tmp_path: Path) -> None:
+        machine: tuple[MechanismModel, Reference], tmp_path: Path) -> None:
     model, reference = machine
     kept = build_model({**model.values, 'reference_residual': reference.residual}, model.source)
     path = tmp_path / 'kept.yaml'
@@ -201,7 +208,7 @@ def test_a_model_file_that_keeps_the_residual_stands_alone(
     assert np.all(np.nanstd(left, axis=0) < 0.35 * np.nanstd(error, axis=0))
 
 
-def test_what_is_no_reference_is_refused(machine: tuple[ArmModel, Reference]) -> None:
+def test_what_is_no_reference_is_refused(machine: tuple[MechanismModel, Reference]) -> None:
     model, _ = machine
     whole = run(model, 0, 1)
     with pytest.raises(ReferenceRunError, match='names no reference run'):
@@ -220,7 +227,7 @@ def test_what_is_no_reference_is_refused(machine: tuple[ArmModel, Reference]) ->
 
 
 def test_what_has_changed_is_added_since_the_reference(
-        machine: tuple[ArmModel, Reference], tmp_path: Path) -> None:
+        machine: tuple[MechanismModel, Reference], tmp_path: Path) -> None:
     model, _ = machine
     for name, one in (('free', run(model, 0, 1)), ('later', run(model, 0, 2, change=0.6)),
                       ('last', run(model, 0, 3, change=0.6))):
@@ -245,7 +252,7 @@ def test_what_has_changed_is_added_since_the_reference(
 
 
 def test_a_reference_in_other_signs_is_refused_as_a_recording_is(
-        machine: tuple[ArmModel, Reference], tmp_path: Path) -> None:
+        machine: tuple[MechanismModel, Reference], tmp_path: Path) -> None:
     model, _ = machine
     whole = run(model, 0, 1)
     write_recording(tmp_path / 'negated.csv', Recording.from_arrays(

@@ -59,18 +59,18 @@ class Axes:
     position: Any
     velocity: Any
     acceleration: Any
-    guide_load: Any
+    friction_load: Any
     drives: tuple[str, ...] = ('axis',)
 
     @property
     def channels(self):
         """A drive that is as warm as its load is high."""
-        return {'temperature': self.guide_load}
+        return {'temperature': self.friction_load}
 
     @property
     def transmitted(self):
         """As large as the load, and here of its sign."""
-        return self.guide_load
+        return self.friction_load
 
     @property
     def direction(self):
@@ -79,7 +79,7 @@ class Axes:
     def __getitem__(self, part):
         time = None if self.time is None else self.time[part]
         return Axes(time, *(x[part] for x in (self.position, self.velocity, self.acceleration,
-                                              self.guide_load)), self.drives)
+                                              self.friction_load)), self.drives)
 
 
 def excitation(duration=20.0, drives=('axis',)):
@@ -364,7 +364,7 @@ def test_effect_acts_in_its_drive_alone_and_by_that_drives_motion(effect):
     force = effect({'lift_1': values}).force(two)
     assert np.all(force[:, 0] == 0)
     alone = Axes(two.time, two.position[:, 1:], two.velocity[:, 1:], two.acceleration[:, 1:],
-                 two.guide_load[:, 1:])
+                 two.friction_load[:, 1:])
     assert_array_equal(force[:, 1:], effect({'axis': values}).force(alone))
     assert np.sqrt(np.mean(force[:, 1] ** 2)) > 1e-3
 

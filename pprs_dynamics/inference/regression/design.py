@@ -333,7 +333,7 @@ class Design:
     def load_variation(self, drive: int) -> float:
         """Return the standard deviation of a drive's load in motion over its mean."""
         width = TURNED * self.given.reversal.widths(len(self.drives))[drive]
-        load = np.concatenate([one.guide_load[np.abs(one.velocity[:, drive]) > width, drive]
+        load = np.concatenate([one.friction_load[np.abs(one.velocity[:, drive]) > width, drive]
                                for one in self.recordings])
         return float(load.std() / load.mean()) if len(load) and load.mean() else 0.0
 
@@ -351,7 +351,7 @@ class Design:
                           float(np.ptp(position)), float(np.abs(velocity).max()),
                           self.given.gear_ratios[drive], _delay(longest, drive),
                           self.given.units[drive].turns,
-                          any(np.any(one.guide_load[:, drive]) for one in self.recordings),
+                          any(np.any(one.friction_load[:, drive]) for one in self.recordings),
                           self._channels(drive))
 
     def _channels(self, drive: int) -> dict[str, tuple[float, float]]:
@@ -524,7 +524,7 @@ class Design:
         if friction is not None and np.any(q_dot):
             width = float(self.model.reversal.widths(len(self.drives))[drive])
             turned = smooth_sign(v - q_dot, width) - recording.direction[:, drive]
-            own = (friction.dry(recording.guide_load)[:, drive] * turned
+            own = (friction.dry(recording.friction_load)[:, drive] * turned
                    - np.broadcast_to(friction.viscous, len(self.drives))[drive] * q_dot)
         return np.stack((q, q_ddot, own))
 

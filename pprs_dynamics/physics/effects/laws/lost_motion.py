@@ -41,7 +41,7 @@ class LostMotion(MeasurementEffect):
     name: ClassVar[str] = 'lost_motion'
     acts_in = frozenset({PLATFORM, ARM})
     idealised: ClassVar[bool] = False
-    bends_columns: ClassVar[bool] = True
+    nonlinear: ClassVar[bool] = True
     linear = (
         Parameter('backlash', 'b', 'm', 'distance between the flanks, of which the load chooses '
                   'one', -0.1, 0.1, 0.0, 5e-4, expected=USUAL, turning=(-0.5, 0.5)),
