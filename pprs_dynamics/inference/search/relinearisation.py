@@ -91,7 +91,7 @@ def search_around_fitted(first: Search, report: Callable[[float], None],
     exact costs, which do not depend on where a search was, decide between sets.
     """
     search, exact_sets, reached = first, dict[Claims, ExactSet](), None
-    search.run()
+    search.run(until_nonlinear=True)
     for number in range(MOST_SEARCHES):
         for listed in _shortlist(search.fits, first.fits.decisions.rival_margin):
             known = exact_sets.get(listed.claims)
@@ -136,10 +136,10 @@ def _shortlist(fits: FittedSets, margin: float) -> list[CandidateSet]:
 
 
 def _is_where(search: Search, best: ExactSet) -> bool:
-    """Return whether a search was around the model of a set, as nearly as matters."""
+    """Return whether a search was to its end around the model of a set, as nearly as matters."""
     there = search.fits.evaluate(best.found.candidates)
-    return abs(there.total - best.found.total) < LEAST_CHANGE and _has_nonlinear(
-        search.fits.design.point, best.effects)
+    return (search.is_ended and abs(there.total - best.found.total) < LEAST_CHANGE
+            and _has_nonlinear(search.fits.design.point, best.effects))
 
 
 def _share_of(report: Callable[[float], None], start: float, width: float,

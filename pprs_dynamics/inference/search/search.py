@@ -58,26 +58,30 @@ class Search:
                  progress: Callable[[float], None] | None = None) -> None:
         self.fits, self.patterns = fits, tuple(patterns)
         self.refuted, self.scan = refuted, Scan(fits, refuted)
-        self._report, self._steps = progress or (lambda share: None), 0
+        self._report, self._steps, self.is_ended = progress or (lambda share: None), 0, False
 
     @property
     def best(self) -> CandidateSet:
         """The set of lowest cost so far."""
         return self.fits.best
 
-    def run(self, start: Candidates = ()) -> CandidateSet:
+    def run(self, start: Candidates = (), until_nonlinear: bool = False) -> CandidateSet:
         """Return the best set that the search reaches, by effects alone at first.
 
-        A pattern of no catalogue stands only beside what effects explain.
+        A pattern of no catalogue stands only beside what effects explain. `until_nonlinear`: where
+        a nonlinear effect joins the search ends before its end, since what would come next might
+        only make good that columns do not show it.
         """
-        self.fits.stepped = self._stepped
+        self.fits.stepped, self.is_ended = self._stepped, False
         try:
             self.fits.evaluate(())
             if start:
                 self.rescanned(self.fits.evaluate(start))
-            self._descend(with_patterns=False)
-            if self.patterns:
-                self._descend(with_patterns=True)
+            self._descend(False, until_nonlinear)
+            if not until_nonlinear or not self.best.is_nonlinear:
+                if self.patterns:
+                    self._descend(True, False)
+                self.is_ended = True
             return self.best
         finally:
             # The fits hold hundreds of megabytes, and are let go of where nothing names them.
@@ -95,7 +99,7 @@ class Search:
         self._steps += 1
         self._report(self._steps / (self._steps + USUAL_STEPS))
 
-    def _descend(self, with_patterns: bool) -> None:
+    def _descend(self, with_patterns: bool, until_nonlinear: bool) -> None:
         """Move from the best set to better neighbours until there is none."""
         while True:
             before = self.best.cost
@@ -103,7 +107,8 @@ class Search:
             if self.best.cost > before - LEAST_IMPROVEMENT:
                 self._fit(self._replacements(self.best))
             simplified(self.fits, self.best)
-            if self.best.cost > before - LEAST_IMPROVEMENT:
+            if (self.best.cost > before - LEAST_IMPROVEMENT
+                    or (until_nonlinear and self.best.is_nonlinear)):
                 return
 
     # Moves
