@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -219,6 +219,8 @@ class MeasurementEffect(DriveEffect):
     """Systematic error of a drive's sensors. It never enters a command."""
 
     is_measurement = True
+    # Whether its errors of positions are smooth functions of the position alone.
+    is_of_position: ClassVar[bool] = False
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
