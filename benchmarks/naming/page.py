@@ -147,7 +147,7 @@ def better_than_ours(scored: Mapping[str, Scored]) -> str:
              if sort_of(name) == PEER}
     rates = {name: tuple(all_figures(pair[one]) for one in (name, ours))
              for name, pair in pairs.items()}
-    for figure in MAIN:
+    for figure in mine:
         sign = -1 if figure in LESS_IS_BETTER else 1
         ahead = [f'{name} ({_cell(its[figure])})' for name, (its, own) in rates.items()
                  if its[figure].count and sign * (its[figure].share - own[figure].share) > 0]
