@@ -31,7 +31,7 @@ from pprs_dynamics.arrays import Array
 
 CONFIG = Path(__file__).parents[2] / 'config' / 'ros2_control'
 LATCHED = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-PATIENCE = 30.0  # [s] for a controller manager on a busy machine
+PATIENCE = 90.0  # [s] for a node that compiles its equations on a busy machine
 WARN = 30  # of rcl_interfaces/Log
 STRICT = 2  # of controller_manager_msgs/SwitchController: all of it or nothing
 MOCK = {'plugin': 'mock_components/GenericSystem'}
