@@ -326,9 +326,8 @@ class Rows:
         return np.ones(1)
 
     @staticmethod
-    def products(first: Any, second: Any, d: int) -> np.ndarray:
-        product: np.ndarray = (first.rows[d] @ second.rows[d].T)[None]
-        return product
+    def products(first: Any, others: Any, d: int) -> list[np.ndarray]:
+        return [(first.rows[d] @ one.rows[d].T)[None] for one in others]
 
     @staticmethod
     def whitened(_: Any, d: int, force: np.ndarray) -> np.ndarray:
