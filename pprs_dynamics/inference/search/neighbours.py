@@ -37,9 +37,10 @@ def simplified(fits: FittedSets, found: CandidateSet) -> CandidateSet:
 def of_same_claims(fits: FittedSets, found: CandidateSet) -> CandidateSet:
     """Return the set of least cost that claims the same: on other drives, in other variants.
 
-    Where it is barred, also without its patterns of no catalogue: around their own model its effects
-    may explain what these stood for. A pattern that may be there is not dropped here, where no other
-    may join for it: a bump came out as ripple at one scale of a robot and as none at another.
+    Where it is barred, also without its patterns of no catalogue: around their own model its
+    effects may explain what these stood for. A pattern that may be there is not dropped here,
+    where no other may join for it: a bump came out as ripple at one scale of a robot and as none
+    at another.
     """
     return _descended(fits, found, lambda one: [
         *_otherwise(fits, one), *_on_more_drives(fits, one),
