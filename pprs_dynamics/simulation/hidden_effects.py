@@ -26,7 +26,7 @@ IN_CATALOGUE: dict[str, type[HiddenEffect]] = {effect.name: effect for effect in
     hidden_forces.Hysteresis, hidden_forces.FrictionDrift, hidden_forces.FrictionTemperature,
     hidden_forces.effort_offset, sensors.EffortGain, sensors.HomingError,
     sensors.LostMotion,
-    hidden_forces.drive_spring, hidden_forces.force_ripple, hidden_bodies.DriveInertia,
+    hidden_forces.drive_spring, hidden_forces.stop_contact, hidden_forces.force_ripple, hidden_bodies.DriveInertia,
     sensors.TimeDelay, sensors.EffortFilter, hidden_forces.JointFriction,
     hidden_forces.joint_spring,
     hidden_bodies.payload_mass, hidden_bodies.payload_offset, hidden_bodies.platform_inertia,

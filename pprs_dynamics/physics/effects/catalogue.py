@@ -29,6 +29,7 @@ from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
 from pprs_dynamics.physics.effects.laws.effort_filter import EffortFilter
 from pprs_dynamics.physics.effects.laws.effort_gain import EffortGain
 from pprs_dynamics.physics.effects.laws.effort_offset import EffortOffset
+from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint
 from pprs_dynamics.physics.effects.laws.external_wrench import ExternalWrench
 from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
 from pprs_dynamics.physics.effects.laws.friction_drift import FrictionDrift
@@ -46,6 +47,7 @@ from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.effects.laws.payload_offset import PayloadOffset
 from pprs_dynamics.physics.effects.laws.platform_inertia import PlatformInertia
 from pprs_dynamics.physics.effects.laws.quadratic_friction import QuadraticFriction
+from pprs_dynamics.physics.effects.laws.stop_contact import StopContact
 from pprs_dynamics.physics.effects.laws.stribeck_friction import StribeckFriction
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
 from pprs_dynamics.physics.effects.laws.tool_drag import ToolDrag
@@ -74,6 +76,7 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         EffortFilter,
         EffortGain,
         EffortOffset,
+        ElasticJoint,
         ExternalWrench,
         ForceRipple,
         FrictionDrift,
@@ -90,6 +93,7 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         PayloadOffset,
         PlatformInertia,
         QuadraticFriction,
+        StopContact,
         StribeckFriction,
         TimeDelay,
         ToolDrag,

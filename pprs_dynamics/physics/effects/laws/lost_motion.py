@@ -42,6 +42,7 @@ class LostMotion(MeasurementEffect):
     acts_in = frozenset({PLATFORM, ARM})
     idealised: ClassVar[bool] = False
     bends_columns: ClassVar[bool] = True
+    bent: ClassVar[tuple[str, ...]] = ('play',)
     linear = (
         Parameter('backlash', 'b', 'm', 'distance between the flanks, of which the load chooses '
                   'one', -0.1, 0.1, 0.0, 5e-4, expected=USUAL, turning=(-0.5, 0.5)),

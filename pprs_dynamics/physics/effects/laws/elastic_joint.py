@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A joint that winds up between two encoders: the motor's leads the link's by w, k w + d w' = tau.
+
+Positions are those before the gear. What the link's own encoder says is what the link does; its
+wind-up tells the load as well, k w + d w', with k and d as they explain what gear or screw pass
+on. Friction is the motor's, whose speed is as read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.effects.drive_effect import DriveRange, MeasurementEffect
+from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.laws.lost_motion import SOFT
+
+LINK_POSITION = 'link_position'
+
+
+class ElasticJoint(MeasurementEffect):
+    """Gear, shaft or belt that winds up under load, seen by an encoder on either side."""
+
+    name: ClassVar[str] = 'elastic_joint'
+    acts_in = frozenset({PLATFORM, ARM})
+    bends_columns: ClassVar[bool] = True
+    linear = (
+        Parameter('compliance', '1/k', 'm/N', 'by which the motor leads the link per load', -1.0,
+                  1.0, scale=1e-6, expected=SOFT, turning=(-10.0, 10.0)),
+        Parameter('loss', 'd/k', 's', 'loss over stiffness: by which wind-up is behind its load',
+                  -10.0, 10.0, 0.0, scale=0.01, expected=(0.03, 0.03)))
+    unphysical_below: ClassVar[Mapping[str, float]] = {'compliance': 0.0, 'loss': 0.0}
+    card = Card(
+        'motor position = q + w, k w + d w_dot = tau',
+        'weight and inertia as of a drive that stands aside, the more the more it carries, and '
+        'shakes after jerks; the difference of the two encoders follows the load',
+        'the flexspline of a harmonic drive, a belt, a long shaft or screw; more than before: a '
+        'crack, a loose clamp, a worn belt',
+        'lock the motor, load the link by known weights, and read its own encoder: slope and width '
+        'of the loop are 1/k and the loss; without one a dial gauge does',
+        'Spong, Modeling and control of elastic joint robots, ASME J. Dynamic Systems, '
+        'Measurement, and Control 109, 1987')
+
+    @classmethod
+    def may_show(cls, covered: DriveRange) -> bool:
+        """Return whether there is a second encoder that moves."""
+        lowest, highest = covered.channels.get(LINK_POSITION, (0.0, 0.0))
+        return highest > lowest
+
+    def loaded_position_error(self, drives: Sequence[str], transmitted: Array) -> Array:
+        """Return how far encoders are ahead because of loads, (N, D) [m, rad]."""
+        softness = [self.drives.get(name, {}).get('compliance', 0.0) for name in drives]
+        return transmitted * np.array(softness)
+
+    def windup_error(self, drives: Sequence[str], transmitted: Array, windup: Array) -> Array:
+        """Return what the second encoder says otherwise than loads, of positions and rates."""
+        error = np.zeros_like(windup)
+        for name, values in self.drives.items():
+            k = drives.index(name) if name in drives else -1
+            if k < 0 or not np.any(w := windup[:, :, k]):
+                continue
+            load = transmitted[:, k]
+            stiffness, damping, constant = np.linalg.lstsq(
+                np.stack((w[0], w[1], np.ones_like(load)), axis=1), load, rcond=None)[0]
+            said = stiffness * w[0] + damping * w[1] + constant
+            error[0, :, k] = values['compliance'] * (said - load) - values['loss'] * w[1]
+            error[2, :, k] = values['compliance'] * stiffness * w[2]
+        return error
