@@ -26,12 +26,12 @@ import matplotlib
 import numpy as np
 from recorded_data import need_data
 
-from pprs_dynamics import ArmModel
+from pprs_dynamics import MechanismModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import read_recording
 from pprs_dynamics.physics.mechanism.description import body_at
-from pprs_dynamics.physics.model.arm_model import inertial_values
+from pprs_dynamics.physics.model.mechanism_model import inertial_values
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model
 
@@ -110,7 +110,7 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return '\n'.join(f'| {line} |' for line in lines)
 
 
-def without(bench: Bench, base: ArmModel, kind: str, joint: int) -> dict[str, Any]:
+def without(bench: Bench, base: MechanismModel, kind: str, joint: int) -> dict[str, Any]:
     """Return the diagnosis of the base model with one number of friction set to 0."""
     name = f'zero_{kind}_{joint}'
     values = dict(base.values)
@@ -121,7 +121,7 @@ def without(bench: Bench, base: ArmModel, kind: str, joint: int) -> dict[str, An
     return bench.run(name, 'diagnose', file(HELD_OUT), '--model', f'{name}.yaml')
 
 
-def with_hand(base: ArmModel) -> dict[str, Any]:
+def with_hand(base: MechanismModel) -> dict[str, Any]:
     """Return the values of the base model with a hand on its tool."""
     hand = body_at(HAND, (0.0, 0.02, 0.045), np.diag([1e-3, 1e-3, 4e-4]))
     inertial = base.robot.with_body('tool0', hand).inertial
@@ -129,7 +129,7 @@ def with_hand(base: ArmModel) -> dict[str, Any]:
                               inertial_values(inertial).items()}}
 
 
-def zero_rows(bench: Bench, base: ArmModel) -> tuple[list[list[str]], int, int]:
+def zero_rows(bench: Bench, base: MechanismModel) -> tuple[list[list[str]], int, int]:
     """Return what was named where one number of friction was 0, how often rightly, and first.
 
     Rightly: first, with a value within 15 %. First: on that joint, with any value.
@@ -256,7 +256,7 @@ def tell(bench: Bench) -> dict[str, str]:
               'loaded.yaml')
     free = bench.run('free', 'diagnose', file(HELD_OUT), '--model', 'base.yaml')
     base = load_model(bench.folder / 'base.yaml')
-    assert isinstance(base, ArmModel)
+    assert isinstance(base, MechanismModel)
     if (bench.folder / 'loaded.yaml').exists():
         pictures(bench)
     write_model(bench.folder / 'hand.yaml', with_hand(base), bench.folder / 'base.yaml')

@@ -24,7 +24,7 @@ import made_up_arm
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pprs_dynamics import ArmModel, DriveModel, PlatformMotion
+from pprs_dynamics import DriveModel, MechanismModel, PlatformMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -121,7 +121,7 @@ def arm_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, 
             'friction.motors.wrist.turn': 1.0, 'friction.motors.wrist.swing': 1.0})
         motion = made_up_arm.motion(SECONDS, RATE, seed=3)
         changed = build_model({**model.values, **block(effect, 'swing')}, model.source)
-    assert isinstance(changed, ArmModel)
+    assert isinstance(changed, MechanismModel)
     plain = model.drive_forces(motion)
     added = changed.drive_forces(motion).total - plain.total
     joint = int(np.argmax((added ** 2).sum(axis=0)))

@@ -16,7 +16,7 @@ import time
 
 import numpy as np
 
-from pprs_dynamics import ArmModel, JointMotion, PlatformMotion, load_model
+from pprs_dynamics import JointMotion, MechanismModel, PlatformMotion, load_model
 from pprs_dynamics.physics.model.model_file import Model
 
 SWING, TURN = 0.02, np.pi  # [rad, m], [rad/s]
@@ -28,11 +28,11 @@ def one_sample(model: Model, t: float) -> JointMotion | PlatformMotion:
 
     In a loop of your own these are your trajectory's next setpoint.
     """
-    shape = (1, len(model.drives) if isinstance(model, ArmModel) else 3)
+    shape = (1, len(model.drives) if isinstance(model, MechanismModel) else 3)
     q, v, a = (np.full(shape, SWING * value) for value in (
         np.sin(TURN * t), TURN * np.cos(TURN * t), -TURN**2 * np.sin(TURN * t)))
     stamp = np.array([t])  # what effects with a memory count from
-    if isinstance(model, ArmModel):
+    if isinstance(model, MechanismModel):
         structure = model.robot.structure
         home = structure.home[structure.tables.drives]
         return JointMotion(home + q, v, a, time=stamp)

@@ -19,7 +19,7 @@ from emps import IDENTIFICATION, PULSES, read_emps
 from recorded_data import need_data
 from scipy.signal import butter, decimate, filtfilt
 
-from pprs_dynamics import ArmModel, JointMotion, PprsError
+from pprs_dynamics import JointMotion, MechanismModel, PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun, adopt_all
@@ -48,7 +48,7 @@ def published_motion(recording: Recording) -> JointMotion:
     q = filtfilt(*butter(ORDER, CUT_OFF * 2 * step), recording.position[:, 0])
     q_dot = np.gradient(q, step)
     return JointMotion(q[:, None], q_dot[:, None], np.gradient(q_dot, step)[:, None],
-                      recording.time)
+                       recording.time)
 
 
 def thinned(values: np.ndarray) -> np.ndarray:
@@ -103,7 +103,7 @@ class Story:
 
     run: Recording
     pulses: Recording
-    model: ArmModel
+    model: MechanismModel
     diagnosis: Diagnosis
     asymmetric: Adoption
     ripple: Adoption | None
@@ -113,7 +113,7 @@ class Story:
 
 def tell(run: Recording, pulses: Recording, report: Callable[[str], None]) -> Story:
     """Run everything; the pulses run gates the second loop and the ripple, and nothing else."""
-    model = ArmModel.load('config/single_axis.yaml')
+    model = MechanismModel.load('config/single_axis.yaml')
     report('diagnosing')
     diagnosis = diagnose(model, [run])
     report('adopting asymmetric_friction')

@@ -28,28 +28,33 @@ def generate_launch_description() -> LaunchDescription:
         'repeat': ('0', 'how often the path is played; 0: until stopped'),
         'hidden_effects': ('[]', 'effects that the simulated robot has and the model lacks'),
         'diagnose_every': ('0.0', 'seconds between diagnoses of the stream; 0: never'),
+        'use_sim_time': ('false', 'the clock is that of /clock'),
+        'parameters': ('', 'further file of parameters, e.g. QoS overrides, with a path; empty: '
+                       'none'),
     }
     given = {name: LaunchConfiguration(name) for name in arguments}
-    common = {'package': 'pprs_dynamics', 'namespace': given['namespace'], 'output': 'screen'}
 
-    def check(context: LaunchContext) -> None:
+    def nodes(context: LaunchContext) -> list[Node]:
         # Launch would leave a missing file out, and say so in a line among many.
-        require_file(given['model'].perform(context))
+        files = [text for name in ('model', 'parameters') if (text := given[name].perform(context))]
+        for file in files:
+            require_file(file)
+        common = {'package': 'pprs_dynamics', 'namespace': given['namespace'], 'output': 'screen'}
+        parameters = [*files, {'use_sim_time': given['use_sim_time']}]
+        return [
+            Node(executable='simulated_robot', parameters=[*parameters, {
+                'hidden_effects': ParameterValue(given['hidden_effects'], value_type=list[str])}],
+                 **common),
+            Node(executable='feedforward', parameters=parameters,
+                 remappings=[('~/joint_command', 'simulated_robot/joint_command')], **common),
+            Node(executable='monitor', parameters=[*parameters, {
+                'diagnose_every': ParameterValue(given['diagnose_every'], value_type=float)}],
+                 **common),
+            Node(executable='play_trajectory', parameters=[*parameters, {
+                'rate': ParameterValue(given['rate'], value_type=float),
+                'repeat': ParameterValue(given['repeat'], value_type=int),
+                'source': 'excitation', 'lead_in': 2.0, 'ahead': 0.05}], **common)]
 
     return LaunchDescription([
         *(DeclareLaunchArgument(name, default_value=value, description=text)
-          for name, (value, text) in arguments.items()),
-        OpaqueFunction(function=check),
-        Node(executable='simulated_robot', parameters=[given['model'], {
-            'hidden_effects': ParameterValue(given['hidden_effects'], value_type=list[str])}],
-             **common),
-        Node(executable='feedforward', parameters=[given['model']],
-             remappings=[('~/joint_command', 'simulated_robot/joint_command')], **common),
-        Node(executable='monitor', parameters=[given['model'], {
-            'diagnose_every': ParameterValue(given['diagnose_every'], value_type=float)}],
-             **common),
-        Node(executable='play_trajectory', parameters=[given['model'], {
-            'rate': ParameterValue(given['rate'], value_type=float),
-            'repeat': ParameterValue(given['repeat'], value_type=int),
-            'source': 'excitation', 'lead_in': 2.0, 'ahead': 0.05}], **common),
-    ])
+          for name, (value, text) in arguments.items()), OpaqueFunction(function=nodes)])

@@ -22,19 +22,25 @@ def generate_launch_description() -> LaunchDescription:
     arguments = {
         'model': (None, 'model file of the robot that is connected, with a path'),
         'joint_states': ('joint_states', 'topic of the measurements'),
+        'namespace': ('', 'of the nodes'),
         'prefix': ('', 'of the joints: joint_states says PREFIXslide_1; empty: joint_prefix of '
                    'the model file'),
+        'use_sim_time': ('false', 'the clock is that of /clock'),
+        'parameters': ('', 'further file of parameters, e.g. QoS overrides, with a path; empty: '
+                       'none'),
     }
     given = {name: LaunchConfiguration(name) for name in ('urdf', *arguments)}
 
     def monitor(context: LaunchContext) -> list[Node]:
         # Launch would leave a missing file out, and say so in a line among many.
-        require_file(given['model'].perform(context))
-        own = {}
+        files = [text for name in ('model', 'parameters') if (text := given[name].perform(context))]
+        for file in files:
+            require_file(file)
+        own = {'use_sim_time': given['use_sim_time']}
         if given['prefix'].perform(context):
             own['joint_prefix'] = ParameterValue(given['prefix'], value_type=str)
         return [Node(package='pprs_dynamics', executable='monitor', output='screen',
-                     parameters=[given['model'], own],
+                     namespace=given['namespace'], parameters=[*files, own],
                      remappings=[('joint_states', given['joint_states'])])]
 
     actions = [
@@ -46,11 +52,12 @@ def generate_launch_description() -> LaunchDescription:
         get_package_prefix('robot_state_publisher')
     except PackageNotFoundError:
         actions.append(LogInfo(msg='robot_state_publisher is not installed: no tf; the joints are '
-                               'on /monitor/joint_states_full'))
+                               'on monitor/joint_states_full'))
     else:
         description = ParameterValue(Command(['cat "', given['urdf'], '"']), value_type=str)
         actions.append(Node(
             package='robot_state_publisher', executable='robot_state_publisher', output='screen',
-            parameters=[{'robot_description': description}],
-            remappings=[('joint_states', '/monitor/joint_states_full')]))
+            namespace=given['namespace'], parameters=[{
+                'robot_description': description, 'use_sim_time': given['use_sim_time']}],
+            remappings=[('joint_states', 'monitor/joint_states_full')]))
     return LaunchDescription(actions)

@@ -30,16 +30,20 @@ def generate_launch_description() -> LaunchDescription:
         'monitor': ('true', 'compare joint_states with the model, too'),
         'joint_states': ('joint_states', 'topic of the measurements'),
         'use_sim_time': ('false', 'the clock is that of /clock'),
+        'parameters': ('', 'further file of parameters, e.g. QoS overrides, with a path; empty: '
+                       'none'),
     }
     given = {name: LaunchConfiguration(name) for name in arguments}
 
     def nodes(context: LaunchContext) -> list[Node]:
         # Launch would leave a missing file out, and say so in a line among many.
-        require_file(given['model'].perform(context))
+        files = [text for name in ('model', 'parameters') if (text := given[name].perform(context))]
+        for file in files:
+            require_file(file)
         own = {'use_sim_time': given['use_sim_time']}
         if given['prefix'].perform(context):
             own['joint_prefix'] = ParameterValue(given['prefix'], value_type=str)
-        parameters = [given['model'], own]
+        parameters = [*files, own]
         return [
             Node(package='pprs_dynamics', executable='feedforward', namespace=given['namespace'],
                  parameters=[*parameters, {

@@ -26,19 +26,23 @@ def generate_launch_description() -> LaunchDescription:
         'diagnose_every': ('', 'seconds between diagnoses of the stream, 0: never; empty: as in '
                            'the model file'),
         'use_sim_time': ('false', 'the clock is that of /clock'),
+        'parameters': ('', 'further file of parameters, e.g. QoS overrides, with a path; empty: '
+                       'none'),
     }
     given = {name: LaunchConfiguration(name) for name in arguments}
 
     def nodes(context: LaunchContext) -> list[Node]:
         # Launch would leave a missing file out, and say so in a line among many.
-        require_file(given['model'].perform(context))
+        files = [text for name in ('model', 'parameters') if (text := given[name].perform(context))]
+        for file in files:
+            require_file(file)
         own = {'use_sim_time': given['use_sim_time']}
         if given['prefix'].perform(context):
             own['joint_prefix'] = ParameterValue(given['prefix'], value_type=str)
         if given['diagnose_every'].perform(context):
             own['diagnose_every'] = ParameterValue(given['diagnose_every'], value_type=float)
         return [Node(package='pprs_dynamics', executable='monitor', namespace=given['namespace'],
-                     parameters=[given['model'], own], output='screen',
+                     parameters=[*files, own], output='screen',
                      remappings=[('joint_states', given['joint_states'])])]
 
     return LaunchDescription([

@@ -58,11 +58,11 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
     from pprs_dynamics.physics.mechanism.motion import PlatformMotion
     from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
-    from pprs_dynamics.physics.model.arm_model import ArmModel
     from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel, ModelState
+    from pprs_dynamics.physics.model.mechanism_model import MechanismModel
     from pprs_dynamics.physics.model.model_file import build_model, load_model
 
-__all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'ArmModel', 'Array',
+__all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'MechanismModel', 'Array',
            'Card', 'CatalogueEffect', 'ChangeResult', 'ComparisonResult',
            'ConvergenceError', 'DiagnosisResult', 'DriveEffect', 'DriveForces', 'DriveModel',
            'DriveRange', 'DriveSamples', 'EffectError', 'Excitation', 'ExperimentResult',
@@ -100,7 +100,7 @@ _HOMES = {
     'physics.mechanism.joint_motion': ('JointMotion',),
     'physics.mechanism.motion': ('PlatformMotion',),
     'physics.mechanism.paths': ('Excitation', 'HelicalPath'),
-    'physics.model.arm_model': ('ArmModel',),
+    'physics.model.mechanism_model': ('MechanismModel',),
     'physics.model.drive_model': ('DriveForces', 'DriveModel', 'ModelState'),
     'physics.model.model_file': ('build_model', 'load_model'),
 }

@@ -16,7 +16,7 @@ COUNT = len(DRIVES)
 
 # Units of a drive that pushes, and of the same quantity of one that turns.
 TURNED = {'m': 'rad', 'm/s': 'rad/s', 'm/s^2': 'rad/s^2', 'N': 'N m', 'kg': 'kg m^2',
-          'N s/m': 'N m s/rad', 'N s^2/m^2': 'N m s^2/rad^2', 'N/m': 'N m/rad',
+          'N s/m': 'N m s/rad', 'N s^2/m^2': 'N m s^2/rad^2', 'N/m': 'N m/rad', 'm/N': 'rad/(N m)',
           'N/K': 'N m/K', 'N s/m/K': 'N m s/rad/K'}
 
 

@@ -34,8 +34,8 @@ from pprs_dynamics.measurement.files.recording import (
     read_recording,
     write_recording,
 )
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import format_model
 from pprs_dynamics.simulation.arm_run import simulate_arm
@@ -179,7 +179,7 @@ def _of_platform(draw: Draw) -> tuple[ForceModel, Recording, Truth]:
 
 def _of_arm(draw: Draw) -> tuple[ForceModel, Recording, Truth]:
     model = load_model(model_of(draw.robot))
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     motion_seed = draw.seed % 1_000_000
     plain = simulate_arm(model, (), draw.seed, noise=0.0, duration=DURATION, path_seed=motion_seed)
     run = simulate_arm(model, draw.names, draw.seed, noise=0.0, duration=DURATION,

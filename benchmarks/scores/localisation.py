@@ -51,7 +51,7 @@ def record_motion(seed: int) -> Residuals:
     rod_angle = state.chains.rod_angle
     variables = {
         'position': state.position, 'velocity': state.velocity,
-        'acceleration': state.acceleration, 'load': state.guide_load,
+        'acceleration': state.acceleration, 'load': state.friction_load,
         'rod_angle': np.concatenate((rod_angle, rod_angle), axis=1),
         **{f'platform_{axis}': motion.position[:, k] for k, axis in enumerate('xyz')},
         'platform_tilt': np.arccos(np.clip(rotation[:, 2, 2], -1, 1)),

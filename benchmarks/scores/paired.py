@@ -1,9 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Two versions of the diagnosis on the same small recordings: what became better, and what worse.
+r"""Two versions of the diagnosis on the same small recordings: what became better, and what worse.
 
     python -m benchmarks.scores.paired FOLDER --make --seed 41 --count 60
+    python -m benchmarks.scores.paired FOLDER --make --seed 71 --count 120 --single \
+        --robots 3-PPRS hexapod delta arm
     python -m benchmarks.scores.paired FOLDER --answers old.jsonl      # PYTHONPATH: the old version
     python -m benchmarks.scores.paired FOLDER --answers new.jsonl      # and the new one
     python -m benchmarks.scores.paired FOLDER --beside old.jsonl new.jsonl
@@ -19,7 +21,7 @@ import json
 import sys
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,11 +40,12 @@ KINDS = ('two', 'form', 'single', 'three', 'unknown', 'two', 'nothing', 'form', 
 ROBOTS = ('3-PPRS', 'arm', 'axis')
 
 
-def draws(seed: int, count: int) -> Iterator[Draw]:
+def draws(seed: int, count: int, kinds: Sequence[str] = KINDS,
+          robots: Sequence[str] = ROBOTS) -> Iterator[Draw]:
     """Yield problems of a seed, kinds and robots in turn."""
     rng = np.random.default_rng((seed, zlib.crc32(b'paired')))
     for k in range(count):
-        kind, robot = KINDS[k % len(KINDS)], ROBOTS[(k + k // len(KINDS)) % len(ROBOTS)]
+        kind, robot = kinds[k % len(kinds)], robots[(k + k // len(kinds)) % len(robots)]
         names = sorted(set(hidden_names(robot)) & set(CAN_BE_OFF) if kind == 'form'
                        else hidden_names(robot))
         size = {'nothing': 0, 'unknown': 0, 'two': 2, 'three': 3}.get(kind, 1)
@@ -55,9 +58,9 @@ def draws(seed: int, count: int) -> Iterator[Draw]:
                    str(rng.choice(NOISES)), int(rng.integers(2 ** 31)))
 
 
-def make(folder: Path, seed: int, count: int) -> None:
+def make(folder: Path, seed: int, found: Iterable[Draw]) -> None:
     """Write the recordings, models and truths that a folder does not have."""
-    for number, draw in enumerate(draws(seed, count)):
+    for number, draw in enumerate(found):
         target = folder / f'{seed}_{number:03d}'
         if not (target / 'truth.json').exists():
             truth = write_problem(draw, target, SECONDS)
@@ -127,12 +130,16 @@ def main() -> int:
     parser.add_argument('--make', action='store_true', help='write them')
     parser.add_argument('--seed', type=int, default=0)
     parser.add_argument('--count', type=int, default=60)
+    parser.add_argument('--single', action='store_true', help='one effect in each')
+    parser.add_argument('--robots', nargs='+', default=ROBOTS)
     parser.add_argument('--answers', type=Path, metavar='FILE', help='append answers to FILE')
     parser.add_argument('--most', type=int, default=10 ** 6, help='problems to answer in this run')
     parser.add_argument('--beside', type=Path, nargs=2, metavar=('OLD', 'NEW'))
     options = parser.parse_args()
     if options.make:
-        make(options.folder, options.seed, options.count)
+        kinds = ('single',) * len(KINDS) if options.single else KINDS
+        make(options.folder, options.seed,
+             draws(options.seed, options.count, kinds, options.robots))
     if options.answers:
         done = {one['name'] for one in read_outcomes(options.answers)}
         todo = [one for one in sorted(options.folder.iterdir()) if one.name not in done

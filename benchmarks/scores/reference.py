@@ -28,7 +28,7 @@ from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.model_file import build_model, load_model
 
 NOISE, DURATION = 0.2, 20.0
@@ -58,13 +58,13 @@ class Change:
     key: str
     value: float
 
-    def model(self, base: ArmModel) -> ArmModel:
+    def model(self, base: MechanismModel) -> MechanismModel:
         """Return the machine after it."""
         if not self.effect:
             return base
         changed = build_model({**base.values, 'effects.active': [self.effect],
                                f'effects.{self.effect}.{self.key}': self.value}, base.source)
-        assert isinstance(changed, ArmModel)
+        assert isinstance(changed, MechanismModel)
         return changed
 
     def told(self, found: Diagnosis) -> dict[str, bool]:
@@ -95,7 +95,7 @@ def unknown_forces(moved: JointMotion, drift: Array) -> Array:
     return force
 
 
-def record(machine: ArmModel, seed: int, drift: float) -> Recording:
+def record(machine: MechanismModel, seed: int, drift: float) -> Recording:
     """Return a run of a machine, its drift and noise of a seed."""
     moved, random = joint_motion(DURATION), np.random.default_rng(seed)
     state = machine.initial_state(0.0)
@@ -113,7 +113,7 @@ def score(seeds: int, drift: float) -> list[dict[str, Any]]:
         (Path(folder) / 'made_up.urdf').write_text(URDF)
         (Path(folder) / 'arm.yaml').write_text(MODEL)
         base = load_model(Path(folder) / 'arm.yaml')
-        assert isinstance(base, ArmModel)
+        assert isinstance(base, MechanismModel)
         reference = Reference.of(base, [record(base, 0, drift)])
         rows = []
         for number, change in enumerate(CHANGES):

@@ -32,7 +32,7 @@ from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJo
 from pprs_dynamics.physics.mechanism.evaluation import PLAIN, is_compiled
 from pprs_dynamics.physics.model.one_pass import forces_kernel
 from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
-from pprs_dynamics.physics.three_pprs.state import MechanismState
+from pprs_dynamics.physics.three_pprs.state import ThreePprsState
 
 ROUNDS = 25
 CALLS = 200  # of one sample, per round
@@ -128,12 +128,12 @@ def _regressors(model: DriveModel, motion: PlatformMotion) -> int:
                 change = small.force(state)
             columns.append(change / coefficient.scale)
     columns += [state.velocity, state.direction, np.abs(state.direction),
-                state.velocity * np.abs(state.velocity), state.guide_load * state.direction,
+                state.velocity * np.abs(state.velocity), state.friction_load * state.direction,
                 np.ones_like(state.velocity), reference, state.position, state.acceleration]
     return len(columns)
 
 
-def _total(model: DriveModel, state: MechanismState) -> np.ndarray:
+def _total(model: DriveModel, state: ThreePprsState) -> np.ndarray:
     """Return rigid body and friction, which follows the loads of other bodies."""
     return sum((effect.force(state) for effect in model.effects), state.rigid_body.force)
 

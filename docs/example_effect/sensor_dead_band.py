@@ -4,7 +4,7 @@
 """A dead band of the effort sensor: y = F - b (F > b), F + b (F < -b), 0 between.
 
 A sensor effect of one's own, complete. It changes how all other effects show in the measured
-effort, and says so (`bends_columns`); the diagnosis needs nothing more. The package's own
+effort, and says so (`nonlinear`); the diagnosis needs nothing more. The package's own
 `effort_filter` is a sensor effect with a memory.
 
 References
@@ -27,7 +27,7 @@ class SensorDeadBand(MeasurementEffect):
 
     name: ClassVar[str] = 'sensor_dead_band'
     idealised: ClassVar[bool] = False
-    bends_columns: ClassVar[bool] = True
+    nonlinear: ClassVar[bool] = True
     # No linear parameter: the shape says it all.
     linear = ()
     shape = (Parameter('width', 'b', 'N', 'effort that does not reach the sensor', 1e-4, 1e4,

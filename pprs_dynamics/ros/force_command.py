@@ -122,7 +122,7 @@ class _Leaving(NamedTuple):
 
     Parameters
     ----------
-    model : DriveModel or ArmModel
+    model : DriveModel or MechanismModel
     memory : ModelState
         As it was at the change: what an effect did since then fades with the model.
     scale : float
@@ -169,7 +169,7 @@ class Feedforward:
 
     Parameters
     ----------
-    model : DriveModel or ArmModel
+    model : DriveModel or MechanismModel
     own : mapping
         The node's parameters, see `parameters_for`.
     clock : callable, optional

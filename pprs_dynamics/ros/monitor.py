@@ -50,6 +50,11 @@ from pprs_dynamics.ros.node.qos import (
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.system.plain_text import for_json
 
+try:
+    from tf2_msgs.msg import TFMessage
+except ImportError:  # it comes with a ROS 2 installation only
+    TFMessage = None
+
 PARAMETERS = (
     AUTOSTART,
     FRAME,
@@ -131,6 +136,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._residual = self._publisher(JointState, '~/residual')
         self._error = self._publisher(Float64MultiArray, '~/error')
         self._all_joints = self._publisher(JointState, '~/joint_states_full')
+        self._tf = self._publisher(TFMessage, '/tf') if TFMessage else None
         self._input = subscription(self, JointState, 'joint_states', self._on_state, raw=True,
                                    profile=MEASURED)
         self._clocks = [steady_timer(self, 1.0 / own['update_rate'], self._judge)]
@@ -180,15 +186,20 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
     def _draw(self) -> None:
         """Publish where all joints are, for programs that draw the robot."""
         if self._latest is None or not self._all_joints.get_subscription_count():
-            return
+            return  # tf is of no use without the joints, which robot_state_publisher listens to
         (stamp, position), self._latest = self._latest, None
         try:
             found = self._joints.at(self._settings.model, position)
         except PprsError as error:
             self.get_logger().warning(f'not drawn: {error}', throttle_duration_sec=5.0)
             return
-        if found is not None:
-            self._all_joints.publish(conversions.joint_positions(stamp, *found))
+        if found is None:
+            return
+        tree, pose = found
+        self._all_joints.publish(conversions.joint_positions(stamp, tree.names, pose.joints))
+        if tree.bodies and self._tf is not None:
+            self._tf.publish(TFMessage(
+                transforms=conversions.transforms(stamp, tree.base, tree.bodies, pose.bodies)))
 
     def _judge(self) -> None:
         if self.state != 'active':

@@ -17,9 +17,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.errors import ModelError, PprsError
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.keys import is_mechanism
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
@@ -41,7 +41,7 @@ from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_effects import draw_effects
-from pprs_dynamics.simulation.linkage_plant import LinkagePlant
+from pprs_dynamics.simulation.mechanism_plant import MechanismPlant
 from pprs_dynamics.simulation.sensors import SensorSettings
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
@@ -101,7 +101,7 @@ class SimulatedRobotNode(ExplainsRefusals):
         self._names = RobotNames.of(self._model)
         self._use_effort = own['use_effort']
         hidden = Hidden.of(own) if not of_joints else None
-        self._robot = (_mechanism(self._model, own) if isinstance(self._model, ArmModel)
+        self._robot = (_mechanism(self._model, own) if isinstance(self._model, MechanismModel)
                        else _platform(self._model, own, hidden.effects if hidden else ()))
         self._queue = SetpointQueue(self._robot.control)
         self._period = round(conversions.NANOSECONDS / own['rate'])
@@ -218,9 +218,9 @@ def _platform(model: ForceModel, own: dict[str, Any], effects: Sequence[HiddenEf
         sensors=SensorSettings.with_effort_noise(own['effort_noise'], own['encoder_resolution']))
 
 
-def _mechanism(model: ArmModel, own: dict[str, Any]) -> SimulatedRobot:
-    plant = LinkagePlant(model, own['hidden_effects'], own['seed'], own['hidden_scale'],
-                         own['rate'])
+def _mechanism(model: MechanismModel, own: dict[str, Any]) -> SimulatedRobot:
+    plant = MechanismPlant(model, own['hidden_effects'], own['seed'], own['hidden_scale'],
+                           own['rate'])
     return SimulatedRobot(
         plant, seed=own['seed'], rate=own['rate'],
         control=plant.gains(own['bandwidth'], own['damping_ratio'], **_behaviour(own)),

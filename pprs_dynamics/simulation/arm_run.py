@@ -19,7 +19,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
-from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.closures import ROWS
 from pprs_dynamics.physics.mechanism.description import (
     Frame,
@@ -28,12 +28,12 @@ from pprs_dynamics.physics.mechanism.description import (
 )
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
-from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Motion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Motion
 from pprs_dynamics.physics.mechanism.urdf import expanded
-from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.simulation.arm_forms import (
     CROSSED,
     FORMS,
@@ -96,10 +96,10 @@ class ArmEngine:
 
     Parameters
     ----------
-    model : ArmModel
+    model : MechanismModel
     """
 
-    def __init__(self, model: ArmModel) -> None:
+    def __init__(self, model: MechanismModel) -> None:
         self.engine = mujoco = load_engine('a simulated robot')
         robot = self.robot = self.described = model.robot
         structure = self.structure = robot.structure
@@ -274,7 +274,8 @@ def _bare(path: Path) -> str:
     return ElementTree.tostring(robot, encoding='unicode')
 
 
-def draw_motion(model: ArmModel, duration: float, seed: int, rate: float = RATE) -> JointMotion:
+def draw_motion(model: MechanismModel, duration: float, seed: int, rate: float = RATE,
+                ) -> JointMotion:
     """Return a random Fourier series of all drives within their limits and the workspace.
 
     It begins and ends at rest, in the middle of the drives' room; see `Structure.room`.
@@ -301,7 +302,7 @@ def draw_motion(model: ArmModel, duration: float, seed: int, rate: float = RATE)
     raise HiddenEffectError('no motion about home stays within the workspace')
 
 
-def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float = 1.0,
+def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: float = 1.0,
                  noise: float | None = None, duration: float = 40.0, path_seed: int = 0,
                  progress: Callable[[float], None] | None = None, thermometers: bool = False,
                  link_encoders: bool = False) -> ArmRun:
@@ -309,7 +310,7 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
 
     Parameters
     ----------
-    model : ArmModel
+    model : MechanismModel
         Its added effects are part of the model, not of the arm.
     names : sequence of str
         Of `arm_forms.NAMES`, or 'random'.
@@ -437,7 +438,7 @@ def simulate_arm(model: ArmModel, names: Sequence[str], seed: int, scale: float 
     return ArmRun(motion, position, measured, tuple(hidden), channels)
 
 
-def _wind_up(model: ArmModel, motion: JointMotion, loads: Array, random: np.random.Generator,
+def _wind_up(model: MechanismModel, motion: JointMotion, loads: Array, random: np.random.Generator,
              scale: float) -> tuple[Array, dict[str, Any]]:
     """Return by how much a motor leads its link because of its load, (N, D), and how.
 
@@ -449,7 +450,7 @@ def _wind_up(model: ArmModel, motion: JointMotion, loads: Array, random: np.rand
     joint = int(random.choice([j for j in later if model.units[j].turns] or later))
     slides_in_loop = model.robot.structure.loops and not model.units[joint].turns
     largest = float(np.abs(loads[:, joint]).max())
-    span = scale * float(random.uniform(0.01, 0.03)) * (SHIFT_OF_SLIDE if slides_in_loop else 1.0)
+    span = scale * float(random.uniform(0.02, 0.05)) * (SHIFT_OF_SLIDE if slides_in_loop else 1.0)
     late, time = float(random.uniform(0.05, 0.2)), float(random.uniform(0.02, 0.1))
     assert motion.time is not None
     step = float(np.median(np.diff(motion.time)))
@@ -468,8 +469,8 @@ def _wind_up(model: ArmModel, motion: JointMotion, loads: Array, random: np.rand
         'tau / tau_0 = x + x^3 / 4, x = w / w_0, a share of it late by a relaxation')
 
 
-def _lost_motion(model: ArmModel, motion: JointMotion, loads: Array, random: np.random.Generator,
-                 scale: float) -> tuple[bool, Array, dict[str, Any]]:
+def _lost_motion(model: MechanismModel, motion: JointMotion, loads: Array,
+                 random: np.random.Generator, scale: float) -> tuple[bool, Array, dict[str, Any]]:
     """Return whether loads drive a clearance, by how much its encoder leads (N, D), and how.
 
     They do on half of the joints of which the load changes sign.
@@ -488,8 +489,8 @@ def _lost_motion(model: ArmModel, motion: JointMotion, loads: Array, random: np.
         'b / 2 x / sqrt(x^2 + (0.02 x_max)^2), x the load or the speed')
 
 
-def _hidden_joint(model: ArmModel, motion: JointMotion, plain: Array, random: np.random.Generator,
-                  scale: float) -> tuple[str, Array, dict[str, float]]:
+def _hidden_joint(model: MechanismModel, motion: JointMotion, plain: Array,
+                  random: np.random.Generator, scale: float) -> tuple[str, Array, dict[str, float]]:
     """Return dry friction of a passive joint: its name, efforts against it (N,), and size."""
     structure = model.robot.structure
     joints = [name for name, (row, _) in friction_rows(structure).items()
@@ -500,7 +501,7 @@ def _hidden_joint(model: ArmModel, motion: JointMotion, plain: Array, random: np
     m = model.robot.at(motion.position, motion.velocity, motion.acceleration).motion
     row = structure.rows[name]
     c, ratio = structure.tables.coordinate[row], structure.tables.ratio[row]
-    rate, felt = ratio * m.v[:, c], np.abs(ratio * m.T[:, c]).max(axis=0)
+    rate, felt = ratio * m.v[:, c], np.abs(ratio * m.drive_to_joint[:, c]).max(axis=0)
     # As large on the drive that feels it most as a hidden force on a drive is.
     d = int(np.argmax(felt))
     torque = scale * SIZE(random) * float(np.abs(plain[:, d]).max()) / float(felt[d])
@@ -508,7 +509,7 @@ def _hidden_joint(model: ArmModel, motion: JointMotion, plain: Array, random: np
     return name, torque * rate / np.sqrt(rate ** 2 + width ** 2), {'torque': torque}
 
 
-def _hide_motor_friction(model: ArmModel, motion: JointMotion, largest: Array, efforts: Array,
+def _hide_motor_friction(model: MechanismModel, motion: JointMotion, largest: Array, efforts: Array,
                          random: np.random.Generator, scale: float) -> dict[str, Any]:
     """Let a motor rub that moves several joints, and return how."""
     motors = model.robot.motors
@@ -530,8 +531,8 @@ def _hide_motor_friction(model: ArmModel, motion: JointMotion, largest: Array, e
         "A' (F v / sqrt(v^2 + w^2) + c v_1 asinh(v / v_1)), v the speed of the motor")
 
 
-def _hide_current_gain(model: ArmModel, motion: JointMotion, temperature: Array, efforts: Array,
-                       random: np.random.Generator, scale: float) -> dict[str, Any]:
+def _hide_current_gain(model: MechanismModel, motion: JointMotion, temperature: Array,
+                       efforts: Array, random: np.random.Generator, scale: float) -> dict[str, Any]:
     """Let a motor's torque per current go with its temperature or its angle, and return how."""
     j = int(random.integers(len(model.drives)))
     ratio = model.gear_ratios[j]
@@ -553,7 +554,7 @@ def _hide_current_gain(model: ArmModel, motion: JointMotion, temperature: Array,
     return truth('current_gain', [model.drives[j]], {model.drives[j]: parameters}, form)
 
 
-def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Array:
+def _own_friction(model: MechanismModel, engine: ArmEngine, motion: JointMotion) -> Array:
     """Return friction, offset and armature as the model file has them, under the true loads."""
     v = motion.velocity
     friction: Array = (
@@ -561,7 +562,7 @@ def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Ar
         + np.asarray(model.friction.coulomb) * np.tanh(v / np.asarray(model.reversal.velocity))
         + np.asarray(model.offset.value))
     for effect in model.effects:
-        if isinstance(effect, LinkageFriction):
+        if isinstance(effect, ModelJointFriction):
             state = model.mechanism(motion).loaded(
                 replace(engine.robot, gravity=tuple(engine.gravity.tolist())),
                 StructureLoad(np.tile(engine.wrench, (len(motion), 1))))
@@ -569,14 +570,14 @@ def _own_friction(model: ArmModel, engine: ArmEngine, motion: JointMotion) -> Ar
     return friction
 
 
-def able_joints(name: str, model: ArmModel, motion: JointMotion) -> list[int]:
+def able_joints(name: str, model: MechanismModel, motion: JointMotion) -> list[int]:
     """Return the joints that a hidden force can act in along a motion."""
     turn, stroke = FORMS[name].needs_turn, np.ptp(motion.position, axis=0)
     return [j for j, unit in enumerate(model.units)
             if not turn or (unit.turns and stroke[j] >= turn)]
 
 
-def one_able_joint(name: str, model: ArmModel, motion: JointMotion,
+def one_able_joint(name: str, model: MechanismModel, motion: JointMotion,
                    random: np.random.Generator) -> int:
     """Return one of the joints that a hidden force can act in along a motion."""
     able = able_joints(name, model, motion)
@@ -586,7 +587,7 @@ def one_able_joint(name: str, model: ArmModel, motion: JointMotion,
     return able[int(random.integers(len(able)))]
 
 
-def _add(name: str, model: ArmModel, motion: JointMotion, load: Array, largest: Array,
+def _add(name: str, model: MechanismModel, motion: JointMotion, load: Array, largest: Array,
          efforts: Array, random: np.random.Generator, scale: float, temperature: Array,
          ) -> dict[str, Any]:
     """Add a hidden force on one joint, or on all, and return what it is."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.description import Frame
-from pprs_dynamics.physics.mechanism.mechanism import Linkage
+from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
 from pprs_dynamics.physics.mechanism.structure import Structure
 
 LEAST_SINGULAR = 1e-10  # of the largest singular value; closures may say a thing twice
@@ -100,14 +100,14 @@ class EngineState:
         data.qpos[at] = ratio * m.q[k, c] + t.offset[rows]
         data.qvel[dofs], data.qacc[dofs] = ratio * m.v[k, c], ratio * m.a[k, c]
 
-    def rates(self, linkage: Linkage) -> Array:
+    def rates(self, links: LinkMotion) -> Array:
         """Return the engine's velocities per rate of the drives at a motion's first sample."""
-        t, m = self.structure.tables, linkage.motion
+        t, m = self.structure.tables, links.motion
         T = np.zeros((self.model.nv, len(t.drives)))
         _, dofs, rows = self._hinged
-        T[dofs] = t.ratio[rows, None] * m.T[0, t.coordinate[rows]]
+        T[dofs] = t.ratio[rows, None] * m.drive_to_joint[0, t.coordinate[rows]]
         for _, v, row in self._free:
-            W, U = (each[0, row] for each in linkage.twists)
+            W, U = (each[0, row] for each in links.twists)
             T[v:v + 3], T[v + 3:v + 6] = self.root.R.T @ U, m.R[0, row].T @ W
         return T
 

@@ -18,7 +18,7 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.simulation.drive_control import ControlSettings, DriveControl, Note, Setpoint
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
 from pprs_dynamics.simulation.hidden_forces import FrictionTemperature
-from pprs_dynamics.simulation.linkage_plant import LinkagePlant
+from pprs_dynamics.simulation.mechanism_plant import MechanismPlant
 from pprs_dynamics.simulation.plant import Plant, PlantSettings, Truth, UnsolvedError
 from pprs_dynamics.simulation.sensors import Measurement, Sensors, SensorSettings
 from pprs_dynamics.simulation.temperatures import read_thermometers
@@ -33,7 +33,7 @@ class SimulatedRobot:
 
     Parameters
     ----------
-    values : mapping or LinkagePlant
+    values : mapping or MechanismPlant
         Flat keys and values of a 3-PPRS's model file, e.g. `DriveModel.values`; or an arm, or a
         robot with loops, and what is hidden in it.
     effects : sequence of HiddenEffect
@@ -57,19 +57,19 @@ class SimulatedRobot:
     """
 
     def __init__(
-        self, values: Mapping[str, Any] | LinkagePlant, effects: Sequence[HiddenEffect] = (), *,
+        self, values: Mapping[str, Any] | MechanismPlant, effects: Sequence[HiddenEffect] = (), *,
         seed: int = 0, rate: float = 500.0, plant: PlantSettings | None = None,
         control: ControlSettings | None = None, sensors: SensorSettings | None = None,
     ) -> None:
-        self.plant: Plant | LinkagePlant = (
-            values if isinstance(values, LinkagePlant) else Plant(values, effects, plant))
+        self.plant: Plant | MechanismPlant = (
+            values if isinstance(values, MechanismPlant) else Plant(values, effects, plant))
         step = self.plant.time_step
         self.steps_per_tick = max(1, round(1 / (rate * step)))
         if abs(self.steps_per_tick * step * rate - 1) > 1e-9:
             raise ValueError(f'{rate} Hz is no whole number of time steps of {step} s')
         self.sensors = Sensors(
             sensors or SensorSettings(), step, np.random.default_rng(seed), effects,
-            values.largest if isinstance(values, LinkagePlant) else None)
+            values.largest if isinstance(values, MechanismPlant) else None)
         self.control = DriveControl(self.plant.limits, self.plant.holding,
                                     control or ControlSettings(), step, self.sensors.smoothing)
         self._ticks = 0
@@ -109,7 +109,7 @@ class SimulatedRobot:
 
     def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
         """Have other hidden effects from now on; the motion goes on, and what stays remembers."""
-        if isinstance(self.plant, LinkagePlant):
+        if isinstance(self.plant, MechanismPlant):
             raise TypeError('what is hidden in a mechanism stays')
         self.plant.use_effects(effects)
         self.sensors.use_effects(effects)

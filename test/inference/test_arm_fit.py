@@ -13,7 +13,7 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 
-from pprs_dynamics import ArmModel, JointMotion
+from pprs_dynamics import JointMotion, MechanismModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
@@ -28,9 +28,9 @@ from pprs_dynamics.physics.model.model_file import build_model
 NOISE = 0.2
 
 
-def heavier(folder: Path) -> ArmModel:
+def heavier(folder: Path) -> MechanismModel:
     """Return an arm that is not as described: heavier links, rotors, friction."""
-    model = ArmModel.load(arm.write_arm(folder))
+    model = MechanismModel.load(arm.write_arm(folder))
     mass = np.array(model.robot.inertial)
     factors = np.array([1.2, 0.8, 1.3])[:, None]
     changed = mass * factors
@@ -42,7 +42,7 @@ def heavier(folder: Path) -> ArmModel:
 
 def test_a_fit_recovers_friction_and_predicts_a_motion_it_never_saw(tmp_path: Path) -> None:
     real = heavier(tmp_path)
-    described = ArmModel.load(arm.write_arm(tmp_path))
+    described = MechanismModel.load(arm.write_arm(tmp_path))
     runs = [arm.record(real, arm.motion(seed=seed), NOISE, seed) for seed in (0, 1)]
     fit = fit_base(described, runs, [arm.record(real, arm.motion(seed=7), NOISE, 7)])
     for key in ('friction.viscous', 'friction.coulomb'):
@@ -78,7 +78,7 @@ def test_a_base_that_predicts_worse_is_not_taken(tmp_path: Path) -> None:
 
 def test_uncertainties_hold_the_truth(tmp_path: Path) -> None:
     real = heavier(tmp_path)
-    described = ArmModel.load(arm.write_arm(tmp_path))
+    described = MechanismModel.load(arm.write_arm(tmp_path))
     inside = []
     for seed in range(4):
         runs = [arm.record(real, arm.motion(20.0, seed=seed), NOISE, seed)]
@@ -94,7 +94,7 @@ def test_what_does_not_move_stays_and_is_told(tmp_path: Path) -> None:
     moved = arm.motion()
     still = JointMotion(*(values * [1, 1, 0] for values in (
         moved.position, moved.velocity, moved.acceleration)), moved.time)
-    described = ArmModel.load(arm.write_arm(tmp_path, friction__viscous=[1.0, 1.0, 33.0]))
+    described = MechanismModel.load(arm.write_arm(tmp_path, friction__viscous=[1.0, 1.0, 33.0]))
     fit = fit_base(described, [arm.record(real, still, NOISE)])
     assert fit.model.values['friction.viscous'][2] == 33.0
     assert any('reach hardly moves' in sentence for sentence in fit.told)
@@ -102,7 +102,7 @@ def test_what_does_not_move_stays_and_is_told(tmp_path: Path) -> None:
 
 def test_a_joint_stands_however_sharply_another_ones_friction_turns_over(tmp_path: Path) -> None:
     # Its noise is motion to the narrow width that is fitted to the others, and would be its only.
-    model = ArmModel.load(arm.write_arm(tmp_path, friction__reversal_velocity=0.01))
+    model = MechanismModel.load(arm.write_arm(tmp_path, friction__reversal_velocity=0.01))
     sharp = build_model({**model.values, **arm.FRICTION,
                          'friction.reversal_velocities': (1e-4, 1e-4, 1e-4)}, model.source)
     moved = arm.motion()
@@ -119,25 +119,25 @@ def test_a_joint_stands_however_sharply_another_ones_friction_turns_over(tmp_pat
 
 
 def test_fitted_links_are_bodies(tmp_path: Path) -> None:
-    described = ArmModel.load(arm.write_arm(tmp_path))
+    described = MechanismModel.load(arm.write_arm(tmp_path))
     fit = fit_base(described, [arm.record(heavier(tmp_path), arm.motion(20.0), 5.0)])
-    assert isinstance(fit.model, ArmModel)
+    assert isinstance(fit.model, MechanismModel)
     for link in fit.model.robot.inertial:
         assert np.linalg.eigvalsh(pseudo_inertia(link)).min() > -1e-6
 
 
 def test_points_of_bodies_begin_at_the_description(tmp_path: Path) -> None:
-    described = ArmModel.load(arm.write_arm(tmp_path)).robot.inertial
+    described = MechanismModel.load(arm.write_arm(tmp_path)).robot.inertial
     bodies = Bodies(described)
     assert bodies.inertial(np.zeros(len(bodies))) == pytest.approx(described, rel=1e-9, abs=1e-12)
     assert np.all(bodies.distance(np.zeros(len(bodies))) == 0)
 
 
 def test_tolerances_of_other_models_are_fitted(tmp_path: Path) -> None:
-    from pprs_dynamics import ArmModel
+    from pprs_dynamics import MechanismModel
     from pprs_dynamics.measurement.files.recording import Recording
 
-    given = ArmModel.load('config/single_axis.yaml')
+    given = MechanismModel.load('config/single_axis.yaml')
     open_values = {**given.values, 'tolerances.axis.mass': 0.2, 'tolerances.axis.coulomb': 0.3}
     real = build_model({**given.values, 'axis.mass': 100.0, 'axis.coulomb': 22.0})
     time = np.arange(0, 20, 0.002)
@@ -152,7 +152,7 @@ def test_tolerances_of_other_models_are_fitted(tmp_path: Path) -> None:
     assert fit.model.values['axis.coulomb'] == pytest.approx(22.0, rel=0.01)
 
 
-def write_currents(folder: Path, model: ArmModel, gain: tuple[float, ...], name: str) -> Path:
+def write_currents(folder: Path, model: MechanismModel, gain: tuple[float, ...], name: str) -> Path:
     """Write a packed CSV of currents, joints in another order, stamps that jitter."""
     run = arm.record(model, arm.motion(20.0), NOISE)
     header = ['time']
@@ -222,7 +222,7 @@ def test_a_hidden_payload_is_named_alone_and_its_mass_is_right(tmp_path: Path) -
     given = arm.real_arm(tmp_path)
     loaded = build_model({**given.values, 'effects.active': ['payload_mass'],
                           'effects.payload_mass.mass': 1.2}, given.source)
-    assert isinstance(loaded, ArmModel)
+    assert isinstance(loaded, MechanismModel)
     found = diagnose(given, [arm.record(loaded, arm.motion(), NOISE)])
     assert [one.name for one in found.effects] == ['payload_mass']
     mass = found.effects[0].parameters['mass']

@@ -19,7 +19,7 @@ from pprs_command import pprs
 from short_recordings import short_recordings
 
 from benchmarks.hidden import recordings
-from pprs_dynamics import ArmModel, DriveModel, JointMotion
+from pprs_dynamics import DriveModel, JointMotion, MechanismModel
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.residuals.conventions import find_mistakes
@@ -33,7 +33,7 @@ from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / 'docs'
 MODEL = DriveModel.load()
-AXIS = ArmModel.load('config/single_axis.yaml')
+AXIS = MechanismModel.load('config/single_axis.yaml')
 RATE, DURATION = 250.0, 10.0
 NOISE = 0.05  # [N]
 Arrays = tuple[Array, Array, Array, Array]
@@ -275,7 +275,7 @@ def test_commands_say_it_before_they_compare(tmp_path: Path) -> None:
         assert done.stderr == stopped
 
 
-def arm_recording(model: ArmModel, motion: float | list[float] = 1.0,
+def arm_recording(model: MechanismModel, motion: float | list[float] = 1.0,
                   effort: float | list[float] = 1.0,
                   changes: Callable[[Arrays], Arrays] | None = None,
                   ) -> Recording:
@@ -286,7 +286,8 @@ def arm_recording(model: ArmModel, motion: float | list[float] = 1.0,
     return recording(scaled(motion=motion, effort=effort)(arrays), model.drives)
 
 
-def read_as_told(model: ArmModel, folder: Path, run: Recording) -> tuple[str, tuple[Defect, ...]]:
+def read_as_told(model: MechanismModel, folder: Path, run: Recording,
+                 ) -> tuple[str, tuple[Defect, ...]]:
     """Return the line that is told, and what is told of the recording once it is written."""
     readings = [one for one in find_mistakes(model, run) if isinstance(one, OtherReading)]
     line = columns_line(readings)
@@ -307,7 +308,7 @@ ARM_MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
 @pytest.mark.parametrize('mistake', ARM_MISTAKES)
 def test_the_line_that_is_told_mends_a_recording_of_an_arm(mistake: str, tmp_path: Path) -> None:
     """The model has no friction, of which most of these efforts are."""
-    model = ArmModel.load(arm.write_arm(tmp_path))
+    model = MechanismModel.load(arm.write_arm(tmp_path))
     change, entry = ARM_MISTAKES[mistake]
     line, left = read_as_told(model, tmp_path, arm_recording(model, **change))
     assert entry in line
@@ -319,7 +320,7 @@ def test_efforts_in_percent_of_the_largest_are_told(tmp_path: Path) -> None:
     text = arm.urdf()
     for limit in largest:
         text = text.replace('effort="200"', f'effort="{limit:g}"', 1)
-    model = ArmModel.load(arm.write_arm(tmp_path, text))
+    model = MechanismModel.load(arm.write_arm(tmp_path, text))
     run = arm_recording(model, effort=(100 / largest).tolist())
     (finding,) = find_mistakes(model, run)
     assert "percent of the drives' largest" in finding.what
@@ -335,7 +336,7 @@ def test_a_joint_that_stands_is_no_reason_to_doubt_a_unit(tmp_path: Path) -> Non
         effort[:, 1] += 40.0
         return a[0], position, velocity, effort
 
-    model = ArmModel.load(arm.write_arm(tmp_path))
+    model = MechanismModel.load(arm.write_arm(tmp_path))
     assert [one for one in find_mistakes(model, arm_recording(model, changes=standing))
             if isinstance(one, OtherReading)] == []
 

@@ -10,7 +10,7 @@ import pytest
 from made_up_arm import motion, real_arm
 from numpy.testing import assert_allclose
 
-from pprs_dynamics import ArmModel, JointMotion
+from pprs_dynamics import JointMotion, MechanismModel
 from pprs_dynamics.inference.regression.design import Design, searched_in_drives
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
@@ -30,7 +30,7 @@ def with_gain(arm, **values):
     found = build_model({**arm.values, 'effects.active': ['current_gain'], **{
         f'effects.current_gain.swing.{key}': value for key, value in {**VALUES, **values}.items()}},
         arm.source)
-    assert isinstance(found, ArmModel)
+    assert isinstance(found, MechanismModel)
     return found
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from made_up_arm import JOINTS, motion, real_arm, record, write_arm
 
-from pprs_dynamics import ArmModel, compare, diagnose, fit
+from pprs_dynamics import MechanismModel, compare, diagnose, fit
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.explained_effort import explained_shares, little_explained
@@ -21,7 +21,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 UNRELATED = 12.0  # [N m] of an effort that is no force of this machine
 
 
-def unrelated(model: ArmModel, seed: int = 5) -> Recording:
+def unrelated(model: MechanismModel, seed: int = 5) -> Recording:
     """Return a recording whose first effort follows nothing that the drives do."""
     made = record(model, motion())
     rng = np.random.default_rng(seed)
@@ -69,7 +69,7 @@ def test_diagnose_calls_no_model_adequate_that_explains_little(tmp_path: Path) -
 
 def test_a_description_alone_is_fitted_first_and_explains_then(tmp_path: Path) -> None:
     real = real_arm(tmp_path)
-    bare = ArmModel.load(write_arm(tmp_path))
+    bare = MechanismModel.load(write_arm(tmp_path))
     made = record(real, motion())
     before = compare(bare, made)
     assert before.comparison.little

@@ -20,7 +20,7 @@ from made_up_diagnosis import (
     white_noise,
 )
 
-from pprs_dynamics import ArmModel, DriveModel
+from pprs_dynamics import DriveModel, MechanismModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption import objections
 from pprs_dynamics.inference.adoption.request import EffectRequest
@@ -420,6 +420,6 @@ def test_an_adopted_effect_leaves_as_much_as_one_that_is_found() -> None:
 
 
 def test_an_axis_has_units_too() -> None:
-    model = ArmModel.load('config/single_axis.yaml')
+    model = MechanismModel.load('config/single_axis.yaml')
     assert 'N' in objections.of_held_out_error(1.0, 2.0, gain(3), model, 'x')[0]
     assert DRIVES[4] == 'lift_2'

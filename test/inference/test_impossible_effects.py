@@ -8,18 +8,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pprs_dynamics import ArmModel, JointMotion
+from pprs_dynamics import JointMotion, MechanismModel
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.possible import why_impossible, why_nothing
 from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.model.model_file import build_model
 
-MODEL = ArmModel.load('config/single_axis.yaml')
+MODEL = MechanismModel.load('config/single_axis.yaml')
 MASS, VISCOUS, COULOMB = (MODEL.values[f'axis.{key}'] for key in ('mass', 'viscous', 'coulomb'))
 TIME = np.arange(0, 20, 0.005)
 
@@ -39,20 +41,7 @@ def recorded(effort: Array) -> Recording:
                                  effort + random.normal(0, 1.0, effort.shape), ('axis',))
 
 
-@pytest.fixture(scope='module')
-def design() -> Design:
-    return Design.of(MODEL, [recorded(MODEL.drive_forces(motion()).total)])
-
-
 IMPOSSIBLE: list[tuple[str, dict[str, float], str]] = [
-    ('drive_inertia', {'axis.mass': -1.2 * MASS}, 'inertia of -'),
-    ('drive_inertia', {'axis.mass': -0.8 * MASS}, ''),
-    ('viscous_friction', {'axis.coefficient': -1.2 * VISCOUS}, 'viscous friction of -'),
-    ('viscous_friction', {'axis.coefficient': -0.8 * VISCOUS}, ''),
-    ('coulomb_friction', {'axis.force': -1.2 * COULOMB}, 'dry friction of -'),
-    ('coulomb_friction', {'axis.force': -0.8 * COULOMB}, ''),
-    ('asymmetric_friction', {'axis.force_forward': 2 * COULOMB,
-                             'axis.force_backward': -2 * COULOMB}, 'dry friction of -'),
     ('effort_gain', {'axis.gain': 0.6}, '1.6 times too large'),
     ('effort_gain', {'axis.gain': -0.4}, '0.6 times too large'),
     ('effort_gain', {'axis.gain': 0.4}, ''),
@@ -61,16 +50,60 @@ IMPOSSIBLE: list[tuple[str, dict[str, float], str]] = [
 
 
 @pytest.mark.parametrize(('name', 'values', 'clause'), IMPOSSIBLE)
-def test_what_no_machine_can_have_is_told(name: str, values: dict[str, float], clause: str,
-                                          design: Design) -> None:
+def test_what_no_machine_can_have_is_told(name: str, values: dict[str, float], clause: str) -> None:
     known = {key: Estimate(value, 0.02 * abs(value), '') for key, value in values.items()}
-    said = why_impossible(catalogue()[name], known, design, DECISIONS)
+    said = why_impossible(catalogue()[name], known, DECISIONS)
     assert clause in said
     assert bool(said) == bool(clause)
     assert not why_nothing(catalogue()[name], known, {})
     # Within twice its uncertainty anything may be nothing, or what the model has.
     unknown = {key: Estimate(value, abs(value), '') for key, value in values.items()}
     assert 'holds 0' in why_nothing(catalogue()[name], unknown, {})
+
+
+TAKEN: list[tuple[str, tuple[str, ...], Array]] = [
+    ('drive_inertia', ('mass',), np.array([-MASS])),
+    ('viscous_friction', ('coefficient',), np.array([-VISCOUS])),
+    ('coulomb_friction', ('force',), np.array([-COULOMB]))]
+
+
+@pytest.mark.parametrize('share', [0.8, 1.2])
+@pytest.mark.parametrize(('name', 'names', 'own'), TAKEN)
+def test_no_more_is_taken_away_than_there_is(name: str, names: tuple[str, ...], own: Array,
+                                             share: float) -> None:
+    """What would leave less than nothing is held at nothing, at a cost."""
+    columns = {'drive_inertia': motion().acceleration, 'viscous_friction': motion().velocity,
+               'coulomb_friction': np.sign(motion().velocity)}[name]
+    recording = recorded(MODEL.drive_forces(motion()).total + share * own * columns)
+    # The model's own numbers are known, so that what is missing is the effect's alone.
+    exact = build_model({**MODEL.values, **dict.fromkeys(
+        (f'tolerances.axis.{key}' for key in ('mass', 'viscous', 'coulomb')), 1e-6)})
+    fits = FittedSets(Design.of(exact, [recording]), DECISIONS)
+    component = Component.of(catalogue()[name], 0, {}, names)
+    found = fits.evaluate((EffectCandidate.of([component]),))
+    taken = found.coefficients(component)
+    if share < 1:
+        np.testing.assert_allclose(taken, share * own, rtol=0.05)
+        assert found.terms.feasibility == 0
+    else:
+        np.testing.assert_allclose(taken, own, rtol=1e-9)
+        assert found.terms.feasibility > DECISIONS.rival_margin
+
+
+def test_what_can_only_be_nothing_does_not_void_what_is_there() -> None:
+    """One direction may have less than nothing by chance; the other is told all the same."""
+    bare = build_model({**MODEL.values, 'axis.coulomb': 0.0})
+    moved = motion()
+    forward = (1 + np.sign(moved.velocity)) / 2
+    effort = bare.drive_forces(moved).total + COULOMB * forward + 0.1 * COULOMB * (1 - forward)
+    fits = FittedSets(Design.of(bare, [recorded(effort)]), DECISIONS)
+    both = Component.of(catalogue()['asymmetric_friction'], 0, {},
+                        ('force_forward', 'force_backward'))
+    one = Component.of(catalogue()['asymmetric_friction'], 0, {}, ('force_forward',))
+    held, without = (fits.evaluate((EffectCandidate.of([c]),)) for c in (both, one))
+    assert held.coefficients(both)[1] == 0
+    assert held.coefficients(both)[0] == pytest.approx(COULOMB, rel=0.05)
+    assert without.cost < held.cost
 
 
 def test_one_number_of_several_may_be_nothing() -> None:

@@ -11,7 +11,7 @@ import made_up_arm
 import numpy as np
 import pytest
 
-from pprs_dynamics import ArmModel
+from pprs_dynamics import MechanismModel
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, next_step
 from pprs_dynamics.measurement.files.recording import Recording
@@ -52,12 +52,12 @@ def test_losses_that_are_alike_in_both_quadrants_are_friction_by_load(tmp_path: 
     assert [one.name for one in found.effects] == ['load_friction']
 
 
-def axis() -> ArmModel:
+def axis() -> MechanismModel:
     """Return a vertical axis of a screw."""
     text = ('/**:\n  ros__parameters:\n    axis: {mass: 20.0, viscous: 100.0, coulomb: 20.0, '
             'offset: 0.0, gravity: -9.81}\n    friction: {reversal_velocity: 0.001}\n')
     model = build_model(parse_parameters(text))
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     return model
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made_up_recordings import the_one
 
-from pprs_dynamics import ArmModel, JointMotion, Recording, compare, diagnose, load_model
+from pprs_dynamics import JointMotion, MechanismModel, Recording, compare, diagnose, load_model
 from pprs_dynamics.inference.residuals.long_recordings import (
     MOST_BLOCKS,
     MOST_WHOLE,
@@ -21,15 +21,15 @@ from pprs_dynamics.physics.model.model_file import build_model
 RATE = 100.0  # [Hz]: every sample is a block
 
 
-def axis(**effects: float) -> ArmModel:
-    model = ArmModel.load('config/single_axis.yaml')
+def axis(**effects: float) -> MechanismModel:
+    model = MechanismModel.load('config/single_axis.yaml')
     changed = build_model({**model.values, **{key.replace('__', '.'): value
                                               for key, value in effects.items()}})
-    assert isinstance(changed, ArmModel)
+    assert isinstance(changed, MechanismModel)
     return changed
 
 
-def record(model: ArmModel, duration: float, moves_in: slice = slice(0, 60)) -> Recording:
+def record(model: MechanismModel, duration: float, moves_in: slice = slice(0, 60)) -> Recording:
     """Return an axis that swings in a part of every minute, and stands in the rest."""
     t = np.arange(0, duration, 1 / RATE)
     minute = t % 60

@@ -18,7 +18,7 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 
-from pprs_dynamics import ArmModel, DriveModel, JointMotion
+from pprs_dynamics import DriveModel, JointMotion, MechanismModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
@@ -90,7 +90,7 @@ def platform_run() -> Run:
 
 
 def axis_run(gravity: float) -> Run:
-    given = ArmModel.load('config/single_axis.yaml').values
+    given = MechanismModel.load('config/single_axis.yaml').values
     model = build_model({**given, 'axis.gravity': gravity})
     time = np.arange(0, DURATION, 1 / RATE)
     q = np.zeros((3, len(time), 1))
@@ -210,12 +210,14 @@ def test_effort_kind_says_that_efforts_are_currents(tmp_path: Path) -> None:
     read = [read_recording(tmp_path / 'run.csv', one.recorded) for one in (run.model, model)]
     np.testing.assert_allclose(read[1].effort, read[0].effort * (2.0, 3.0, 4.0))
     with pytest.raises(ModelError, match='only an arm and a robot with loops have a gain'):
-        build_model({**ArmModel.load('config/single_axis.yaml').values, 'effort_kind': 'current'})
+        build_model({**MechanismModel.load('config/single_axis.yaml').values,
+                     'effort_kind': 'current'})
 
 
 def test_another_kind_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r'effort_kind is .*torque.*, must be one of measured, '):
-        build_model({**ArmModel.load('config/single_axis.yaml').values, 'effort_kind': 'torque'})
+        build_model({**MechanismModel.load('config/single_axis.yaml').values,
+                     'effort_kind': 'torque'})
 
 
 def test_commands_stop_or_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

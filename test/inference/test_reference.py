@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import pprs_dynamics as pprs
-from pprs_dynamics import ArmModel, JointMotion
+from pprs_dynamics import JointMotion, MechanismModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError, UnreadableFileError
@@ -37,7 +37,7 @@ def healthy(moved: JointMotion) -> Array:
     return force
 
 
-def run(model: ArmModel, seed: int, noise: int, change: float = 0.0) -> Recording:
+def run(model: MechanismModel, seed: int, noise: int, change: float = 0.0) -> Recording:
     """Return a recording of a motion, with Coulomb friction of `swing` otherwise."""
     moved = arm.motion(20.0, seed=seed)
     clean = arm.record(model, moved, NOISE, noise)
@@ -54,12 +54,14 @@ def variance(carried: CarriedOver, drive: int) -> Array:
 
 
 @pytest.fixture(scope='module')
-def machine(tmp_path_factory: pytest.TempPathFactory) -> tuple[ArmModel, Reference]:
+def machine(tmp_path_factory: pytest.TempPathFactory) -> tuple[MechanismModel, Reference]:
     model = arm.real_arm(tmp_path_factory.mktemp('arm'))
     return model, Reference.of(model, [run(model, 0, 1)])
 
 
-def test_what_was_in_the_reference_has_not_changed(machine: tuple[ArmModel, Reference]) -> None:
+def test_what_was_in_the_reference_has_not_changed(
+    machine: tuple[MechanismModel, Reference],
+) -> None:
     model, _ = machine
     again = run(model, 0, 2)
     found = pprs.diagnose(model, again, reference=run(model, 0, 1))
@@ -73,7 +75,7 @@ def test_what_was_in_the_reference_has_not_changed(machine: tuple[ArmModel, Refe
     assert max(found.diagnosis.noise_floors.values()) < 2 * NOISE
 
 
-def test_a_change_of_friction_is_told_alone(machine: tuple[ArmModel, Reference]) -> None:
+def test_a_change_of_friction_is_told_alone(machine: tuple[MechanismModel, Reference]) -> None:
     model, _ = machine
     found = pprs.diagnose(model, run(model, 0, 3, change=0.4), reference=run(model, 0, 1))
     assert [one.name for one in found.effects] == ['coulomb_friction']
@@ -83,7 +85,7 @@ def test_a_change_of_friction_is_told_alone(machine: tuple[ArmModel, Reference])
 
 
 def test_what_is_carried_over_is_as_uncertain_as_it_is_wrong(
-        machine: tuple[ArmModel, Reference]) -> None:
+        machine: tuple[MechanismModel, Reference]) -> None:
     model, reference = machine
     design = Design.of(model, [run(model, 0, 4)])
     carried = reference.carried_over(design)
@@ -93,7 +95,9 @@ def test_what_is_carried_over_is_as_uncertain_as_it_is_wrong(
         assert 0.4 < np.nanmean(left[:, d] ** 2 / (noise + variance(carried, d))) < 1.5
 
 
-def test_two_runs_tell_how_far_the_machine_repeats(machine: tuple[ArmModel, Reference]) -> None:
+def test_two_runs_tell_how_far_the_machine_repeats(
+    machine: tuple[MechanismModel, Reference],
+) -> None:
     model, _ = machine
     first, same = run(model, 0, 1), run(model, 0, 2)
     moved = arm.motion(20.0, seed=0)
@@ -109,7 +113,7 @@ def test_two_runs_tell_how_far_the_machine_repeats(machine: tuple[ArmModel, Refe
 
 
 def test_a_drive_that_stood_in_the_reference_is_told_of_by_nothing(
-        machine: tuple[ArmModel, Reference]) -> None:
+        machine: tuple[MechanismModel, Reference]) -> None:
     model, _ = machine
     whole = run(model, 0, 1)
     effort = whole.effort.copy()
@@ -123,7 +127,9 @@ def test_a_drive_that_stood_in_the_reference_is_told_of_by_nothing(
     assert 0.8 < left[2] < 1.2
 
 
-def test_on_another_path_a_reference_does_no_harm(machine: tuple[ArmModel, Reference]) -> None:
+def test_on_another_path_a_reference_does_no_harm(
+    machine: tuple[MechanismModel, Reference],
+) -> None:
     model, reference = machine
     design = Design.of(model, [run(model, 5, 4)])
     before = design.residuals.error
@@ -133,7 +139,7 @@ def test_on_another_path_a_reference_does_no_harm(machine: tuple[ArmModel, Refer
 
 
 def test_far_from_its_states_a_reference_knows_less(
-        machine: tuple[ArmModel, Reference]) -> None:
+        machine: tuple[MechanismModel, Reference]) -> None:
     model, reference = machine
     near, far = (reference.carried_over(Design.of(model, [run(model, seed, 4)]))
                  for seed in (0, 5))
@@ -172,7 +178,7 @@ def test_a_fit_names_its_runs_and_a_diagnosis_takes_them(tmp_path: Path) -> None
 
 
 def test_a_model_file_that_keeps_the_residual_stands_alone(
-        machine: tuple[ArmModel, Reference], tmp_path: Path) -> None:
+        machine: tuple[MechanismModel, Reference], tmp_path: Path) -> None:
     model, reference = machine
     kept = build_model({**model.values, 'reference_residual': reference.residual}, model.source)
     path = tmp_path / 'kept.yaml'
@@ -184,7 +190,7 @@ def test_a_model_file_that_keeps_the_residual_stands_alone(
     assert np.all(np.nanstd(left, axis=0) < 0.35 * np.nanstd(error, axis=0))
 
 
-def test_what_is_no_reference_is_refused(machine: tuple[ArmModel, Reference]) -> None:
+def test_what_is_no_reference_is_refused(machine: tuple[MechanismModel, Reference]) -> None:
     model, _ = machine
     whole = run(model, 0, 1)
     with pytest.raises(ReferenceRunError, match='names no reference run'):

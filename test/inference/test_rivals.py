@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pprs_dynamics import ArmModel
+from pprs_dynamics import MechanismModel
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose, rival_effects
 from pprs_dynamics.inference.diagnosis.quantities import in_unit
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
@@ -30,7 +30,7 @@ def ambiguous() -> Diagnosis:
              + SPRING * q + NOISE * np.random.default_rng(3).standard_normal(len(time)))
     model = build_model({'axis.mass': MASS, 'axis.viscous': VISCOUS, 'axis.coulomb': COULOMB,
                          'axis.offset': 0.0, 'friction.reversal_velocity': WIDTH})
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     return diagnose(model, [Recording.from_arrays('sine', time, q[:, None], None, force[:, None],
                                                   (AXIS,))])
 

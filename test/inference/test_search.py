@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pprs_dynamics import ArmModel, DriveModel
+from pprs_dynamics import DriveModel, MechanismModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.regression import design as design_module
 from pprs_dynamics.inference.regression.design import Design
@@ -57,7 +57,7 @@ def axis_recording(hidden: dict[str, dict[str, float]], seed: int, noise: float 
     values = {f'effects.{name}.{AXIS}.{key}': value for name, block in hidden.items()
               for key, value in block.items()}
     model = build_model({**AXIS_VALUES, 'effects.active': list(hidden), **values})
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     rng = np.random.default_rng(seed)
     time = np.arange(0, 20, 0.002)
     omega = 2 * np.pi * np.array([0.21, 0.37, 0.83])[:, None]
@@ -66,7 +66,7 @@ def axis_recording(hidden: dict[str, dict[str, float]], seed: int, noise: float 
     q = (size * np.sin(phase)).sum(0)[:, None]
     from pprs_dynamics import JointMotion
     motion = JointMotion(q, (size * omega * np.cos(phase)).sum(0)[:, None],
-                        -(size * omega ** 2 * np.sin(phase)).sum(0)[:, None], time=time)
+                         -(size * omega ** 2 * np.sin(phase)).sum(0)[:, None], time=time)
     force = model.measured(model.drive_forces(motion)).total
     return Recording.from_arrays('axis', time, q, None,
                                  force + noise * rng.normal(size=force.shape), (AXIS,))
@@ -172,7 +172,7 @@ def test_without_an_effect_that_bent_the_columns_the_search_begins_again() -> No
     # As if it had never been found.
     assert without.nothing.cost == pytest.approx(ranking.nothing.cost)
     assert without.last is not ranking.last
-    # One that bends none takes along what paid beside it, and the search stands.
+    # A linear one takes along what paid beside it, and the search stands.
     simpler = ranking.less(stribeck)
     assert simpler.last is ranking.last
     assert names(simpler.reported) == ['time_delay']

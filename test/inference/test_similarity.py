@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from benchmarks.hidden.recordings import tolerant_model
-from pprs_dynamics import ArmModel, DriveModel, JointMotion
+from pprs_dynamics import DriveModel, JointMotion, MechanismModel
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
@@ -61,14 +61,14 @@ def diagnosed(name: str, s: float, k: float) -> Diagnosis:
     values = {f'effects.{effect}.{AXIS}.{key}': value for effect, block in hidden.items()
               for key, value in block.items()}
     true = build_model({**AXIS_VALUES, 'effects.active': list(hidden), **values})
-    assert isinstance(true, ArmModel)
+    assert isinstance(true, MechanismModel)
     time = np.arange(0, 20, 0.002)
     omega = 2 * np.pi * np.array([0.21, 0.37, 0.83])[:, None]
     size = np.array([0.08, 0.04, 0.015])[:, None]
     phase = omega * time + np.array([0.3, 1.9, 4.0])[:, None]
     q = (size * np.sin(phase)).sum(0)[:, None]
     motion = JointMotion(q, (size * omega * np.cos(phase)).sum(0)[:, None],
-                        -(size * omega ** 2 * np.sin(phase)).sum(0)[:, None], time=time)
+                         -(size * omega ** 2 * np.sin(phase)).sum(0)[:, None], time=time)
     force = true.drive_forces(motion).total
     if name == 'bump':
         force = force + 1.5 * np.exp(-0.5 * ((q - 0.03) / 0.008) ** 2)

@@ -67,9 +67,9 @@ class MujocoLoops:
         assert np.max(np.abs(columns @ found - needed)) < 1e-9 * np.max(np.abs(needed))
         return found[:len(self.drives)], float(np.max(np.abs(data.efc_pos), initial=0.0))
 
-    def state(self, linkage, k) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return MuJoCo's coordinates, velocities and accelerations at a sample of a linkage."""
-        m, s = linkage.motion, linkage.structure
+    def state(self, links, k) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return MuJoCo's coordinates, velocities and accelerations at a sample of all links."""
+        m, s = links.motion, links.structure
         q, v, a = np.zeros(self.model.nq), np.zeros(self.model.nv), np.zeros(self.model.nv)
         for j in range(self.model.njnt):
             at, dof = int(self.model.jnt_qposadr[j]), int(self.model.jnt_dofadr[j])

@@ -62,7 +62,7 @@ def everything(model: DriveModel, motion: PlatformMotion) -> dict[str, np.ndarra
     rates = platform_rates(geometry, motion, s.velocity, s.acceleration)
     return {'total': forces.total, **forces.parts, 'in steps': kept.total,
             'position': s.position, 'acceleration': s.acceleration, 'J': s.jacobians.J,
-            'J_u': s.jacobians.J_u, 'guide_load': s.guide_load,
+            'J_u': s.jacobians.J_u, 'friction_load': s.friction_load,
             'reactions': np.stack(s.rigid_body.reactions), 'found': found.position,
             'turned': found.orientation, 'rates': rates.rows}
 

@@ -234,7 +234,7 @@ def test_active_friction_is_viscous_plus_load_times_sign(robot, motion):
                              'friction.drives.coulomb': tuple(coulomb)})
     forces = model.drive_forces(motion)
     q_dot = drive_motion(robot.geometry, motion)[1]
-    expected = viscous * q_dot + coulomb * forces.mechanism.guide_load * np.sign(q_dot)
+    expected = viscous * q_dot + coulomb * forces.mechanism.friction_load * np.sign(q_dot)
     assert_allclose(forces.parts['active_friction'], expected, rtol=0, atol=ROUNDING)
 
 

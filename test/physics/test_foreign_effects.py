@@ -15,7 +15,7 @@ import pytest
 from failing_effects import FAULTS, fail, model_file
 from feedforward_bench import random_motion
 
-from pprs_dynamics import ArmModel, DriveModel, JointMotion, PlatformMotion, load_model
+from pprs_dynamics import DriveModel, JointMotion, MechanismModel, PlatformMotion, load_model
 from pprs_dynamics.errors import EffectError
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples, GainEffect
 from pprs_dynamics.physics.effects.effect import Card, Parameter
@@ -55,10 +55,10 @@ def test_a_failing_effect_on_the_bodies_is_one_error_with_its_name(
     assert told in str(raised.value)
 
 
-def hexapod_with(effect: str, **block: float) -> ArmModel:
+def hexapod_with(effect: str, **block: float) -> MechanismModel:
     added = {f'effects.{effect}.{key}': value for key, value in block.items()}
-    return ArmModel.from_parameters({**load_model('config/hexapod.yaml').values,
-                                     'effects.active': [effect], **added}, 'config/hexapod.yaml')
+    values = {**load_model('config/hexapod.yaml').values, 'effects.active': [effect], **added}
+    return MechanismModel.from_parameters(values, 'config/hexapod.yaml')
 
 
 def test_an_effect_on_the_bodies_acts_on_a_robot_with_loops_as_well(package: ModuleType) -> None:

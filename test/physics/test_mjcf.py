@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pprs_dynamics import ArmModel, JointMotion, load_model
+from pprs_dynamics import JointMotion, MechanismModel, load_model
 from pprs_dynamics.errors import PprsError
 
 mujoco = pytest.importorskip('mujoco')
@@ -54,7 +54,7 @@ def test_an_arm_is_that_of_mj_inverse_with_ref_rotor_friction_and_gravity(
     tmp_path: Path, dry: float,
 ) -> None:
     model = load_model(arm(tmp_path, dry))
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     engine = mujoco.MjModel.from_xml_path(str(tmp_path / 'robot.xml'))
     engine.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
     data = mujoco.MjData(engine)
@@ -100,14 +100,14 @@ LOOP = '''<mujoco><compiler angle="radian"/><option gravity="0 -9.81 0"/><worldb
 @pytest.mark.parametrize('anchor', ['0 0 0', '0.03 -0.02 0'])
 def test_a_weld_closes_at_its_anchor_and_passive_joints_rub(tmp_path: Path, anchor: str) -> None:
     model = load_model(write(tmp_path, LOOP.format(ref=0.3, anchor=anchor), 'a', 'rod'))
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     engine = mujoco.MjModel.from_xml_path(str(tmp_path / 'robot.xml'))
     engine.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     data = mujoco.MjData(engine)
     q = np.linspace(0.1, 0.6, 7)[:, None]
     v, a = np.random.default_rng(0).normal(size=(2, 7, 1))
     motion = JointMotion(q, v, a)
-    found, m = model.drive_forces(motion).total, model.mechanism(motion).linkage.motion
+    found, m = model.drive_forces(motion).total, model.mechanism(motion).links.motion
     s = model.robot.structure
     order = [s.tables.coordinate[s.rows[name]] for name in 'abcd']
     assert s.home[order[0]] == pytest.approx(0.3)
@@ -135,7 +135,7 @@ def test_a_coupling_counts_from_where_bodies_are_placed(tmp_path: Path) -> None:
       <equality><joint joint1="b" joint2="a" polycoef="0.1 3 0 0 0"/></equality></mujoco>'''
     model = load_model(write(tmp_path, text, 'a', 'one'))
     q = np.array([[0.3]])
-    state = model.mechanism(JointMotion(q, 0 * q, 0 * q)).linkage.motion
+    state = model.mechanism(JointMotion(q, 0 * q, 0 * q)).links.motion
     s = model.robot.structure
     row = s.rows['b']
     angle = s.tables.ratio[row] * state.q[0, s.tables.coordinate[row]] + s.tables.offset[row]
@@ -162,7 +162,7 @@ def test_what_a_mechanism_cannot_have_is_refused_by_name(
 
 def test_a_body_that_does_not_weigh_what_it_weighs_is_refused(tmp_path: Path) -> None:
     text = ARM.format(dry=0, more='', end='').replace('<body name="beam"',
-                                                       '<body name="beam" gravcomp="1"')
+                                                      '<body name="beam" gravcomp="1"')
     with pytest.raises(PprsError, match=r'beam.*gravcomp'):
         load_model(write(tmp_path, text, 'turn, reach, swing', 'tool'))
 

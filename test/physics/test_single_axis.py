@@ -15,7 +15,7 @@ import pytest
 from pprs_command import pprs
 from ros_processes import environment, executable
 
-from pprs_dynamics import ArmModel, DriveModel, JointMotion, load_model
+from pprs_dynamics import DriveModel, JointMotion, MechanismModel, load_model
 from pprs_dynamics.errors import ModelError, MotionError
 from pprs_dynamics.inference.adoption.request import EffectRequest, EffectRequestError
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
@@ -109,9 +109,9 @@ def test_an_effect_adds_its_closed_form_and_changes_nothing_else() -> None:
 
 def test_the_shipped_file_loads_by_both_loaders_and_a_robot_is_no_axis() -> None:
     assert load_model(FILE).kind == 'axis'
-    assert ArmModel.load('config/single_axis.yaml').values == load_model(FILE).values
+    assert MechanismModel.load('config/single_axis.yaml').values == load_model(FILE).values
     with pytest.raises(ModelError, match='single axis'):
-        ArmModel.load(CONFIG / 'paper.yaml')
+        MechanismModel.load(CONFIG / 'paper.yaml')
     with pytest.raises(ModelError, match=r'axis\.mass is 95\.109.*3-PPRS'):
         DriveModel.load(FILE)
 

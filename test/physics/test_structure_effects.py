@@ -327,10 +327,10 @@ def test_the_body_with_an_effect_is_a_robot_of_its_own(case, name) -> None:
     assert vars(masses) == kept
     assert state.robot.masses is masses
     # Guide loads change with it: the friction that follows loads does, too.
-    assert np.abs(applied.guide_load - state.guide_load).max() > 1e-3
+    assert np.abs(applied.friction_load - state.friction_load).max() > 1e-3
     if name in ('base_tilt', 'link_mass', 'payload_mass', 'payload_offset', 'platform_inertia'):
         fresh = model_of(robot_of(effect.changed(robot))).mechanism(motion)
-        assert_allclose(applied.guide_load, fresh.guide_load, rtol=0, atol=FORCE_TOLERANCE)
+        assert_allclose(applied.friction_load, fresh.friction_load, rtol=0, atol=FORCE_TOLERANCE)
 
 
 def robot_of(robot):

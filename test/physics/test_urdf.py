@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 import robots_with_loops as robots
 
-from pprs_dynamics import ArmModel, JointMotion, load_model
+from pprs_dynamics import JointMotion, MechanismModel, load_model
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.description import Description
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
-from pprs_dynamics.physics.model.arm_model import inertial_values
+from pprs_dynamics.physics.model.mechanism_model import inertial_values
 from pprs_dynamics.physics.model.model_file import build_model
 
 INERTIA = '<inertia ixx="{}" iyy="{}" izz="{}" ixy="0" ixz="0" iyz="0"/>'
@@ -75,7 +75,7 @@ def as_constraints(text: robots.RobotText, folder: Path) -> Path:
 @pytest.mark.parametrize('kind', ['five_bar', 'hexapod'])
 def test_loops_are_read_from_constraints(tmp_path: Path, kind: str) -> None:
     make = getattr(robots, kind)
-    expected = ArmModel.load(make().write(tmp_path))
+    expected = MechanismModel.load(make().write(tmp_path))
     s = expected.robot.structure
     home = s.home[s.tables.drives]
     q, v, a = np.random.default_rng(0).uniform(-0.02, 0.02, size=(3, 5, len(home)))

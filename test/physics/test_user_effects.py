@@ -213,7 +213,7 @@ print(json.dumps({'found': found.to_dict(), 'adopted': answer.to_dict()}))
 """
 
 
-def test_a_sensor_effect_of_another_package_that_bends_columns_is_found_and_adopted(
+def test_a_nonlinear_sensor_effect_of_another_package_is_found_and_adopted(
         installed: Path, tmp_path: Path) -> None:
     done = python(FIND_DEAD_BAND, installed, model_file(tmp_path, {}), limit=200)
     assert done.returncode == 0, done.stderr

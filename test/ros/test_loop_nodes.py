@@ -23,9 +23,10 @@ from trajectory_msgs.msg import (
     MultiDOFJointTrajectory,
 )
 
-from pprs_dynamics import ArmModel, JointMotion, PlatformMotion
+from pprs_dynamics import JointMotion, MechanismModel, PlatformMotion
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
+from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.monitor import MonitorNode
 from pprs_dynamics.ros.play_trajectory import PlayTrajectoryNode
 from pprs_dynamics.ros.run_node import Finished
@@ -50,7 +51,7 @@ def node() -> Iterator[FeedforwardBench]:
         yield running
 
 
-def drives_message(model: ArmModel, position: np.ndarray) -> JointTrajectory:
+def drives_message(model: MechanismModel, position: np.ndarray) -> JointTrajectory:
     zero = np.zeros(len(position)).tolist()
     return JointTrajectory(joint_names=list(model.drives), points=[JointTrajectoryPoint(
         positions=position.tolist(), velocities=zero, accelerations=zero,
@@ -58,7 +59,7 @@ def drives_message(model: ArmModel, position: np.ndarray) -> JointTrajectory:
 
 
 def test_efforts_are_the_models_and_what_cannot_be_is_refused(node: FeedforwardBench) -> None:
-    model = ArmModel.load(FILE)
+    model = MechanismModel.load(FILE)
     home = model.robot.structure.home[model.robot.structure.tables.drives]
     near = home + 0.01 * np.arange(6)
     rest = np.zeros((1, 6))
@@ -83,7 +84,7 @@ def poses(rng: np.random.Generator, points: int = 1) -> PlatformMotion:
 
 
 def test_poses_of_the_tool_are_answered_or_refused_as_those_of_a_platform() -> None:
-    model, motion = ArmModel.load(FILE), poses(np.random.default_rng(4), 3)
+    model, motion = MechanismModel.load(FILE), poses(np.random.default_rng(4), 3)
     forces = model.drive_forces(motion)
     with feedforward_bench(MultiDOFJointTrajectory, 'pose_trajectory', **parameters()) as node:
         np.testing.assert_allclose(node.answer(message_of(motion)), forces.total[0], rtol=0,
@@ -122,7 +123,7 @@ def given(**own: Any) -> list[Parameter]:
 
 def test_the_simulated_robot_holds_moves_and_refuses() -> None:
     """How it follows a whole path is tested in simulated time."""
-    model = ArmModel.load(FILE)
+    model = MechanismModel.load(FILE)
     home, _ = model.robot.structure.room(np.pi)
     with bench() as running:
         states = running.listen(JointState, '/joint_states', 1000)
@@ -153,7 +154,7 @@ def test_the_simulated_robot_holds_moves_and_refuses() -> None:
 
 
 def test_the_path_is_an_excitation_of_the_drives_from_rest_to_rest() -> None:
-    model = ArmModel.load(FILE)
+    model = MechanismModel.load(FILE)
     home, room = model.robot.structure.room(np.pi)
     with bench() as running:
         heard = running.listen(JointTrajectory, '/feedforward/trajectory', 1000)
@@ -172,3 +173,31 @@ def test_the_path_is_an_excitation_of_the_drives_from_rest_to_rest() -> None:
     assert heard[3].points[1].positions == heard[4].points[0].positions
     assert heard[3].points[1].time_from_start.nanosec == 25_000_000
     model.drive_forces(JointMotion(*motion.transpose(1, 0, 2)))
+
+
+def test_the_platform_is_on_tf_while_somebody_draws_the_robot() -> None:
+    tf = pytest.importorskip('tf2_msgs.msg', reason='tf2_msgs comes with a ROS 2 installation only')
+    model, motion = MechanismModel.load(FILE), poses(np.random.default_rng(5))
+    position = model.drive_forces(motion).mechanism.position[0]
+    with bench() as running:
+        running.add(MonitorNode, parameter_overrides=overrides(**parameters()))
+        heard = running.listen(tf.TFMessage, '/tf', 10)
+        running.listen(JointState, '/monitor/joint_states_full', 10)
+        states = running.probe.create_publisher(JointState, '/joint_states', 10)
+        assert running.connected()
+        message = conversions.joint_positions(1_000_000_000, model.drives, position)
+        message.effort = [float('nan')] * 6  # not measured
+
+        def drawn() -> bool:
+            states.publish(message)
+            running.spin_for(0.05)
+            return bool(heard)
+
+        assert running.spin_until(drawn)
+        found, = heard[0].transforms
+        assert (found.header.frame_id, found.child_frame_id) == ('base', 'platform')
+        assert found.header.stamp == message.header.stamp
+        at, turn = found.transform.translation, found.transform.rotation
+        np.testing.assert_allclose([at.x, at.y, at.z], motion.position[0], atol=1e-6)
+        told = np.array([turn.x, turn.y, turn.z, turn.w])
+        assert abs(told @ motion.orientation[0]) == pytest.approx(1.0, abs=1e-9)

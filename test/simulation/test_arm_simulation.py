@@ -12,7 +12,7 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 
-from pprs_dynamics import ArmModel
+from pprs_dynamics import MechanismModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
@@ -25,7 +25,7 @@ from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 
 
 @pytest.fixture(scope='module')
-def model(tmp_path_factory: pytest.TempPathFactory) -> ArmModel:
+def model(tmp_path_factory: pytest.TempPathFactory) -> MechanismModel:
     """Return an arm whose links are not those of its URDF, and with joints in another order."""
     described = arm.real_arm(tmp_path_factory.mktemp('arm'))
     mass = np.array(described.robot.inertial) * np.array([1.3, 0.9, 1.1])[:, None]
@@ -34,11 +34,11 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> ArmModel:
         'links.moment': tuple(mass[:, 1:4].ravel()),
         'links.inertia': tuple(mass[:, 4:][:, [0, 2, 5, 1, 3, 4]].ravel()),
         'arm.armature': (0.4, 0.2, 1.0)}, described.source)
-    assert isinstance(found, ArmModel)
+    assert isinstance(found, MechanismModel)
     return found
 
 
-def test_the_engine_moves_the_bodies_of_the_model(model: ArmModel) -> None:
+def test_the_engine_moves_the_bodies_of_the_model(model: MechanismModel) -> None:
     motion = draw_motion(model, 10.0, 0)
     engine = ArmEngine(model)
     assert engine.torques(motion) == pytest.approx(
@@ -46,7 +46,7 @@ def test_the_engine_moves_the_bodies_of_the_model(model: ArmModel) -> None:
         - np.array(model.values['arm.armature']) * motion.acceleration, abs=1e-8)
 
 
-def test_a_hidden_payload_is_a_point_at_the_tool(model: ArmModel) -> None:
+def test_a_hidden_payload_is_a_point_at_the_tool(model: MechanismModel) -> None:
     motion = draw_motion(model, 10.0, 1)
     engine = ArmEngine(model)
     before = engine.torques(motion)
@@ -58,8 +58,8 @@ def test_a_hidden_payload_is_a_point_at_the_tool(model: ArmModel) -> None:
 
 
 @pytest.mark.parametrize('of', ['arm', 'hexapod'])
-def test_a_wrench_at_the_tool_is_that_of_the_engine(model: ArmModel, of: str) -> None:
-    robot = model if of == 'arm' else ArmModel.load('config/hexapod.yaml')
+def test_a_wrench_at_the_tool_is_that_of_the_engine(model: MechanismModel, of: str) -> None:
+    robot = model if of == 'arm' else MechanismModel.load('config/hexapod.yaml')
     motion = draw_motion(robot, 2.0, 1)
     engine = ArmEngine(robot)
     before = engine.torques(motion)
@@ -70,7 +70,7 @@ def test_a_wrench_at_the_tool_is_that_of_the_engine(model: ArmModel, of: str) ->
         loaded.rigid_force - state.rigid_force, abs=1e-8)
 
 
-def test_a_hidden_link_mass_is_that_of_the_model(model: ArmModel) -> None:
+def test_a_hidden_link_mass_is_that_of_the_model(model: MechanismModel) -> None:
     motion = draw_motion(model, 10.0, 1)
     engine = ArmEngine(model)
     before = engine.torques(motion)
@@ -82,25 +82,27 @@ def test_a_hidden_link_mass_is_that_of_the_model(model: ArmModel) -> None:
 
 
 @pytest.mark.parametrize('name', ['slider', 'nowhere'])
-def test_a_link_that_is_the_payloads_or_not_there_is_refused(model: ArmModel, name: str) -> None:
+def test_a_link_that_is_the_payloads_or_not_there_is_refused(
+    model: MechanismModel, name: str,
+) -> None:
     with pytest.raises(ModelError, match=f'unknown key effects.link_mass.{name}.mass'):
         build_model({**model.values, 'effects.active': ['link_mass'],
                      f'effects.link_mass.{name}.mass': 0.7}, model.source)
 
 
-def test_without_effects_the_model_leaves_noise(model: ArmModel) -> None:
+def test_without_effects_the_model_leaves_noise(model: MechanismModel) -> None:
     run = simulate_arm(model, (), 0, noise=0.3)
     error = run.effort - model.drive_forces(run.motion).total
     assert np.std(error, axis=0) == pytest.approx(np.full(3, 0.3), rel=0.1)
 
 
-def test_an_arm_has_no_passive_joint_that_could_rub(model: ArmModel) -> None:
+def test_an_arm_has_no_passive_joint_that_could_rub(model: MechanismModel) -> None:
     with pytest.raises(HiddenEffectError, match='needs a passive joint'):
         simulate_arm(model, ('joint_friction',), 4, duration=10.0)
 
 
 @pytest.mark.parametrize('name', [name for name in NAMES if name != 'joint_friction'])
-def test_every_hidden_effect_shows(wrist: ArmModel, name: str) -> None:
+def test_every_hidden_effect_shows(wrist: MechanismModel, name: str) -> None:
     model = wrist
     # A slow motion turns the joints farther, as a cylinder needs.
     duration = 30.0 if name == 'counterbalance' else 10.0
@@ -118,17 +120,17 @@ def test_every_hidden_effect_shows(wrist: ArmModel, name: str) -> None:
                      'lost_motion', 'current_gain'})
 
 
-def test_motors_without_a_map_rub_nowhere(model: ArmModel) -> None:
+def test_motors_without_a_map_rub_nowhere(model: MechanismModel) -> None:
     with pytest.raises(HiddenEffectError, match=r'friction: \{motors:'):
         simulate_arm(model, ('coupled_drives',), 4, duration=10.0)
 
 
 @pytest.fixture(scope='module')
-def wrist(model: ArmModel) -> ArmModel:
+def wrist(model: MechanismModel) -> MechanismModel:
     """Return the arm with a motor that turns with two joints."""
     found = build_model({**model.values, 'friction.motors.wrist.turn': 1.0,
                          'friction.motors.wrist.swing': 1.0}, model.source)
-    assert isinstance(found, ArmModel)
+    assert isinstance(found, MechanismModel)
     return found
 
 
@@ -136,7 +138,7 @@ def wrist(model: ArmModel) -> ArmModel:
     ('payload_mass', 1), ('link_mass', 1), ('viscous_friction', 2), ('coulomb_friction', 3),
     ('friction_temperature', 1), ('friction_temperature', 2), ('friction_drift', 1),
     ('counterbalance', 1), ('coupled_drives', 1), ('current_gain', 1), ('effort_gain', 1)])
-def test_what_is_hidden_is_named(wrist: ArmModel, name: str, seed: int) -> None:
+def test_what_is_hidden_is_named(wrist: MechanismModel, name: str, seed: int) -> None:
     model = wrist
     run = simulate_arm(model, (name,), seed, thermometers=True)
     assert run.motion.time is not None
@@ -162,7 +164,7 @@ def test_the_command_writes_recording_and_truth(tmp_path: Path,
     assert 'no hidden effect of such a robot' in capsys.readouterr().err
 
 
-def test_statements_have_the_units_of_joints(model: ArmModel, tmp_path: Path,
+def test_statements_have_the_units_of_joints(model: MechanismModel, tmp_path: Path,
                                              capsys: pytest.CaptureFixture[str]) -> None:
     without = build_model({**model.values, 'friction.coulomb': (0.0, 4.0, 0.0)}, model.source)
     from pprs_dynamics.inference.diagnosis.localisation import localise

@@ -17,7 +17,7 @@ import pinocchio
 import pytest
 from robots_with_loops import five_bar
 
-from pprs_dynamics import ArmModel, DriveModel
+from pprs_dynamics import DriveModel, MechanismModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.paths import Excitation
@@ -197,7 +197,7 @@ def test_robots_with_loops(name: str, kind: str, tmp_path: Path) -> None:
     file, result = exported(f'config/{name}.yaml', kind, tmp_path)
     assert result['replay_error'] == pytest.approx(result['expected_error'], abs=1e-8)
     model = load_model(f'config/{name}.yaml')
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     # Read as any robot's file, it moves as the model's bodies do.
     own = {key: value for key, value in model.values.items()
            if not key.startswith(('robot.urdf', 'friction.joints'))
@@ -206,7 +206,7 @@ def test_robots_with_loops(name: str, kind: str, tmp_path: Path) -> None:
     again = build_model({**own, f'robot.{kind}': str(file), 'robot.base': base})
     motion = draw_motion(model, 3.0, 1)
     expected = model.drive_forces(motion).parts['rigid_body']
-    assert isinstance(again, ArmModel)
+    assert isinstance(again, MechanismModel)
     assert again.drive_forces(motion).parts['rigid_body'] == pytest.approx(
         expected, abs=1e-8 * np.abs(expected).max())
     if kind == URDF:
@@ -245,7 +245,7 @@ def test_an_arm_in_another_library(tmp_path: Path) -> None:
     path = arm.write_arm(tmp_path, friction__viscous=[8.0, 5.0, 20.0],
                          friction__coulomb=[6.0, 4.0, 9.0])
     model = load_model(path)
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     file, result = exported(path, URDF, tmp_path)
     assert result['not_expressed'] == []
     assert result['replay_error'] == pytest.approx(result['expected_error'], abs=1e-9)
@@ -309,7 +309,7 @@ def test_a_body_that_cannot_be_is_refused_and_nothing_is_written(
 
 def test_a_closure_that_mujoco_lacks_is_refused() -> None:
     model = load_model('config/delta.yaml')
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     structure = model.robot.structure
     other = replace(structure, loops=tuple(
         replace(loop, kind='universal') for loop in structure.loops))
@@ -325,7 +325,7 @@ def test_joints_of_the_urdf_put_the_platform_where_it_is(motion: Any) -> None:
     position = model.drive_forces(motion).mechanism.position
     for k in range(0, len(motion), 20):
         q = pinocchio.neutral(robot)
-        for name, value in zip(tree.names, tree.at(position[k]), strict=True):
+        for name, value in zip(tree.names, tree.at(position[k]).joints, strict=True):
             joint = robot.joints[robot.getJointId(name)]
             # Joints without limits are a cosine and a sine there.
             q[joint.idx_q:joint.idx_q + joint.nq] = (
@@ -335,3 +335,30 @@ def test_joints_of_the_urdf_put_the_platform_where_it_is(motion: Any) -> None:
         assert platform.translation == pytest.approx(motion.position[k], abs=1e-9)
         turn = pinocchio.Quaternion(platform.rotation).coeffs()
         assert abs(turn @ motion.orientation[k]) == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize('name', ['hexapod', 'delta'])
+def test_joints_and_free_bodies_of_the_urdf_meet_at_every_closure(name: str) -> None:
+    model = load_model(f'config/{name}.yaml')
+    assert isinstance(model, MechanismModel)
+    structure = model.robot.structure
+    tree = TreePositions(model)
+    robot = pinocchio.buildModelFromXML(text_of(model, URDF))
+    data = robot.createData()
+    home = structure.home[structure.tables.drives]
+    for shift in np.random.default_rng(3).uniform(-0.03, 0.03, (5, len(home))):
+        pose = tree.at(home + shift)
+        q = pinocchio.neutral(robot)
+        for joint_name, value in zip(tree.names, pose.joints, strict=True):
+            joint = robot.joints[robot.getJointId(joint_name)]
+            q[joint.idx_q:joint.idx_q + joint.nq] = (
+                [value] if joint.nq == 1 else [np.cos(value), np.sin(value)])
+        pinocchio.framesForwardKinematics(robot, data, q)
+        place = {frame.name: data.oMf[k] for k, frame in enumerate(robot.frames)}
+        # What robot_state_publisher leaves out is put where tf says that it is.
+        for link, told in zip(tree.bodies, pose.bodies, strict=True):
+            place[link] = place[tree.base] * pinocchio.XYZQUATToSE3(told)
+        assert structure.loops
+        for loop in structure.loops:
+            np.testing.assert_allclose(place[loop.a].act(loop.frame_a.p),
+                                       place[loop.b].act(loop.frame_b.p), atol=1e-9)

@@ -117,7 +117,7 @@ def test_the_model_explains_other_robots_too(change: dict[str, object]) -> None:
 
 def test_guide_loads_come_out_as_in_the_model(plain: SimulatedRun) -> None:
     assert plain.truth is not None
-    loads = MODEL.drive_forces(plain.platform_motion()).mechanism.guide_load
+    loads = MODEL.drive_forces(plain.platform_motion()).mechanism.friction_load
     assert np.abs(plain.truth.guide_load - loads).max() < 1e-4
 
 
@@ -448,7 +448,7 @@ def test_the_drives_give_the_power_that_the_effect_takes(name: str, power: objec
 def test_forces_on_the_platform_raise_the_friction_of_the_guides() -> None:
     effect = drawn('external_wrench')
     run = simulate(MODEL.values, wave(0.3), [effect], control=WEIGHT_HELD, sensors=QUIET)
-    loads = MODEL.drive_forces(run.platform_motion()).mechanism.guide_load
+    loads = MODEL.drive_forces(run.platform_motion()).mechanism.friction_load
     assert np.abs(run.truth.guide_load - loads).max() > 0.1
 
 
@@ -782,16 +782,16 @@ CONTAINERS = (
     'pprs_dynamics.drives', 'pprs_dynamics.physics.effects.former_names',
     'pprs_dynamics.physics.mechanism.motion', 'pprs_dynamics.physics.mechanism.joint_motion',
     'pprs_dynamics.physics.mechanism.structure_load',
-    'pprs_dynamics.physics.mechanism.joint_series', 'pprs_dynamics.physics.model.arm_model',
+    'pprs_dynamics.physics.mechanism.joint_series', 'pprs_dynamics.physics.model.mechanism_model',
     'pprs_dynamics.physics.model.limits')
 # Robots by URDF are built in MuJoCo from what was read of their file: joints, loops and names. Of
 # equations they share one: the friction that the model file itself gives passive joints, which
 # hides nothing. All that is hidden, and the rigid body, is the engine's or a form of its own.
 DESCRIPTION = tuple(f'pprs_dynamics.physics.mechanism.{name}' for name in (
-    'description', 'urdf', 'structure', 'closures', 'mechanism', 'linkage_equations',
+    'description', 'urdf', 'structure', 'closures', 'mechanism', 'tree_equations',
     'passive_joints'))
 OF_ARMS = {'engine_state.py': DESCRIPTION,
-           **dict.fromkeys(('arm_run.py', 'linkage_plant.py'), (
+           **dict.fromkeys(('arm_run.py', 'mechanism_plant.py'), (
                *DESCRIPTION, 'pprs_dynamics.physics.effects.laws.joint_friction'))}
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.hidden.motions import joint_motion
-from pprs_dynamics import ArmModel, JointMotion
+from pprs_dynamics import JointMotion, MechanismModel
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.model_file import build_model
@@ -59,15 +59,15 @@ def write_arm(folder: Path, text: str = '', joints: tuple[str, ...] = JOINTS,
     return path
 
 
-def real_arm(folder: Path, **changes: Any) -> ArmModel:
+def real_arm(folder: Path, **changes: Any) -> MechanismModel:
     """Return the arm with friction, and with other values."""
-    model = ArmModel.load(write_arm(folder))
+    model = MechanismModel.load(write_arm(folder))
     real = build_model({**model.values, **FRICTION, **changes}, model.source)
-    assert isinstance(real, ArmModel)
+    assert isinstance(real, MechanismModel)
     return real
 
 
-def record(model: ArmModel, moved: JointMotion, noise: float = 0.2, seed: int = 0,
+def record(model: MechanismModel, moved: JointMotion, noise: float = 0.2, seed: int = 0,
            ) -> Recording:
     """Return what a recording of the arm would hold, with white noise of the efforts."""
     forces = model.measured(model.drive_forces(moved))

@@ -73,7 +73,7 @@ class EffectRow {
     this.node.classList.toggle('ticked', effect.is_ticked);
     this.box.checked = effect.is_ticked;
     this.title.replaceChildren(titleOf(effect.name));
-    if (effect.bends_columns) {
+    if (effect.nonlinear) {
       this.title.append(make('abbr', ' ≈', '', {
         title: 'bends how others show: approximate until it is evaluated'}));
     }

@@ -73,7 +73,7 @@ export class WhatIf {
         drives: own(effect).map((one) => one.drive),
         places: effect.placements.map((one) => one.drive),
         is_on_drives: effect.placements[0].drive !== null, evidence: evidence.get(effect),
-        evidence_is_pending: false, bends_columns: effect.is_approximate,
+        evidence_is_pending: false, nonlinear: effect.is_approximate,
         is_called_for: effect.placements.some((one) => one.is_found), parameters: []})),
       now: drives.map((drive) => curveOf(drive, weightsOf(drive, c), gap))};
   }

@@ -24,8 +24,8 @@ from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.residuals.mistakes import effort_looks_like
 from pprs_dynamics.measurement.files.recording import Summary, describe
 from pprs_dynamics.measurement.files.repeats import find_repeat
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.model_file import load_model
 
 EXAMPLE = 'pprs info run.mcap --model robot.yaml'
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     model = load_model(options.model)
     content: dict[str, Any] = {}
-    if isinstance(model, ArmModel) and model.is_described:
+    if isinstance(model, MechanismModel) and model.is_described:
         content['robot'] = describe_mechanism(model)
         for line in mechanism_lines(model):
             screen.print(shown(line))

@@ -27,8 +27,8 @@ from pprs_dynamics.inference.experiments.next_experiment import next_experiment 
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
@@ -160,14 +160,14 @@ def next_experiment(
     found = inputs.model
     share_done = stage(progress, 'designing')
     designed: Experiment | ArmExcitation
-    kind = ArmLimits if isinstance(found, ArmModel) else MotionLimits
+    kind = ArmLimits if isinstance(found, MechanismModel) else MotionLimits
     if limits is not None and not isinstance(limits, kind):
         raise InputError(f'limits are {type(limits).__name__}, must be {kind.__name__} for '
                          f'{found.title}')
-    if isinstance(found, ArmModel) and purpose == 'commission':
+    if isinstance(found, MechanismModel) and purpose == 'commission':
         designed = excite_arm(found, limits if isinstance(limits, ArmLimits) else ArmLimits(),
                               duration, seed, share_done)
-    elif isinstance(found, (ArmModel, DriveModel)):
+    elif isinstance(found, (MechanismModel, DriveModel)):
         designed = design(found, inputs.fitted, purpose, limits, duration, seed, noise,
                           share_done)
     else:

@@ -19,9 +19,9 @@ from pprs_dynamics.measurement.files.recording import Recording, describe, write
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.simulation.drive_control import ControlSettings, Note
@@ -89,7 +89,7 @@ class SimulationResult(Result):
         """Return the page of `pprs simulate --report`: the moving robot."""
         from pprs_dynamics.app.report.robot_view import robot_page
 
-        assert isinstance(self.model, (DriveModel, ArmModel))
+        assert isinstance(self.model, (DriveModel, MechanismModel))
         return robot_page(self.model, self.motion, 'The simulated motion')
 
     def table(self) -> DataFrame:
@@ -157,7 +157,7 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     found = model if isinstance(model, ForceModel) else load_model(find_file(model))
     names = [effects] if isinstance(effects, str) else list(effects)
     share_done = stage(progress, 'simulating')
-    if isinstance(found, ArmModel) and found.is_described:
+    if isinstance(found, MechanismModel) and found.is_described:
         from pprs_dynamics.simulation.arm_run import RATE as ARM_RATE
         from pprs_dynamics.simulation.arm_run import simulate_arm
 

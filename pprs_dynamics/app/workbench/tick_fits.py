@@ -270,8 +270,8 @@ class TickFits:
     def exact(self, found: CandidateSet, is_free: bool) -> Exact:
         """Return the fitted model and what it leaves, with nothing linear about it.
 
-        Where an effect of the set bends the columns of others, and nothing is held, the set is
-        fitted around its own model first.
+        Where an effect of the set is nonlinear, and nothing is held, the set is fitted around
+        its own model first.
 
         Raises
         ------
@@ -279,7 +279,7 @@ class TickFits:
             For values that no model may have, or that cannot be followed.
         """
         fits, parameters = self.fits, None
-        if is_free and any(c.effect.bends_columns for c in found.effects):
+        if is_free and any(c.effect.nonlinear for c in found.effects):
             fits, found = relinearised(fits, found)
             parameters = {c.name: estimate(fits, found, c, True).parameters for c in found.effects}
         model = fitted_model(fits, found)

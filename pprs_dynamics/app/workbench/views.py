@@ -127,9 +127,9 @@ class ViewState:
 
     @property
     def is_approximate(self) -> bool:
-        """True where an effect bends the columns of others and nothing exact is known yet."""
+        """True where an effect is nonlinear and nothing exact is known yet."""
         return self.stage != EXACT and any(
-            tick.effect.bends_columns for tick in self.ticks.values())
+            tick.effect.nonlinear for tick in self.ticks.values())
 
 
 def without_ticks(fits: TickFits, revision: int) -> ViewState:
@@ -221,7 +221,7 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: ForceM
         'is_on_drives': issubclass(effect, DriveEffect), 'evidence': finite(evidence),
         'evidence_terms': '' if without is None else word_terms(without),
         'evidence_is_pending': (view.stage == LINEAR if tick else not view.has_offers),
-        'bends_columns': effect.bends_columns,
+        'nonlinear': effect.nonlinear,
         'is_called_for': called_for is not None and effect.name in called_for,
         'is_judged': called_for is not None,
         'equation': card.equation, 'looks_like': card.looks_like,

@@ -70,6 +70,7 @@ from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.form import Remainder
 from pprs_dynamics.inference.search.held_out import hold_out
 from pprs_dynamics.inference.search.noise_floors import noise_floors
+from pprs_dynamics.inference.search.possible_totals import left_at_nothing
 from pprs_dynamics.inference.search.ranking import Ranking, select, without_search
 from pprs_dynamics.inference.search.relinearisation import settled
 from pprs_dynamics.measurement.files.recording import Recording
@@ -402,8 +403,8 @@ class _Answer:
             without = self._told(self.ranking.best_without(candidate),
                                  self.ranking.best_with(candidate))
             in_model = self._in_model(candidate, said.parameters)
-            impossible = why_impossible(
-                candidate.effect, said.parameters, self.design, self.decisions)
+            impossible = why_impossible(candidate.effect, said.parameters, self.decisions) or (
+                self._why_less_than_nothing(candidate))
             # Numbers that stand for each other in part are uncertain each, and not together.
             nothing = '' if without.cost > self.decisions.rival_margin else why_nothing(
                 candidate.effect, said.parameters, in_model)
@@ -415,6 +416,14 @@ class _Answer:
                 impossible or nothing, bool(impossible),
                 without, in_model, moments=said.moments))
         return found
+
+    def _why_less_than_nothing(self, candidate: EffectCandidate) -> str:
+        """Return where recordings speak for less than no friction or inertia, as a clause."""
+        if self.reported.terms.feasibility <= self.decisions.rival_margin:
+            return ''
+        return next((f'{self.drives[one.drive]} would have less than no {of} with what the model '
+                     'has' for one in candidate.components if one.drive is not None
+                     for of in left_at_nothing(self.design, self.reported, one)), '')
 
     def _dated_effects(self) -> list[FoundEffect]:
         """Return the effects where some begin, end or grow within the recordings."""
@@ -588,7 +597,7 @@ class _Answer:
             # Those of the search are of constant forms.
             return (RankedSet(tuple((c.name, self.design.named(c.drives))
                                     for c in self.dated.candidates), CostTerms()),)
-        # Of a set that bends nothing the cost is that in the first design.
+        # Of a linear set the cost is that in the first design.
         best, *others = self._of_each_name(self.ranking.sets, MOST_SETS)
         return (best, *sorted(others, key=lambda one: one.cost))
 

@@ -3,8 +3,8 @@
 
 """What a fit may say of an effect and no machine can have: then it is no finding.
 
-Inertia and friction that are negative together with what the model has, a base that leans as none
-does, a gain that is another unit, and values whose interval holds nothing at all.
+A base that leans as none does, a gain that is another unit, and values whose interval holds
+nothing at all. Negative friction and inertia are a matter of cost (`search.possible_totals`).
 """
 
 from __future__ import annotations
@@ -14,31 +14,15 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from pprs_dynamics.inference.diagnosis.quantities import INTERVAL, with_uncertainty
-from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
-from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
-from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.effort_gain import EffortGain
-from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import RIGID_BODY
-
-# Parameters that add to the model's own friction of a drive.
-VISCOUS = {ViscousFriction.name: ('coefficient',),
-           AsymmetricFriction.name: ('viscous_forward', 'viscous_backward')}
-DRY = {CoulombFriction.name: ('force',),
-       AsymmetricFriction.name: ('force_forward', 'force_backward')}
-
-MASSES = ('masses.platform', 'masses.payload', 'masses.slides', 'masses.lifts', 'masses.rods')
 
 
 def why_impossible(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
-                   design: Design, decisions: Decisions) -> str:
+                   decisions: Decisions) -> str:
     """Return why what a fit says of an effect cannot be, as a clause; '' where it can.
 
     Parameters
@@ -46,11 +30,9 @@ def why_impossible(effect: type[CatalogueEffect], parameters: Mapping[str, Estim
     effect : type of CatalogueEffect
     parameters : mapping of str to Estimate
         By drive.parameter, or parameter.
-    design : Design
-        Of the model and the recordings.
     decisions : Decisions
     """
-    return next(_reasons(effect, parameters, design, decisions), '')
+    return next(_reasons(effect, parameters, decisions), '')
 
 
 def why_nothing(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
@@ -87,10 +69,10 @@ def _sizes(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
             if effect.place_and_parameter(key)[1] in linear and one.value}
 
 
-def _reasons(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate], design: Design,
+def _reasons(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
              decisions: Decisions) -> Iterator[str]:
     for key, one in _sizes(effect, parameters).items():
-        drive, name = effect.place_and_parameter(key)
+        drive, _ = effect.place_and_parameter(key)
         at = f' of {drive}' if drive else ''
         if effect is EffortGain:
             factor = 1 + one.value
@@ -100,51 +82,3 @@ def _reasons(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate], 
         elif effect is BaseTilt and abs(one.value) > decisions.most_tilt:
             yield (f'a base that leans by {np.degrees(abs(one.value)):.3g} degrees was put up so: '
                    'gravity in the model file says how')
-        elif drive in design.drives:
-            yield from _negative(effect, name, drive, one, design)
-
-
-def _negative(effect: type[CatalogueEffect], name: str, drive: str, one: Estimate,
-              design: Design) -> Iterator[str]:
-    """Yield where the model and an effect together have less than nothing, for certain."""
-    d = design.drives.index(drive)
-    if effect is DriveInertia:
-        own, what = _own_inertia(design, d), 'inertia'
-    elif name in VISCOUS.get(effect.name, ()):
-        own, what = _own_viscous(design, d), 'viscous friction'
-    elif name in DRY.get(effect.name, ()):
-        own, what = _own_dry(design, d), 'dry friction'
-    else:
-        return
-    if own + one.value + INTERVAL * one.std < 0:
-        unit = design.residuals.units_of(drive)
-        total = with_uncertainty(own + one.value, one.std, unit.of(one.unit))
-        yield f'{drive} would have {what} of {total} with what the model has'
-
-
-def _own_viscous(design: Design, drive: int) -> float:
-    """Return the model's own viscous friction of a drive [N s/m, N m s/rad]."""
-    friction = design.friction()
-    return 0.0 if friction is None else float(
-        np.broadcast_to(friction.viscous, len(design.drives))[drive])
-
-
-def _own_dry(design: Design, drive: int) -> float:
-    """Return the model's own dry friction of a drive, under its usual load [N, N m]."""
-    friction, usual = design.friction(), np.zeros(len(design.drives))
-    if 'load' in design.residuals.variables:
-        usual = np.median(np.abs(design.residuals.variables['load']), axis=0)
-    return 0.0 if friction is None else float(friction.dry(usual)[drive])
-
-
-def _own_inertia(design: Design, drive: int) -> float:
-    """Return the most that the model has of inertia, as one drive moves alone [kg, kg m^2]."""
-    model = design.given
-    if isinstance(model, DriveModel):  # at most all of its masses
-        return float(sum(np.sum(model.values[key]) for key in MASSES))
-    position = design.residuals.variables['position']
-    still, pushed = np.zeros_like(position), np.zeros_like(position)
-    pushed[:, drive] = 1.0
-    moved, held = (model.drive_forces(JointMotion(position, still, one)).parts[RIGID_BODY]
-                   for one in (pushed, still))
-    return float(np.max((moved - held)[:, drive]))

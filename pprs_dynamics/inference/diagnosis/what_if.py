@@ -216,7 +216,7 @@ class _System:
                   *(column for block in self.unknown for column in self.columns[block])]
         return WhatIf(
             tuple(OptionalEffect(
-                name, catalogue()[name].bends_columns,
+                name, catalogue()[name].nonlinear,
                 tuple(self._optional(placement) for (of, _), placement in sorted(
                     self.placements.items(), key=lambda item: item[0][1] or 0) if of == name)
             ) for name in self.first_choice),

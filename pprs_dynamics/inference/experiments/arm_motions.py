@@ -27,7 +27,7 @@ from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.inference.fit.bodies import Bodies
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
-from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 HARMONICS = 8  # of the duration
 WIDEST = np.pi  # [rad, m]: a joint is not moved further from the middle, whatever its range
@@ -65,12 +65,12 @@ class ArmMotions:
 
     Parameters
     ----------
-    model : ArmModel
+    model : MechanismModel
     limits : ArmLimits
     duration : float
     """
 
-    def __init__(self, model: ArmModel, limits: ArmLimits, duration: float) -> None:
+    def __init__(self, model: MechanismModel, limits: ArmLimits, duration: float) -> None:
         tree, left = model.robot.structure, 1 - limits.margin
         self.model, self.duration = model, duration
         self.middle, reach = tree.room(WIDEST)
@@ -171,7 +171,7 @@ class ArmExcitation:
 
     Parameters
     ----------
-    model : ArmModel
+    model : MechanismModel
     series : JointSeries
     determined, total : int
         Numbers of links, rotors and friction that it tells better than the description, and all.
@@ -179,7 +179,7 @@ class ArmExcitation:
         Use of each limit, its margin taken off: at most 1.
     """
 
-    model: ArmModel
+    model: MechanismModel
     series: JointSeries
     determined: int
     total: int
@@ -203,13 +203,13 @@ class ArmExcitation:
                 'total': self.total, 'limits': self.limits, 'duration': self.series.duration}
 
 
-def excite_arm(model: ArmModel, limits: ArmLimits, duration: float, seed: int,
+def excite_arm(model: MechanismModel, limits: ArmLimits, duration: float, seed: int,
                progress: Callable[[float], None] | None = None) -> ArmExcitation:
     """Return a motion that tells most of an arm's numbers.
 
     Parameters
     ----------
-    model : ArmModel
+    model : MechanismModel
     limits : ArmLimits
     duration : float
         [s]

@@ -248,7 +248,7 @@ class ColumnPlan:
                        block: int) -> Design:
         s, total = forces.mechanism, forces.total[part]
         full = FullRate(time, s.position[part], s.velocity[part], s.acceleration[part],
-                        s.direction[part], s.guide_load[part], s.transmitted[part], total, total,
+                        s.direction[part], s.friction_load[part], s.transmitted[part], total, total,
                         (slice(0, len(time)),), treat, float(time[0]), {})
         means = treat(total)
         residuals = Residuals(self.model.drives, treat(time), np.zeros(len(means), dtype=int),

@@ -30,9 +30,9 @@ from pprs_dynamics.inference.experiments.trajectory_search import ArmSearch, Fou
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel, Forces
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 PURPOSES = ('separate', 'commission')
 SURE = 0.9  # probability from which a design counts as separating
@@ -128,7 +128,7 @@ class Experiment:
         Times [s] -> PlatformMotion, or JointMotion of an arm.
     forces : callable
         Times [s] -> Forces.
-    model : DriveModel or ArmModel
+    model : DriveModel or MechanismModel
     """
 
     kind: str
@@ -215,7 +215,7 @@ class Experiment:
 
 def _moved_mass(model: ForceModel) -> float:
     """Return the mass of what a robot moves [kg]."""
-    if isinstance(model, ArmModel):
+    if isinstance(model, MechanismModel):
         return float(model.robot.masses.sum())
     return float(model.values['masses.platform'] + model.values['masses.payload'])
 
@@ -227,7 +227,8 @@ def _listed(pairs: Sequence[tuple[str, str]]) -> str:
 
 
 def next_experiment(
-    model: DriveModel | ArmModel, recordings: Sequence[Recording] = (), purpose: str = 'separate',
+    model: DriveModel | MechanismModel, recordings: Sequence[Recording] = (),
+    purpose: str = 'separate',
     limits: MotionLimits | ArmLimits | None = None, duration: float = 20.0, seed: int = 0,
     noise: float = 0.05, progress: Callable[[float], None] | None = None,
     decisions: Decisions = DECISIONS,
@@ -251,7 +252,7 @@ def next_experiment(
     question = (commissioning(model, recordings, noise, decisions)
                 if purpose == 'commission' and isinstance(model, DriveModel) else
                 question_of(model, recordings, lambda share: report(0.2 * share), decisions))
-    limits = limits or (ArmLimits() if isinstance(model, ArmModel) else MotionLimits())
+    limits = limits or (ArmLimits() if isinstance(model, MechanismModel) else MotionLimits())
     limits = replace(limits, effort_reserve=max(
         limits.effort_reserve, RESERVE * question.noise_floor))
     search: TrajectorySearch | ArmSearch = (

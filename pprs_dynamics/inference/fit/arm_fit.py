@@ -28,7 +28,7 @@ from pprs_dynamics.inference.residuals.reconstruction import (
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.description import PARAMETERS
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.model.arm_model import ArmModel, inertial_values
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel, inertial_values
 from pprs_dynamics.physics.model.model_file import build_model
 
 # Numbers of a joint beside those of its link, in this order.
@@ -70,12 +70,12 @@ class ArmColumns:
     reconstruction: Reconstruction
 
     @classmethod
-    def of(cls, model: ArmModel, recording: Recording) -> ArmColumns:
+    def of(cls, model: MechanismModel, recording: Recording) -> ArmColumns:
         """Return the columns of a recording; errors as `reconstruct`."""
         return cls.of_motion(model, reconstruct(model, recording))
 
     @classmethod
-    def of_motion(cls, model: ArmModel, found: Reconstruction) -> ArmColumns:
+    def of_motion(cls, model: MechanismModel, found: Reconstruction) -> ArmColumns:
         """Return the columns of a recording whose motion is known."""
         treat = found.treat
         total = treated_forces(model, found)['total']
@@ -122,14 +122,14 @@ class ArmColumns:
         return efforts
 
 
-def own_numbers(model: ArmModel) -> Array:
+def own_numbers(model: MechanismModel) -> Array:
     """Return armature, viscous and dry friction, and offset of each joint, (n, 4)."""
     values = model.values
     return np.column_stack([values[key] for key in (
         f'{model.block}.armature', 'friction.viscous', 'friction.coulomb', 'friction.offset')])
 
 
-def columns_of(model: ArmModel, recordings: Sequence[Recording]) -> list[ArmColumns]:
+def columns_of(model: MechanismModel, recordings: Sequence[Recording]) -> list[ArmColumns]:
     """Return the columns of recordings."""
     return [ArmColumns.of(model, recording) for recording in recordings]
 
@@ -140,7 +140,7 @@ class ArmFit:
 
     Parameters
     ----------
-    model : ArmModel
+    model : MechanismModel
     determined, total : int
         Combinations of the links' inertial parameters that the motion determines, and all.
     std : dict of str to (n,) array
@@ -151,7 +151,7 @@ class ArmFit:
         Joints that hardly move.
     """
 
-    model: ArmModel
+    model: MechanismModel
     determined: int
     total: int
     std: dict[str, Array]
@@ -159,12 +159,12 @@ class ArmFit:
     standing: tuple[str, ...]
 
 
-def fit_arm(model: ArmModel, columns: Sequence[ArmColumns]) -> ArmFit:
+def fit_arm(model: MechanismModel, columns: Sequence[ArmColumns]) -> ArmFit:
     """Return the model fitted to recordings.
 
     Parameters
     ----------
-    model : ArmModel
+    model : MechanismModel
         As described; its added effects stay as they are.
     columns : sequence of ArmColumns
         Of that model.
@@ -201,7 +201,7 @@ def fit_arm(model: ArmModel, columns: Sequence[ArmColumns]) -> ArmFit:
         tuple(names[~moving].tolist()))
 
 
-def _with(model: ArmModel, inertial: Array, own: Array, width: Array) -> ArmModel:
+def _with(model: MechanismModel, inertial: Array, own: Array, width: Array) -> MechanismModel:
     """Return the model with fitted numbers, rounded as files have them."""
     def numbers(values: Array) -> tuple[float, ...]:
         return tuple(rounded(float(value)) for value in values)
@@ -214,11 +214,11 @@ def _with(model: ArmModel, inertial: Array, own: Array, width: Array) -> ArmMode
         'friction.coulomb': numbers(own[:, COULOMB]), 'friction.offset': numbers(own[:, OFFSET]),
         'friction.reversal_velocities': numbers(width)}
     fitted = build_model(values, model.source)
-    assert isinstance(fitted, ArmModel)
+    assert isinstance(fitted, MechanismModel)
     return fitted
 
 
-def numbers_at(model: ArmModel, position: Array, velocity: Array, acceleration: Array,
+def numbers_at(model: MechanismModel, position: Array, velocity: Array, acceleration: Array,
                width: Array) -> Array:
     """Return the columns of all numbers at states (M, n), (M, n, 14 n), as `ArmColumns.numbers`."""
     joints = np.stack((acceleration, velocity, np.asarray(smooth_sign(velocity, width)),
@@ -253,14 +253,14 @@ def own_spread(efforts: Array, joints: Array) -> Array:
     return spread
 
 
-def base_prior(model: ArmModel, spread: Array) -> Array:
+def base_prior(model: MechanismModel, spread: Array) -> Array:
     """Return directions of unit variance of a base's numbers, (14 n, 14 n): links, then joints.
 
     Of what is expected before any recording, about the model as it is.
 
     Parameters
     ----------
-    model : ArmModel
+    model : MechanismModel
     spread : (n, 4) array
         See `own_spread`.
     """

@@ -28,8 +28,8 @@ from pprs_dynamics.inference.search.fitted_model import fitted_model
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.relinearisation import relinearised
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.system.numbers import finite
 
 RECORDINGS, HALVES, VALIDATION = 'recordings', 'halves', 'validation'
@@ -149,7 +149,7 @@ def require_open_numbers(model: ForceModel) -> None:
 
 def _is_fitted_whole(model: ForceModel) -> bool:
     """Return whether all numbers are fitted, and not those alone that tolerances leave open."""
-    return isinstance(model, ArmModel) and model.is_described
+    return isinstance(model, MechanismModel) and model.is_described
 
 
 def halves(recording: Recording) -> list[Recording]:
@@ -184,7 +184,7 @@ def _rms(model: ForceModel, squares: Array) -> dict[str, float]:
 def _fitted(model: ForceModel, recordings: Sequence[Recording],
             ) -> tuple[ForceModel, tuple[FittedNumber, ...], tuple[str, ...]]:
     if _is_fitted_whole(model):
-        assert isinstance(model, ArmModel)
+        assert isinstance(model, MechanismModel)
         fit = fit_arm(model, columns_of(model, recordings))
         return fit.model, _numbers(model, fit), _told(model, fit)
     # As in a diagnosis without any effect: the tolerance is the prior, and how friction turns over
@@ -196,7 +196,7 @@ def _fitted(model: ForceModel, recordings: Sequence[Recording],
         for one in calibrations(fits, found, {})), ()
 
 
-def _numbers(model: ArmModel, fit: ArmFit) -> tuple[FittedNumber, ...]:
+def _numbers(model: MechanismModel, fit: ArmFit) -> tuple[FittedNumber, ...]:
     """Return what was fitted of each joint; links are told in `_told`."""
     found = []
     widths = {'friction.reversal_velocities': np.full(len(model.drives), np.inf)}
@@ -211,7 +211,7 @@ def _numbers(model: ArmModel, fit: ArmFit) -> tuple[FittedNumber, ...]:
     return tuple(found)
 
 
-def _told(model: ArmModel, fit: ArmFit) -> tuple[str, ...]:
+def _told(model: MechanismModel, fit: ArmFit) -> tuple[str, ...]:
     told = [f'the motion determines {fit.determined} combinations of the {fit.total} inertial '
             'parameters of the links; all others stay near those of the URDF']
     if fit.weak_links:

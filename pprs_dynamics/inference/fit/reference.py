@@ -55,8 +55,8 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.reference_keys import DIRECTIONS, RESIDUAL
 from pprs_dynamics.system.plain_text import displayed
 
@@ -273,7 +273,7 @@ class Reference:
         numbers = numbers_at(
             model, motion['position'], motion['velocity'], motion['acceleration'],
             model.reversal.widths(count)) if (
-                isinstance(model, ArmModel) and model.is_described) else None
+                isinstance(model, MechanismModel) and model.is_described) else None
         return cls._fitted(model, residuals, numbers, kept, (displayed(model.source),), ())
 
     @classmethod
@@ -459,7 +459,7 @@ def _base(model: ForceModel, numbers: Array | None, residuals: Residuals, kept: 
     """Return columns (M, D, P) of told directions of the base, all directions, and P."""
     if numbers is None:
         return np.zeros((len(residuals), len(residuals.drives), 0)), np.zeros((0, 0)), 0
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     count = len(model.drives)
     joints = numbers[..., -OF_JOINT * count:].reshape(len(numbers), count, count, OF_JOINT)
     prior = base_prior(model, own_spread(
@@ -483,7 +483,7 @@ def _base(model: ForceModel, numbers: Array | None, residuals: Residuals, kept: 
 
 def _numbers(model: ForceModel, found: Reconstruction) -> Array:
     """Return the columns of a base's numbers on a recording, (M, n, 14 n)."""
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     return ArmColumns.of_motion(model, found).numbers(model.reversal.widths(len(model.drives)))
 
 

@@ -50,7 +50,7 @@ class ColumnCollector:
         s: Any = forces.mechanism
         effort = forces.total - sum((forces.parts[name] for name in self.sensors),
                                     np.zeros_like(forces.total))
-        self.kept.append((s.velocity, s.acceleration, s.direction, s.guide_load,
+        self.kept.append((s.velocity, s.acceleration, s.direction, s.friction_load,
                           s.transmitted, effort))
         columns = self.sensitivities.columns(forces)
         columns[NUMBERS][self.without_gain] = 0.0

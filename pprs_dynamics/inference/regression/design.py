@@ -329,7 +329,7 @@ class Design:
     def load_variation(self, drive: int) -> float:
         """Return the standard deviation of a drive's load in motion over its mean."""
         width = TURNED * self.given.reversal.widths(len(self.drives))[drive]
-        load = np.concatenate([one.guide_load[np.abs(one.velocity[:, drive]) > width, drive]
+        load = np.concatenate([one.friction_load[np.abs(one.velocity[:, drive]) > width, drive]
                                for one in self.recordings])
         return float(load.std() / load.mean()) if len(load) and load.mean() else 0.0
 
@@ -347,7 +347,7 @@ class Design:
                           float(np.ptp(position)), float(np.abs(velocity).max()),
                           self.given.gear_ratios[drive], _delay(longest, drive),
                           self.given.units[drive].turns,
-                          any(np.any(one.guide_load[:, drive]) for one in self.recordings),
+                          any(np.any(one.friction_load[:, drive]) for one in self.recordings),
                           self._channels(drive), float(position.min() + position.max()) / 2)
 
     def _channels(self, drive: int) -> dict[str, tuple[float, float]]:
@@ -476,7 +476,7 @@ class Design:
         """Return what positions of a drive that are measured wrong do to all, (k, M) by drive.
 
         What a play does is not in proportion to it. Around a model that has the effect it is told
-        by steps of `SHARE` of what it has; else, of what the effect calls `bent`, by the one of
+        by steps of `SHARE` of what it has; else, of what the effect is `not_linear_in`, by the one of
         `SIZES` that alone would explain most of the drive's error.
         """
         name = self.drives[drive]
@@ -510,7 +510,7 @@ class Design:
         for c in effect.coefficients:
             usual = c.scale if c.expected is None else c.expected[self.given.units[drive].turns]
             steps = ([SHARE * max(abs(before[c.name]), usual)] if there is not None
-                     else [size * usual for size in SIZES] if c.name in effect.bent
+                     else [size * usual for size in SIZES] if c.name in effect.not_linear_in
                      else [usual])
             found = []
             for step in steps:
@@ -533,7 +533,7 @@ class Design:
         if friction is not None and np.any(q_dot):
             width = float(self.model.reversal.widths(len(self.drives))[drive])
             turned = smooth_sign(v - q_dot, width) - recording.direction[:, drive]
-            own = (friction.dry(recording.guide_load)[:, drive] * turned
+            own = (friction.dry(recording.friction_load)[:, drive] * turned
                    - np.broadcast_to(friction.viscous, len(self.drives))[drive] * q_dot)
         return np.stack((q, q_ddot, own))
 

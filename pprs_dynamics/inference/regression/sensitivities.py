@@ -188,7 +188,7 @@ class Sensitivities:
     def dry(self, state: Any) -> Array:
         """Return the size of the drives' dry friction in full motion, (N, D) [N, N m]."""
         friction: Any = next(one for one in self.model.effects if one.name == ACTIVE_FRICTION)
-        size: Array = friction.dry(state.guide_load)
+        size: Array = friction.dry(state.friction_load)
         return size
 
     def _of_misreadings(self, state: Any) -> tuple[Array, Array]:

@@ -70,7 +70,7 @@ class FullRate:
     velocity: Array
     acceleration: Array
     direction: Array
-    guide_load: Array
+    friction_load: Array
     transmitted: Array
     effort: Array
     effort_measured: Array
@@ -84,7 +84,7 @@ class FullRate:
         return DriveSamples(
             self.time[part], self.position[part, drive], self.velocity[part, drive],
             self.acceleration[part, drive], self.direction[part, drive],
-            self.guide_load[part, drive], self.transmitted[part, drive], memory,
+            self.friction_load[part, drive], self.transmitted[part, drive], memory,
             {name: values[part, drive] for name, values in self.channels.items()})
 
 

@@ -52,9 +52,9 @@ from pprs_dynamics.inference.residuals.readings import (
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Defect
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 # What efforts may be, as multiples of what they are taken for.
 EFFORT_FACTORS = (1.0, -1.0, 1e-3, -1e-3, 1e3, -1e3)
@@ -247,7 +247,7 @@ class _Search:
 
     @property
     def _strokes(self) -> tuple[Array, Array]:
-        assert isinstance(self.model, (DriveModel, ArmModel))
+        assert isinstance(self.model, (DriveModel, MechanismModel))
         return self.model.limits.strokes
 
     def _possible(self, reading: Reading, excerpt: Excerpt) -> bool:
@@ -276,7 +276,7 @@ class _Search:
         lower, upper = self._strokes
         reach = np.abs(motion.position).max(axis=0) / np.maximum(np.abs(lower), np.abs(upper))
         speed = np.zeros(len(reach))
-        if isinstance(self.model, ArmModel):
+        if isinstance(self.model, MechanismModel):
             speed = np.abs(motion.velocity).max(axis=0) / self.model.robot.structure.speed
         return bool(np.any(np.maximum(reach, speed)[group] > BEYOND))
 
@@ -416,7 +416,7 @@ def _of_shares(model: ForceModel, contents: Mapping[str, EffortContent]) -> list
 
 def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Defect]:
     """Yield what positions far outside of the strokes say without any effort."""
-    assert isinstance(model, (DriveModel, ArmModel))
+    assert isinstance(model, (DriveModel, MechanismModel))
     lower, upper = model.limits.strokes
     drives, ends = recording.drives, np.maximum(-lower, upper)
     reach = np.abs(recording.position).max(axis=0)

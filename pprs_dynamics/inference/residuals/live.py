@@ -18,9 +18,9 @@ from pprs_dynamics.measurement.motion.differentiation import LocalPolynomial
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction, LiveSample
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 
 WINDOW = 0.12  # [s] of the smoothing that gives velocity and acceleration
@@ -72,7 +72,7 @@ class LiveComparison:
 
     def __init__(self, model: ForceModel, window: float | None = None, span: float = ERROR_SPAN,
                  ) -> None:
-        self._window = window or (ARM_WINDOW if isinstance(model, ArmModel) else WINDOW)
+        self._window = window or (ARM_WINDOW if isinstance(model, MechanismModel) else WINDOW)
         self._span = span
         self._stamps: list[float] = []
         self._live: LiveReconstruction | None = None

@@ -310,9 +310,9 @@ class CandidateSet:
         return frozenset(candidate.claim for candidate in self.effects)
 
     @property
-    def is_bent(self) -> bool:
+    def is_nonlinear(self) -> bool:
         """Whether one of its effects changes how others show."""
-        return any(candidate.effect.bends_columns for candidate in self.effects)
+        return any(candidate.effect.nonlinear for candidate in self.effects)
 
     @property
     def unknowns(self) -> tuple[UnknownCandidate, ...]:

@@ -30,7 +30,8 @@ class CostTerms:
     discrepancy : float
         What the lack of fit of other effects makes of it; 0, as it is judged after the fit.
     feasibility : float
-        By how much possible bodies fit worse than those of the least squares.
+        By how much possible bodies, and friction and inertia that are not negative, fit worse
+        than those of the least squares.
     linearisation : float
         By how much the exact forces of its own fitted model fit worse than the linear ones; 0
         where that was not computed.

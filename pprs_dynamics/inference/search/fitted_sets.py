@@ -33,6 +33,7 @@ from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.library import Library
 from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
 from pprs_dynamics.inference.search.possible_bodies import with_possible_bodies
+from pprs_dynamics.inference.search.possible_totals import with_possible_totals
 from pprs_dynamics.physics.effects.added_body import AddedBody
 
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
@@ -115,8 +116,10 @@ class FittedSets:
         found = self._set(candidates, fit, nuisance)
         if possible is None:
             return replace(found, barred='no body that can be comes near')
+        possible = with_possible_totals(self.design, self.regression, possible,
+                                        found.blocks.items())
         if possible is not fit:
-            # What possible bodies cost is told as such, not as a worse fit.
+            # What possible values cost is told as such, not as a worse fit.
             feasible = CostTerms(feasibility=possible.deviance - fit.deviance)
             held = self._set(candidates, possible, nuisance)
             signs = CostTerms(signs=held.terms.signs - found.terms.signs)

@@ -34,10 +34,13 @@ def simplified(fits: FittedSets, found: CandidateSet) -> CandidateSet:
     return _descended(fits, found, lambda one: [*_with_fewer(one), *_otherwise(fits, one)])
 
 
-def on_best_drives(fits: FittedSets, found: CandidateSet) -> CandidateSet:
-    """Return a set with its effects on the drives, and in the variants, in which it costs least."""
-    return _descended(fits, found, lambda one: [*_otherwise(fits, one),
-                                                *_on_more_drives(fits, one)])
+def of_same_claims(fits: FittedSets, found: CandidateSet) -> CandidateSet:
+    """Return the set of least cost that claims the same: on other drives, in other variants.
+
+    With its patterns of no catalogue or without: its effects may explain what these stood for.
+    """
+    return _descended(fits, found, lambda one: [
+        *_otherwise(fits, one), *_on_more_drives(fits, one), *[one.effects] * bool(one.unknowns)])
 
 
 def _descended(fits: FittedSets, found: CandidateSet,

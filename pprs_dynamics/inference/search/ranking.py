@@ -124,7 +124,7 @@ class Ranking:
         """
         places = {(one.effect, one.drive) for one in gone.components}
         refuted = self.refuted | places
-        if gone.effect.bends_columns and not places <= self.refuted:
+        if gone.effect.nonlinear and not places <= self.refuted:
             return _searched(FittedSets(self.first.design, self.first.decisions), refuted)
         reported = self.last.pruned(self.without[gone])
         return replace(self._reporting(self.first, self.last, self.patterns, self.map_set, reported,
@@ -152,13 +152,13 @@ class Ranking:
     def sets(self) -> tuple[CandidateSet, ...]:
         """Sets of both searches, the best first, the others by cost.
 
-        A set belongs to the search around whose point it is linear: those with an effect that
-        bends the columns to the last, the others to the first.
+        A set belongs to the search around whose point it is linear: those with a
+        nonlinear effect to the last, the others to the first.
         """
         found = list(self.of_last)
         if self.first is not self.last:
-            found = [one for one in self.of_last if one.is_bent] + [
-                one for one in self.of_first if not one.is_bent]
+            found = [one for one in self.of_last if one.is_nonlinear] + [
+                one for one in self.of_first if not one.is_nonlinear]
         return (self.map_set, *_by_cost([
             one for one in found if one is not self.map_set and one.is_admissible]))
 

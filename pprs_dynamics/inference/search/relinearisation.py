@@ -28,7 +28,7 @@ from pprs_dynamics.inference.search.fitted_model import (
     squared,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.neighbours import on_best_drives
+from pprs_dynamics.inference.search.neighbours import of_same_claims
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -42,7 +42,7 @@ SHORTLIST = 4  # sets of different claims of a search that are ranked by exact f
 
 @dataclass(frozen=True)
 class ExactSet:
-    """A set around its own fitted model, on the drives and in the variants of least cost there.
+    """A set around its own fitted model, moved to where it costs least there.
 
     Parameters
     ----------
@@ -68,10 +68,7 @@ class ExactSet:
         try:
             for _ in range(MOST_STEPS):
                 last, moved = linearised(last, moved, alone=True)
-                before, moved = moved, on_best_drives(last, moved)
-                if moved.barred and len(moved.effects) < len(moved.candidates):
-                    # What a pattern stood for is explained around the model: its effects count.
-                    moved = last.refined(last.evaluate(moved.effects))
+                before, moved = moved, of_same_claims(last, moved)
                 if moved is before:
                     break
             one = settled(last, moved)
@@ -94,12 +91,12 @@ def search_around_fitted(first: Search, report: Callable[[float], None],
     exact costs, which do not depend on where a search was, decide between sets.
     """
     search, exact, at = first, dict[Claims, ExactSet](), None
-    search.run(until_bent=True)
+    search.run(until_nonlinear=True)
     for number in range(MOST_SEARCHES):
         for one in _shortlist(search.fits, first.fits.decisions.rival_margin):
             known = exact.get(one.claims)
             if known is None or one.cost < known.cost - LEAST_CHANGE:
-                new = ExactSet.of(search.fits if one.is_bent else first.fits, one)
+                new = ExactSet.of(search.fits if one.is_nonlinear else first.fits, one)
                 exact[one.claims] = new if known is None else min(known, new, key=_cost)
         best = min(exact.values(), key=_cost)
         if best is at or _is_where(search, best):
@@ -130,10 +127,10 @@ def _shortlist(fits: FittedSets, margin: float) -> list[CandidateSet]:
     tilts, wrenches and offsets of a payload look nearly alike there.
     """
     best, near = fits.best, dict[Claims, CandidateSet]()
-    is_beyond = not _is_bent_by(fits.design.point, parts_of(fits, best)[1])
+    is_beyond = not _has_nonlinear(fits.design.point, parts_of(fits, best)[1])
     for one in sorted(fits.sets, key=_cost):
         if one.cost <= best.cost + margin or (
-                is_beyond and one.is_bent and one.is_admissible):
+                is_beyond and one.is_nonlinear and one.is_admissible):
             near.setdefault(one.claims, one)
     return list(near.values())[:SHORTLIST]
 
@@ -141,8 +138,8 @@ def _shortlist(fits: FittedSets, margin: float) -> list[CandidateSet]:
 def _is_where(search: Search, best: ExactSet) -> bool:
     """Return whether a search was to its end around the model of a set, as nearly as matters."""
     there = search.fits.evaluate(best.found.candidates)
-    return search.is_ended and abs(there.total - best.found.total) < LEAST_CHANGE and _is_bent_by(
-        search.fits.design.point, best.effects)
+    return (search.is_ended and abs(there.total - best.found.total) < LEAST_CHANGE
+            and _has_nonlinear(search.fits.design.point, best.effects))
 
 
 def _share_of(report: Callable[[float], None], start: float, width: float,
@@ -179,7 +176,7 @@ def next_operating_point(fits: FittedSets, found: CandidateSet) -> OperatingPoin
     """Return where to expand next: towards a set's fitted model, as far as the exact error falls.
 
     None where the exact forces of the fitted model are those of the linear fit, and columns were
-    computed with every effect that bends them; the point where columns hold where no step from it
+    computed with every nonlinear effect; the point where columns hold where no step from it
     lowers the exact error.
     """
     design = fits.design
@@ -190,7 +187,7 @@ def next_operating_point(fits: FittedSets, found: CandidateSet) -> OperatingPoin
     exact = exact_forces(design, target)
     before = design.point
     if (squared(fits, found, exact - linear) < LEAST_DIFFERENCE
-            and _is_bent_by(before, effects)):
+            and _has_nonlinear(before, effects)):
         return None
     loss = squared(fits, found, measured - exact)
     known = {(one.effect, one.drive): one for one in before.effects} if before else {}
@@ -222,13 +219,13 @@ def _held_at(fits: FittedSets, found: CandidateSet, point: OperatingPoint) -> Ca
     return fits.held(found, at[moves], wanted[moves])
 
 
-def _is_bent_by(point: OperatingPoint | None, effects: Sequence[PlacedEffect]) -> bool:
-    """Return whether a point has the effects that bend columns, nearly of the same shapes."""
+def _has_nonlinear(point: OperatingPoint | None, effects: Sequence[PlacedEffect]) -> bool:
+    """Return whether a point has the nonlinear ones of some effects, nearly of the same shapes."""
     known = {(one.effect, one.drive): one for one in point.effects} if point else {}
     return all((one.effect, one.drive) in known and all(
         abs(one.shape[p.name] - known[one.effect, one.drive].shape[p.name]) <= p.scale
         for p in one.effect.parameters if p.name in one.shape)
-        for one in effects if one.effect.bends_columns)
+        for one in effects if one.effect.nonlinear)
 
 
 def _between(a: PlacedEffect, b: PlacedEffect) -> PlacedEffect:

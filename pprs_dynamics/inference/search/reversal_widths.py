@@ -76,7 +76,7 @@ def estimate_widths(fits: FittedSets, found: CandidateSet) -> dict[int, float]:
         def column(trial: float, d: int = d, turning: list[Turning] = turning) -> Array:
             def change(recording: FullRate) -> Array:
                 drive = recording.samples(slice(None), d)
-                dry = friction.dry(recording.guide_load)[:, d]
+                dry = friction.dry(recording.friction_load)[:, d]
                 other = replace(drive, direction=smooth_sign(drive.velocity, trial))
                 changed: Array = _dry_force(other, dry, turning) - _dry_force(drive, dry, turning)
                 return changed[None]

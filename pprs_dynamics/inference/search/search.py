@@ -65,20 +65,20 @@ class Search:
         """The set of lowest cost so far."""
         return self.fits.best
 
-    def run(self, start: Candidates = (), until_bent: bool = False) -> CandidateSet:
+    def run(self, start: Candidates = (), until_nonlinear: bool = False) -> CandidateSet:
         """Return the best set that the search reaches, by effects alone at first.
 
-        A pattern of no catalogue stands only beside what effects explain. `until_bent`: where an
-        effect joins that bends the columns the search ends before its end, since what would come
-        next might only make good that they are not bent.
+        A pattern of no catalogue stands only beside what effects explain. `until_nonlinear`: where
+        a nonlinear effect joins the search ends before its end, since what would come next might
+        only make good that columns do not show it.
         """
         self.fits.stepped, self.is_ended = self._stepped, False
         try:
             self.fits.evaluate(())
             if start:
                 self.rescanned(self.fits.evaluate(start))
-            self._descend(False, until_bent)
-            if not until_bent or not self.best.is_bent:
+            self._descend(False, until_nonlinear)
+            if not until_nonlinear or not self.best.is_nonlinear:
                 if self.patterns:
                     self._descend(True, False)
                 self.is_ended = True
@@ -99,7 +99,7 @@ class Search:
         self._steps += 1
         self._report(self._steps / (self._steps + USUAL_STEPS))
 
-    def _descend(self, with_patterns: bool, until_bent: bool) -> None:
+    def _descend(self, with_patterns: bool, until_nonlinear: bool) -> None:
         """Move from the best set to better neighbours until there is none."""
         while True:
             before = self.best.cost
@@ -107,7 +107,8 @@ class Search:
             if self.best.cost > before - LEAST_IMPROVEMENT:
                 self._fit(self._replacements(self.best))
             simplified(self.fits, self.best)
-            if self.best.cost > before - LEAST_IMPROVEMENT or (until_bent and self.best.is_bent):
+            if (self.best.cost > before - LEAST_IMPROVEMENT
+                    or (until_nonlinear and self.best.is_nonlinear)):
                 return
 
     # Moves

@@ -24,9 +24,9 @@ ALONE = 'drive'  # name of one whose name does not matter
 class DriveSamples:
     """Samples of one drive: all (N,); `time` is None where unknown, `direction` is sgn.
 
-    `guide_load` is what its guide carries, without a sign; `transmitted` what its gear or screw
-    passes on to the mechanism, without friction, with the sign of the effort [N, N m]; `channels`
-    has what was measured of the drive beside, as `temperature` [degC].
+    `friction_load` is what its guide or gear carries, without a sign; `transmitted` what its gear
+    or screw passes on to the mechanism, without friction, with the sign of the effort [N, N m];
+    `channels` has what was measured of the drive beside, as `temperature` [degC].
     """
 
     time: Array | None
@@ -34,7 +34,7 @@ class DriveSamples:
     velocity: Array
     acceleration: Array
     direction: Array
-    guide_load: Array
+    friction_load: Array
     transmitted: Array
     memory: Any = None
     channels: Mapping[str, Array] = field(default_factory=dict)
@@ -44,7 +44,7 @@ class DriveSamples:
         """Return the samples of one drive of a state."""
         return cls(state.time, state.position[:, drive], state.velocity[:, drive],
                    state.acceleration[:, drive], state.direction[:, drive],
-                   state.guide_load[:, drive], state.transmitted[:, drive], memory,
+                   state.friction_load[:, drive], state.transmitted[:, drive], memory,
                    {name: values[:, drive] for name, values in state.channels.items()})
 
 
@@ -223,12 +223,12 @@ class MeasurementEffect(DriveEffect):
 
     Class attributes
     ----------------
-    bent : tuple of str
+    not_linear_in : tuple of str
         Coefficients to which errors of positions are not in proportion.
     """
 
     is_measurement = True
-    bent: ClassVar[tuple[str, ...]] = ()
+    not_linear_in: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

@@ -120,7 +120,7 @@ class Effect(ABC):
 
         Parameters
         ----------
-        state : MechanismState or LinkageState
+        state : ThreePprsState or MechanismState
         memory : object, optional
             What `initial_memory` returned, advanced in place to the last sample.
         """
@@ -219,7 +219,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     is_friction : bool
         True for friction: of a drive that stands it tells nothing, any constant force looks like
         it, and it may not give power back.
-    bends_columns : bool
+    nonlinear : bool
         True where the effect changes how others show, or holds in its linear form nearby only: a
         delay, a shifted zero, gravity that turns. Sets of effects with and without it are then
         compared around models of their own.
@@ -251,7 +251,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     unphysical_below: ClassVar[Mapping[str, float]] = {}
     may_be_measurement: ClassVar[bool] = False
     is_friction: ClassVar[bool] = False
-    bends_columns: ClassVar[bool] = False
+    nonlinear: ClassVar[bool] = False
     idealised: ClassVar[bool] = True
     shows_at_reversals: ClassVar[bool] = False
     is_of_one_place: ClassVar[bool] = False

@@ -115,13 +115,13 @@ def _columns(result: Any, effect: type[DriveEffect], _: Any, drive: DriveSamples
     if len(columns) != len(wanted):
         raise _WrongResultError(
             f'{len(columns)} arrays, must be {len(wanted)} ({names(wanted) or "none"})')
-    given = (drive.position, drive.velocity, drive.acceleration, drive.guide_load,
+    given = (drive.position, drive.velocity, drive.acceleration, drive.friction_load,
              drive.transmitted, *drive.channels.values())
     return tuple(_finite(_array(column, drive.velocity.shape), given) for column in columns)
 
 
 def _force(result: Any, _: Any, __: Any, state: DriveStates, *___: Any) -> Array:
-    given = (state.position, state.velocity, state.acceleration, state.guide_load,
+    given = (state.position, state.velocity, state.acceleration, state.friction_load,
              state.transmitted)
     return _finite(_array(result, state.velocity.shape), given)
 

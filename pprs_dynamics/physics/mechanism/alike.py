@@ -76,7 +76,7 @@ def proportional_joints(structure: Structure) -> tuple[tuple[str, ...], ...]:
     position, rest, _ = _states(structure)
     names = tuple(structure.rows)
     at = [int(structure.tables.coordinate[structure.rows[name]]) for name in names]
-    rates = _bare(structure).at(position, 0 * rest, 0 * rest).motion.T
+    rates = _bare(structure).at(position, 0 * rest, 0 * rest).motion.drive_to_joint
     rows = rates[:, at].transpose(1, 0, 2).reshape(len(names), -1)
     size = np.linalg.norm(rows, axis=1, keepdims=True)
     unit = rows / np.where(size > 0, size, 1.0)

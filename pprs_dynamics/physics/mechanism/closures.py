@@ -15,8 +15,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.linkage import survey
-from pprs_dynamics.physics.mechanism.linkage_equations import (
+from pprs_dynamics.physics.mechanism.tree_equations import (
     ANGLE,
     AXES,
     KIND,
@@ -25,6 +24,7 @@ from pprs_dynamics.physics.mechanism.linkage_equations import (
     Integers,
     Tables,
 )
+from pprs_dynamics.physics.mechanism.tree_evaluation import survey
 
 X, Y, Z = range(3)
 Row = tuple[int, tuple[int, int, int, int], tuple[float, float]]
@@ -111,8 +111,8 @@ class Closing:
 
     def derivatives(self, q: Array) -> tuple[Array, Array]:
         """Return rows (r,) and their derivatives by all coordinates (r, C), in units of size."""
-        gaps, J, _ = survey(self.t, q, np.arange(len(q)))
-        return gaps * self.rows, self.rows[:, None] * J * self.columns
+        residuals, J, _ = survey(self.t, q, np.arange(len(q)))
+        return residuals * self.rows, self.rows[:, None] * J * self.columns
 
     def home(self, q: Array, free: Integers) -> Array:
         """Return closed coordinates near `q` of which only the free ones are moved.
@@ -124,10 +124,10 @@ class Closing:
         """
         q = q.copy()
         for _ in range(TRIES):
-            gaps, J = self.derivatives(q)
-            if np.max(np.abs(gaps), initial=0.0) < CLOSED_HOME:
+            residuals, J = self.derivatives(q)
+            if np.max(np.abs(residuals), initial=0.0) < CLOSED_HOME:
                 break
-            step = np.linalg.lstsq(J[:, free], -gaps, rcond=RANK)[0]
+            step = np.linalg.lstsq(J[:, free], -residuals, rcond=RANK)[0]
             step *= min(1.0, LONGEST_STEP / max(np.max(np.abs(step), initial=0.0), 1e-12))
             q[free] += step * self.columns[free]
         self._require_closed(q)
@@ -135,13 +135,13 @@ class Closing:
 
     def _require_closed(self, q: Array) -> None:
         t = self.t
-        gaps, _, m = survey(t, q, np.arange(len(q)))
-        worst = np.abs(gaps * self.rows)
+        residuals, _, m = survey(t, q, np.arange(len(q)))
+        worst = np.abs(residuals * self.rows)
         if np.max(worst, initial=0.0) > OPEN:
             row = int(np.argmax(worst))
             name, kind = self.loops[t.rows[row, LOOP]], t.rows[row, KIND]
-            amount = (f'{1e3 * abs(gaps[row]):.3g} mm' if kind == TRANSLATION
-                      else f'{np.degrees(abs(gaps[row])):.3g} degrees')
+            amount = (f'{1e3 * abs(residuals[row]):.3g} mm' if kind == TRANSLATION
+                      else f'{np.degrees(abs(residuals[row])):.3g} degrees')
             raise ModelError('robot.loops', name, f'close at home: it is open by {amount}, and '
                              'no position of the passive joints nearby closes it (check frames, '
                              'lengths, and robot.home)')

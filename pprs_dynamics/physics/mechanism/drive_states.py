@@ -43,8 +43,8 @@ class DriveStates(Protocol):
         """Sign of the velocities, sgn, (N, D)."""
 
     @property
-    def guide_load(self) -> Array:
-        """[N], (N, D)."""
+    def friction_load(self) -> Array:
+        """What the drive's guide or gear carries, without a sign [N, N m], (N, D)."""
 
     @property
     def transmitted(self) -> Array:

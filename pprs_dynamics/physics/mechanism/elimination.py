@@ -17,8 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.linkage import survey
-from pprs_dynamics.physics.mechanism.linkage_equations import (
+from pprs_dynamics.physics.mechanism.tree_equations import (
     DRIVE_OF,
     JOINT,
     KIND,
@@ -30,6 +29,7 @@ from pprs_dynamics.physics.mechanism.linkage_equations import (
     Integers,
     Tables,
 )
+from pprs_dynamics.physics.mechanism.tree_evaluation import survey
 
 PIVOT = 0.1  # of the largest number in its column: the least that a pivot is at home
 

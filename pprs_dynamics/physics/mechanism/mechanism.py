@@ -21,8 +21,14 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism.description import PARAMETERS, Frame, inertial_in
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.linkage import NO_FRICTION, Found, samples_last
-from pprs_dynamics.physics.mechanism.linkage_equations import (
+from pprs_dynamics.physics.mechanism.passive_joints import friction_table, passive_joints
+from pprs_dynamics.physics.mechanism.places import BodyPlace, PassiveJoint
+from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
+from pprs_dynamics.physics.mechanism.structure import Structure
+from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.tree_equations import (
+    CONDITION,
+    DETERMINANT,
     KIND,
     LOOP,
     OPEN_IN_MOTION,
@@ -33,11 +39,7 @@ from pprs_dynamics.physics.mechanism.linkage_equations import (
     Motion,
     residual,
 )
-from pprs_dynamics.physics.mechanism.passive_joints import friction_table, passive_joints
-from pprs_dynamics.physics.mechanism.places import BodyPlace, PassiveJoint
-from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
-from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, Found, samples_last
 from pprs_dynamics.system.parallel import lazy
 
 
@@ -144,7 +146,7 @@ class Mechanism:
 
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
                        ) -> JointFriction:
-        """Return friction of joints as `LinkageState.against_friction` takes it."""
+        """Return friction of joints as `MechanismState.against_friction` takes it."""
         return friction_table(self.structure, blocks, reversal)
 
     def with_body(self, link: str, parameters: Array) -> Mechanism:
@@ -166,7 +168,7 @@ class Mechanism:
         return replace(self, bodies=np.append(self.bodies, row),
                        inertial=np.vstack((self.inertial, added)))
 
-    def at(self, position: Array, velocity: Array, acceleration: Array) -> Linkage:
+    def at(self, position: Array, velocity: Array, acceleration: Array) -> LinkMotion:
         """Return the motion of all links for that of the drives, (N, D) each.
 
         Raises
@@ -176,7 +178,7 @@ class Mechanism:
         SingularityError
             Where the drives do not determine the motion.
         """
-        return Linkage.of(self.structure, position, velocity, acceleration)
+        return LinkMotion.of(self.structure, position, velocity, acceleration)
 
     def torques(self, position: Array, velocity: Array, acceleration: Array) -> Array:
         """Return the efforts of the drives that move the bodies, (N, D) [N m, N]."""
@@ -188,7 +190,7 @@ class Mechanism:
 
 
 @dataclass(frozen=True, eq=False)
-class Linkage:
+class LinkMotion:
     """The motion of all links of a structure, at N samples.
 
     Parameters
@@ -206,7 +208,7 @@ class Linkage:
 
     @classmethod
     def of(cls, structure: Structure, position: Array, velocity: Array, acceleration: Array,
-           start: Array | None = None, nearby: Array | None = None) -> Linkage:
+           start: Array | None = None, nearby: Array | None = None) -> LinkMotion:
         """Return the motion, or raise as `Mechanism.at`; see `Evaluation.follow`."""
         rows, failed = structure.evaluation.follow(position, velocity, acceleration, start, nearby)
         if failed >= 0:
@@ -231,12 +233,13 @@ class Linkage:
     @property
     def condition(self) -> Array:
         """Condition number of the loops over that at home, (N,); 0 without loops."""
-        home = self.structure.evaluation.at_home[2]
-        condition: Array = self.motion.state[:, 2] / home if home else self.motion.state[:, 2]
+        home = self.structure.evaluation.at_home[CONDITION]
+        condition: Array = self.motion.solution[:, CONDITION] / (home or 1.0)
         return condition
 
     def _require_regular(self) -> None:
-        lost = ~(self.motion.state[:, 1] * self.structure.evaluation.at_home[1] > 0)
+        home = self.structure.evaluation.at_home[DETERMINANT]
+        lost = ~(self.motion.solution[:, DETERMINANT] * home > 0)
         if lost.any():
             raise SingularityError(
                 int(np.argmax(lost)), 'the motion leaves the assembly of home through a '
@@ -259,15 +262,16 @@ class Linkage:
         if not len(implied):
             return
         m = samples_last(self.motion)
-        gaps = np.stack([residual(t, m, int(r)) for r in implied], axis=-1)
-        size = np.abs(gaps) / t.row_unit[implied]
+        residuals = np.stack([residual(t, m, int(r)) for r in implied], axis=-1)
+        size = np.abs(residuals) / t.row_unit[implied]
         if np.all(size < OPEN_IN_MOTION):
             return
         sample = int(np.argmax(~np.all(size < OPEN_IN_MOTION, axis=1)))
         worst = int(np.argmax(size[sample]))
         row = implied[worst]
-        amount = (f'{1e3 * abs(gaps[sample, worst]):.3g} mm' if t.rows[row, KIND] == TRANSLATION
-                  else f'{np.degrees(abs(gaps[sample, worst])):.3g} degrees')
+        by = abs(residuals[sample, worst])
+        amount = (f'{1e3 * by:.3g} mm' if t.rows[row, KIND] == TRANSLATION
+                  else f'{np.degrees(by):.3g} degrees')
         raise WorkspaceError(
             sample, f'the loop {self.structure.loops[t.rows[row, LOOP]].name} is open by {amount}',
             'must close as at home, where it follows from the other loops and joints alone: name a '
@@ -354,7 +358,7 @@ class Linkage:
 
 
 @dataclass(frozen=True, eq=False)
-class LinkageState(JointMotion):
+class MechanismState(JointMotion):
     """A motion of a mechanism's drives with the quantities that effects take, (N, D) each.
 
     Efforts and the model's own friction of joints come from one pass that keeps nothing else; the
@@ -365,7 +369,7 @@ class LinkageState(JointMotion):
     robot : Mechanism
     reversal : Reversal
     load : StructureLoad, optional
-    known : Linkage, optional
+    known : LinkMotion, optional
         The motion of all links, where it is there.
     friction : JointFriction
         The model's own, which is found with the efforts.
@@ -376,7 +380,7 @@ class LinkageState(JointMotion):
     robot: Mechanism = field(kw_only=True)
     reversal: Reversal = field(default_factory=Reversal, kw_only=True)
     load: StructureLoad | None = field(default=None, kw_only=True)
-    known: Linkage | None = field(default=None, kw_only=True)
+    known: LinkMotion | None = field(default=None, kw_only=True)
     friction: JointFriction = field(default=NO_FRICTION, kw_only=True)
     start: Array | None = field(default=None, kw_only=True)
     nearby: Array | None = field(default=None, kw_only=True)
@@ -402,19 +406,19 @@ class LinkageState(JointMotion):
             self.friction, self.start, self.nearby)
 
     @lazy
-    def linkage(self) -> Linkage:
+    def links(self) -> LinkMotion:
         """The motion of all links."""
         motion = self.position, self.velocity, self.acceleration
         if self.known is not None and self.known.is_of(*motion):
             return self.known
         found = vars(self).get('found')
         start, nearby = (self.start, self.nearby) if found is None else (found.q, None)
-        return Linkage.of(self.robot.structure, *motion, start, nearby)
+        return LinkMotion.of(self.robot.structure, *motion, start, nearby)
 
     @property
     def closed(self) -> Array:
         """Closed coordinates, (N, C)."""
-        return self.linkage.motion.q if self.found is None else self.found.q
+        return self.links.motion.q if self.found is None else self.found.q
 
     @lazy
     def direction(self) -> Array:
@@ -438,15 +442,15 @@ class LinkageState(JointMotion):
         return efforts
 
     @lazy
-    def guide_load(self) -> Array:
+    def friction_load(self) -> Array:
         """What a drive's gear carries [N m, N]: the size of what it passes on; 0 if not known."""
         load: Array = np.abs(self.transmitted) * self.robot.load_is_known
         return load
 
     @lazy
     def _load_rows(self) -> Array:
-        wrenches = None if self.load is None else self.linkage.wrenches_of(self.load)
-        return self.linkage.load_rows(self.robot, wrenches)
+        wrenches = None if self.load is None else self.links.wrenches_of(self.load)
+        return self.links.load_rows(self.robot, wrenches)
 
     @lazy
     def reactions(self) -> Loads:
@@ -456,16 +460,16 @@ class LinkageState(JointMotion):
     @property
     def tool_velocity(self) -> Array:
         """Linear velocity of the tool's origin and angular velocity, in `base`, (N, 6)."""
-        linkage = self.linkage
-        row, _ = linkage.structure.links[linkage.structure.tool]
-        m = linkage.motion
-        arm = linkage.frame_of(linkage.structure.tool).p - m.p[:, row]
+        links = self.links
+        row, _ = links.structure.links[links.structure.tool]
+        m = links.motion
+        arm = links.frame_of(links.structure.tool).p - m.p[:, row]
         return np.concatenate((m.u[:, row] + np.cross(m.w[:, row], arm), m.w[:, row]), axis=1)
 
     def joint_position(self, joint: str) -> Array:
         """Return where a passive joint of the tree is, (N,) [rad, m]."""
-        t, row = self.linkage.structure.tables, self.linkage.structure.rows[joint]
-        position: Array = (t.ratio[row] * self.linkage.motion.q[:, t.coordinate[row]]
+        t, row = self.links.structure.tables, self.links.structure.rows[joint]
+        position: Array = (t.ratio[row] * self.links.motion.q[:, t.coordinate[row]]
                            + t.offset[row])
         return position
 
@@ -474,13 +478,13 @@ class LinkageState(JointMotion):
         """By which a drive is moved for derivatives [rad, m]."""
         return 1e-4
 
-    def moved(self, drive: int, step: float) -> LinkageState:
+    def moved(self, drive: int, step: float) -> MechanismState:
         """Return the state with a drive at other positions, which moves as it did."""
         position = self.position.copy()
         position[:, drive] += step
         return replace(self, position=position, known=None)
 
-    def accelerated(self, drive: int, change: float) -> LinkageState:
+    def accelerated(self, drive: int, change: float) -> MechanismState:
         """Return the state with another acceleration of a drive."""
         acceleration = self.acceleration.copy()
         acceleration[:, drive] += change
@@ -490,19 +494,19 @@ class LinkageState(JointMotion):
         """Return the drives' efforts against friction of joints, (N, D)."""
         if friction is self.friction and self.found is not None:
             return self.found.friction
-        return self.robot.structure.evaluation.friction(self.linkage.rows, self._load_rows,
+        return self.robot.structure.evaluation.friction(self.links.rows, self._load_rows,
                                                         friction)
 
-    def turning_over(self, reversal: Reversal) -> LinkageState:
+    def turning_over(self, reversal: Reversal) -> MechanismState:
         """Return the state with a sgn of other widths; all else is computed once for both."""
-        state = replace(self, reversal=reversal, known=self.linkage)
+        state = replace(self, reversal=reversal, known=self.links)
         vars(state)['_load_rows'] = self._load_rows
         return state
 
-    def loaded(self, robot: Mechanism, load: StructureLoad | None = None) -> LinkageState:
+    def loaded(self, robot: Mechanism, load: StructureLoad | None = None) -> MechanismState:
         """Return a state of this motion with other bodies, and with an additional load."""
         if load is None:
             load = self.load
         elif self.load is not None:
             load = self.load + load
-        return replace(self, robot=robot, load=load, known=self.linkage)
+        return replace(self, robot=robot, load=load, known=self.links)

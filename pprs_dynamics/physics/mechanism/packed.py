@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.linkage_equations import (
+from pprs_dynamics.physics.mechanism.tree_equations import (
     OF_FORCES,
     OF_LINK,
     Integers,
@@ -67,9 +67,9 @@ SHAPES: dict[type, dict[str, tuple[str | int, ...]]] = {
         'row_reals': ('rows', 3), 'passive_unit': ('passive',)},
     Motion: {
         'q': ('coordinates',), 'v': ('coordinates',), 'a': ('coordinates',), 'links': ('links', 3),
-        'loops': ('closure_frames', 3), 'T': ('coordinates', 'drives'),
-        'J': ('passive', 'passive'), 'inverse': ('passive', 'passive'),
-        'by_drives': ('passive', 'drives'), 'gaps': ('passive', 1), 'state': (4,)},
+        'loops': ('closure_frames', 3), 'drive_to_joint': ('coordinates', 'drives'),
+        'inverse': ('passive', 'passive'), 'solution': (4,), 'J': ('passive', 'passive'),
+        'by_drives': ('passive', 'drives'), 'residuals': ('passive', 1)},
     Loads: {
         'links': ('forces', 3), 'loops': ('loop_forces', 3), 'coordinates': ('coordinates',),
         'rubbed': ('coordinates',), 'efforts': ('drives',)}}

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
 from pprs_dynamics.physics.mechanism.places import PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure
+from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 
 ROTATING = ('spherical', 'revolute', 'universal')
 

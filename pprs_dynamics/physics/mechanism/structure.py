@@ -34,8 +34,8 @@ from pprs_dynamics.physics.mechanism.description import (
     inertial_in,
 )
 from pprs_dynamics.physics.mechanism.elimination import determining, given
-from pprs_dynamics.physics.mechanism.linkage import Evaluation, survey
-from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Integers, Tables
+from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Integers, Tables
+from pprs_dynamics.physics.mechanism.tree_evaluation import Evaluation, survey
 
 # Drives move by these between closings when a motion is walked to.
 STRIDE_TURN, STRIDE_SLIDE = 0.1, 0.1  # [rad], and of the mechanism's size

@@ -6,7 +6,7 @@
 The tool's pose becomes six coordinates of the mechanism, three slides along the base's axes and
 three turns about the tool's axes at home, tied to the tool by a closure of type `fixed`. Of these
 coordinates as many are given as the robot has drives; the drives are then passive, and
-`linkage.follow` closes the loops for them as it does for the drives.
+`tree_evaluation.follow` closes the loops for them as it does for the drives.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ from pprs_dynamics.physics.mechanism.closures import RANK, ROWS
 from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.elimination import determining, given
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.linkage_equations import TRANSLATION, Integers, Tables
-from pprs_dynamics.physics.mechanism.mechanism import Linkage
+from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.structure import (
     STRIDE_SLIDE,
@@ -31,6 +30,7 @@ from pprs_dynamics.physics.mechanism.structure import (
     Structure,
     path_to_base,
 )
+from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Integers, Tables
 
 COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
 SLIDES = 3  # the first of them
@@ -105,8 +105,9 @@ class ToolPose:
         q, v, a = self._coordinates(motion)
         closed = {} if closed is None else closed
         try:
-            tied = Linkage.of(self._tied, q[:, self.chosen], v[:, self.chosen], a[:, self.chosen],
-                              nearby=closed.get(self._tied))
+            tied = LinkMotion.of(
+                self._tied, q[:, self.chosen], v[:, self.chosen], a[:, self.chosen],
+                nearby=closed.get(self._tied))
         except SingularityError as error:
             raise SingularityError(
                 error.sample, 'the pose of the tool does not determine the drives',

@@ -38,7 +38,7 @@ from pprs_dynamics.physics.three_pprs.passive_friction import (
     WholeMechanismFriction,
 )
 from pprs_dynamics.physics.three_pprs.robot import Geometry, Masses, Robot
-from pprs_dynamics.physics.three_pprs.state import MechanismState, solve_mechanism
+from pprs_dynamics.physics.three_pprs.state import ThreePprsState, solve_mechanism
 
 __all__ = ['RIGID_BODY', 'DriveForces', 'DriveModel', 'ModelState']
 
@@ -54,11 +54,11 @@ class DriveForces(Forces):
     parts : dict of (N, 6) arrays
         `rigid_body`, `active_friction`, `passive_friction` and one per added effect; they sum
         to `total`.
-    mechanism : MechanismState
+    mechanism : ThreePprsState
         Drive motion, Jacobians, reactions: what the forces were computed from.
     """
 
-    mechanism: MechanismState
+    mechanism: ThreePprsState
 
     @property
     def drive_motion(self) -> tuple[Array, ...]:
@@ -135,7 +135,7 @@ class DriveModel(ForceModel):
             return cls(robot=robot, effects=effects, limits=limits, reversal=reversal,
                        equations=values['equations'], values=values, source=source)
 
-    def mechanism(self, motion: PlatformMotion) -> MechanismState:
+    def mechanism(self, motion: PlatformMotion) -> ThreePprsState:
         """Return drive motion, Jacobians and frictionless forces for a platform motion.
 
         Raises
@@ -152,7 +152,7 @@ class DriveModel(ForceModel):
                 self.robot, motion, reversal=self.reversal, printed=self.equations == 'printed',
                 minimum_sine=self.limits.rod_sine, condition_limit=self.limits.condition_number)
 
-    def at_drives(self, state: MechanismState) -> MechanismState:
+    def at_drives(self, state: ThreePprsState) -> ThreePprsState:
         """Return the state in which the platform follows drives that move as in another."""
         found = solve_forward_motion(self.robot.geometry, state.position, state.velocity,
                                      state.acceleration, state.motion[:1]).motion.with_channels(
@@ -175,7 +175,7 @@ class DriveModel(ForceModel):
         return (self._with_effects(added, parts, mechanism, state, DriveForces) if added
                 else DriveForces(table[0], parts, mechanism))
 
-    def forces_at(self, mechanism: MechanismState, state: ModelState | None = None) -> DriveForces:
+    def forces_at(self, mechanism: ThreePprsState, state: ModelState | None = None) -> DriveForces:
         """Return the forces at a solved state of the mechanism; see `drive_forces`."""
         return self._with_effects(self.effects, {RIGID_BODY: mechanism.rigid_force}, mechanism,
                                   state, DriveForces)
@@ -190,11 +190,11 @@ class DriveModel(ForceModel):
                                    self.equations == 'printed')
         return None
 
-    def variables(self, state: MechanismState) -> dict[str, Array]:
+    def variables(self, state: ThreePprsState) -> dict[str, Array]:
         """Return loads of the guides, rod angles, and where the platform is."""
         motion = state.motion
         x, y, z = motion.position.T
-        return {'load': state.guide_load, 'rod_angle': np.tile(state.chains.rod_angle, 2),
+        return {'load': state.friction_load, 'rod_angle': np.tile(state.chains.rod_angle, 2),
                 'platform_x': x, 'platform_y': y, 'platform_z': z,
                 'platform_tilt': motion.tilt, 'platform_turn': motion.turn}
 

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.linkage_equations import WORST_CONDITION
-from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.mechanism.tree_equations import WORST_CONDITION
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.passive_friction import IndependentChainsFriction
-from pprs_dynamics.physics.three_pprs.state import MechanismState
+from pprs_dynamics.physics.three_pprs.state import ThreePprsState
 
 # Of a long trajectory that many samples are looked at for their condition number, evenly spread:
 # neighbours hardly differ, and a singular value decomposition each would cost more than the model.
@@ -44,13 +44,13 @@ class Margins:
     drive: str
 
 
-def margins(model: DriveModel | ArmModel, mechanism: Any) -> Margins:
+def margins(model: DriveModel | MechanismModel, mechanism: Any) -> Margins:
     """Return the margins of a motion that the model has accepted.
 
     Parameters
     ----------
-    model : DriveModel or ArmModel
-    mechanism : MechanismState or LinkageState
+    model : DriveModel or MechanismModel
+    mechanism : ThreePprsState or MechanismState
         What `model.drive_forces` returned with the forces.
     """
     lower, upper = model.limits.strokes
@@ -64,11 +64,11 @@ def margins(model: DriveModel | ArmModel, mechanism: Any) -> Margins:
     if isinstance(model, DriveModel):
         singularity = _singularity(model, mechanism)
     elif model.robot.structure.loops:
-        singularity = float(1 - mechanism.linkage.condition.max() / WORST_CONDITION)
+        singularity = float(1 - mechanism.links.condition.max() / WORST_CONDITION)
     return Margins(singularity, float(room[nearest]), model.drives[nearest])
 
 
-def _singularity(model: DriveModel, mechanism: MechanismState) -> float:
+def _singularity(model: DriveModel, mechanism: ThreePprsState) -> float:
     limits = model.limits
     J = mechanism.jacobians.J
     step = -(-len(J) // MOST_CONDITIONS)

@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from os import PathLike
 from typing import Any
 
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import is_axis, is_mechanism
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file, read_parameters
 
-Model = DriveModel | ArmModel
+Model = DriveModel | MechanismModel
 
 
 def load_model(path: str | PathLike[str] = DEFAULT_MODEL) -> Model:
@@ -39,6 +39,6 @@ def build_model(parameters: Mapping[str, Any], source: str = '') -> Model:
     ModelError
         For a key that is unknown, missing, of the wrong type or impossible.
     """
-    kind: type[Model] = (ArmModel if is_mechanism(parameters) or is_axis(parameters)
+    kind: type[Model] = (MechanismModel if is_mechanism(parameters) or is_axis(parameters)
                          else DriveModel)
     return kind.from_parameters(parameters, source)

@@ -3,7 +3,7 @@
 
 """The rigid body and the paper's friction in one pass over the samples.
 
-No intermediate quantity is stored. The equations are the functions that `MechanismState` and the
+No intermediate quantity is stored. The equations are the functions that `ThreePprsState` and the
 two effects call, too, which store every step and take three times as long.
 """
 
@@ -46,7 +46,7 @@ from pprs_dynamics.physics.three_pprs.passive_joints import (
 )
 from pprs_dynamics.physics.three_pprs.rigid_body import ThreeForces, body_forces
 from pprs_dynamics.physics.three_pprs.robot import Robot
-from pprs_dynamics.physics.three_pprs.state import MechanismKinematics, MechanismState
+from pprs_dynamics.physics.three_pprs.state import MechanismKinematics, ThreePprsState
 
 
 class DriveFriction(NamedTuple):
@@ -121,12 +121,12 @@ class OnePass:
         doubtful = evaluate(forces_kernel, self.parameters, rows, table)
         return table if doubtful < 0 else None
 
-    def mechanism(self, motion: PlatformMotion, table: Array) -> MechanismState:
+    def mechanism(self, motion: PlatformMotion, table: Array) -> ThreePprsState:
         """Return the state of the mechanism, not yet solved, for a motion and its forces."""
         kinematics = MechanismKinematics(self._robot.geometry, motion, *self._bounds)
         if len(table) > FORCES:
             kinematics.__dict__['drive_motion'] = tuple(table[FORCES:])
-        return MechanismState(self._robot, motion, kinematics, self._reversal, self._printed)
+        return ThreePprsState(self._robot, motion, kinematics, self._reversal, self._printed)
 
 
 def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, parts: Any) -> Any:

@@ -15,21 +15,21 @@ import numpy as np
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 
 HEIGHT = 0.5  # [m], of the home pose
 SAMPLES = 3  # more than one, as for recordings
 
 
-def prepare(model: DriveModel | ArmModel) -> None:
+def prepare(model: DriveModel | MechanismModel) -> None:
     """Evaluate a model once, both ways, alone and in a batch.
 
     A robot that cannot be at the home pose refuses it, after what is needed has been compiled.
     Effects that fail are told of when they are asked for an answer.
     """
-    if isinstance(model, ArmModel):
+    if isinstance(model, MechanismModel):
         with suppress(PprsError):
             structure = model.robot.structure
             closed = np.tile(structure.home[structure.tables.drives], (SAMPLES, 1))

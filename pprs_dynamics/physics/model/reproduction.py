@@ -23,7 +23,7 @@ from pprs_dynamics.physics.three_pprs.passive_friction import (
     PassiveFriction,
     WholeMechanismFriction,
 )
-from pprs_dynamics.physics.three_pprs.state import MechanismState
+from pprs_dynamics.physics.three_pprs.state import ThreePprsState
 
 # Of the paper's path; fine enough that rms figures no longer change in four digits.
 SAMPLES = 9425
@@ -106,7 +106,7 @@ def reproduce(model: DriveModel) -> Reproduction:
 
 
 def _claims(
-    state: MechanismState, active_friction: ActiveFriction,
+    state: ThreePprsState, active_friction: ActiveFriction,
     approaches: tuple[PassiveFriction, ...],
 ) -> list[Claim]:
     Q, active = state.rigid_body.force, active_friction.force(state)
@@ -147,13 +147,13 @@ def _claims(
     ]
 
 
-def _approach_at(effect: PassiveFriction, state: MechanismState, cosine: float) -> float:
+def _approach_at(effect: PassiveFriction, state: ThreePprsState, cosine: float) -> float:
     assert isinstance(effect, IndependentChainsFriction)
     force = _where_defined(replace(effect, minimum_cosine=cosine), state)
     return float(np.nanmax(np.abs(force)))
 
 
-def _where_defined(effect: PassiveFriction, state: MechanismState) -> Array:
+def _where_defined(effect: PassiveFriction, state: ThreePprsState) -> Array:
     """Return the effect's force, NaN where it refuses."""
     if isinstance(effect, IndependentChainsFriction):
         # Evaluated with the bound lifted, so that refused samples can be blanked one by one.

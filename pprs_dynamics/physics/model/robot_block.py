@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.description import (
     PARAMETERS,
     PRISMATIC,
@@ -233,7 +233,8 @@ def motor_map(structure: Structure, values: Mapping[str, Any]) -> dict[str, tupl
             for motor, ratios in rows.items()}
 
 
-def passive_friction(structure: Structure, values: Mapping[str, Any]) -> Iterator[LinkageFriction]:
+def passive_friction(structure: Structure, values: Mapping[str, Any],
+                     ) -> Iterator[ModelJointFriction]:
     """Yield the model's own friction in passive joints and loops, if it has any."""
     blocks: dict[str, dict[str, float]] = {}
     for key, value in values.items():
@@ -250,4 +251,4 @@ def passive_friction(structure: Structure, values: Mapping[str, Any]) -> Iterato
             raise ModelError(f'friction.joints.{name}.radius', blocks[name]['radius'],
                              'be greater than 0 beside coulomb: the load rubs at it [m]')
     if blocks:
-        yield LinkageFriction(blocks)
+        yield ModelJointFriction(blocks)

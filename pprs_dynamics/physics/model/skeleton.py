@@ -11,10 +11,10 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.mechanism import Linkage
+from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import joint_positions
 
 LINK, DRIVE, GUIDE = 'link', 'drive', 'guide'
@@ -68,10 +68,11 @@ class Skeleton:
     labels: dict[str, int]
 
     @classmethod
-    def of(cls, model: DriveModel | ArmModel, motion: PlatformMotion | JointMotion) -> Skeleton:
+    def of(cls, model: DriveModel | MechanismModel, motion: PlatformMotion | JointMotion,
+           ) -> Skeleton:
         """Return the poses of a motion of a model."""
-        if isinstance(model, ArmModel):
-            return _of_linkage(model, model.mechanism(motion).linkage)
+        if isinstance(model, MechanismModel):
+            return _of_links(model, model.mechanism(motion).links)
         assert isinstance(motion, PlatformMotion)
         return _of_platform(model, motion)
 
@@ -102,12 +103,12 @@ def _of_platform(model: DriveModel, motion: PlatformMotion) -> Skeleton:
                     tuple(joints[f'A_{i}'] for i in (1, 2, 3)), joints, {}, labels)
 
 
-def _of_linkage(model: ArmModel, linkage: Linkage) -> Skeleton:
-    s, m = model.robot.structure, linkage.motion
+def _of_links(model: MechanismModel, links: LinkMotion) -> Skeleton:
+    s, m = model.robot.structure, links.motion
     t, size = s.tables, s.size
     count = len(t.parent)
     points = [*np.moveaxis(m.p, 1, 0), *np.moveaxis(m.pA, 1, 0), *np.moveaxis(m.pB, 1, 0),
-              linkage.frame_of(s.tool).p]
+              links.frame_of(s.tool).p]
     driven = {s.rows[name]: d for d, name in enumerate(s.drives)}
     lines: list[Line] = []
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import Effect
-from pprs_dynamics.physics.three_pprs.state import MechanismState
+from pprs_dynamics.physics.three_pprs.state import ThreePprsState
 
 SixFloats = tuple[float, float, float, float, float, float]
 
@@ -38,12 +38,12 @@ class ActiveFriction(Effect):
     viscous: SixFloats
     coulomb: SixFloats
 
-    def force(self, state: MechanismState, memory: Any = None) -> Array:
+    def force(self, state: ThreePprsState, memory: Any = None) -> Array:
         """Return Delta Q^m, (N, 6) [N]."""
         Q_m: Array = drive_friction(np.asarray(self.viscous), np.asarray(self.coulomb),
-                                    state.velocity, state.guide_load, state.direction)
+                                    state.velocity, state.friction_load, state.direction)
         return Q_m
 
-    def dry(self, guide_load: Array) -> Array:
+    def dry(self, friction_load: Array) -> Array:
         """Return the dry friction in full motion [N], for loads of the guides (N, 6) [N]."""
-        return np.asarray(self.coulomb) * guide_load
+        return np.asarray(self.coulomb) * friction_load

@@ -22,7 +22,7 @@ from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.three_pprs.joint_rates import relative_rate
 from pprs_dynamics.physics.three_pprs.kernel_parameters import Joints
-from pprs_dynamics.physics.three_pprs.state import MechanismState
+from pprs_dynamics.physics.three_pprs.state import ThreePprsState
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class PassiveFriction(Effect):
                         for value in (joint.viscous, 0.0, joint.coulomb, joint.diameter)))
 
     @abstractmethod
-    def force(self, state: MechanismState, memory: Any = None) -> Array:
+    def force(self, state: ThreePprsState, memory: Any = None) -> Array:
         """Return Delta Q^p, (N, 6) [N]."""
 
 
@@ -79,7 +79,7 @@ class WholeMechanismFriction(PassiveFriction):
 
     approach: ClassVar[str] = 'whole_mechanism'
 
-    def force(self, state: MechanismState, memory: Any = None) -> Array:
+    def force(self, state: ThreePprsState, memory: Any = None) -> Array:
         """Return Delta Q^p, (N, 6) [N], by virtual power."""
         return state.against_friction(self.joints, self.printed)
 
@@ -103,12 +103,12 @@ class IndependentChainsFriction(PassiveFriction):
     approach: ClassVar[str] = 'independent_chains'
     minimum_cosine: float = 0.05
 
-    def singular(self, state: MechanismState) -> np.ndarray:
+    def singular(self, state: ThreePprsState) -> np.ndarray:
         """Return the samples at which this approach is not defined, (N,) bool."""
         mask: np.ndarray = np.any(np.abs(state.chains.cos_u) < self.minimum_cosine, axis=1)
         return mask
 
-    def force(self, state: MechanismState, memory: Any = None) -> Array:
+    def force(self, state: ThreePprsState, memory: Any = None) -> Array:
         """Return Delta Q^p, (N, 6) [N].
 
         Raises

@@ -227,7 +227,7 @@ class Robot:
 
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
                        ) -> Joints:
-        """Return friction of joints as `MechanismState.against_friction` takes it."""
+        """Return friction of joints as `ThreePprsState.against_friction` takes it."""
         return Joints.of(blocks)
 
     def heavier(self, link: str, mass: float) -> Robot:

@@ -89,10 +89,10 @@ class MechanismKinematics:
 
 
 @dataclass(frozen=True, eq=False)
-class MechanismState:
+class ThreePprsState:
     """Motion, Jacobians and frictionless forces at N samples.
 
-    Drive quantities (`position`, `velocity`, `acceleration`, `guide_load`) are (N, 6) in drive
+    Drive quantities (`position`, `velocity`, `acceleration`, `friction_load`) are (N, 6) in drive
     order; chain quantities (N, 3).
     """
 
@@ -155,7 +155,7 @@ class MechanismState:
         return self.kinematics.drive_motion[2]
 
     @property
-    def guide_load(self) -> Array:
+    def friction_load(self) -> Array:
         """Normal forces on the drives' guides [N]."""
         return self.rigid_body.guide_load
 
@@ -169,12 +169,12 @@ class MechanismState:
         """Sign of the drive velocities, sgn, turning over within the reversal velocity."""
         return self.kinematics.direction(self.reversal.velocity)
 
-    def __getitem__(self, samples: Any) -> MechanismState:
+    def __getitem__(self, samples: Any) -> ThreePprsState:
         """Return the samples that a slice, a mask or indices select, with their load."""
         return replace(self._along(self.motion[samples]),
                        load=None if self.load is None else self.load.at(samples))
 
-    def _along(self, motion: PlatformMotion) -> MechanismState:
+    def _along(self, motion: PlatformMotion) -> ThreePprsState:
         """Return a state of the same robot along another motion."""
         kinematics = self.kinematics
         return replace(self, motion=motion, kinematics=MechanismKinematics(
@@ -185,7 +185,7 @@ class MechanismState:
         """By which a drive is moved for derivatives [m]."""
         return POSITION_STEP * self.robot.geometry.rod_length
 
-    def moved(self, drive: int, step: float) -> MechanismState:
+    def moved(self, drive: int, step: float) -> ThreePprsState:
         """Return the state with a drive at other positions, to first order; all move as before."""
         from scipy.spatial.transform import Rotation  # here: commands start without it
 
@@ -197,7 +197,7 @@ class MechanismState:
             self.velocity, self.acceleration).with_channels(self.channels)
         return self._along(rates if self.time is None else rates.with_time(self.time))
 
-    def accelerated(self, drive: int, change: float) -> MechanismState:
+    def accelerated(self, drive: int, change: float) -> ThreePprsState:
         """Return the state with another acceleration of a drive."""
         rates = platform_rates(
             self.robot.geometry, self.motion, self.velocity,
@@ -228,13 +228,13 @@ class MechanismState:
         return transferred(self.robot.geometry.kernel_parameters, self.kinematics.chain_table,
                            self.kinematics.inverse_table, self.resistances(joints), printed)
 
-    def turning_over(self, reversal: Reversal) -> MechanismState:
+    def turning_over(self, reversal: Reversal) -> ThreePprsState:
         """Return the state with a sgn of other widths; all else is computed once for both."""
         state = replace(self, reversal=reversal)
         vars(state)['rigid_body'] = self.rigid_body
         return state
 
-    def loaded(self, robot: Robot, load: StructureLoad | None = None) -> MechanismState:
+    def loaded(self, robot: Robot, load: StructureLoad | None = None) -> ThreePprsState:
         """Return a state of this motion with other bodies, and with an additional load.
 
         The robot must have the geometry that the state was solved for.
@@ -249,7 +249,7 @@ class MechanismState:
 def solve_mechanism(
     robot: Robot, motion: PlatformMotion, *, reversal: Reversal | None = None,
     printed: bool = False, minimum_sine: float = 1e-6, condition_limit: float = np.inf,
-) -> MechanismState:
+) -> ThreePprsState:
     """Return the state of the mechanism for a platform motion.
 
     Raises
@@ -258,6 +258,6 @@ def solve_mechanism(
         See `solve_inverse_kinematics` and `inverse_table`.
     """
     kinematics = MechanismKinematics(robot.geometry, motion, minimum_sine, condition_limit)
-    state = MechanismState(robot, motion, kinematics, reversal or Reversal(), printed)
+    state = ThreePprsState(robot, motion, kinematics, reversal or Reversal(), printed)
     _ = kinematics.inverse_table
     return state

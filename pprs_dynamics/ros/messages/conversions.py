@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from builtin_interfaces.msg import Duration, Time
-from geometry_msgs.msg import Quaternion, Transform, Twist, Vector3
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Twist, Vector3
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import (
     JointTrajectory,
@@ -119,6 +119,24 @@ def joint_positions(stamp: int, names: Sequence[str], position: Array) -> JointS
     message = JointState(name=list(names), position=doubles(position))
     message.header.stamp = time(stamp)
     return message
+
+
+def transforms(stamp: int, base: str, links: Sequence[str], poses: Array) -> list[TransformStamped]:
+    """Return where links are on a base at a time [ns], for tf.
+
+    Parameters
+    ----------
+    poses : (F, 7) array
+        Place [m] and quaternion, x y z w.
+    """
+    found = []
+    for link, (x, y, z, *turn) in zip(links, poses.tolist(), strict=True):
+        one = TransformStamped(child_frame_id=link)
+        one.header.stamp, one.header.frame_id = time(stamp), base
+        one.transform.translation = Vector3(x=x, y=y, z=z)
+        one.transform.rotation = Quaternion(**dict(zip('xyzw', turn, strict=True)))
+        found.append(one)
+    return found
 
 
 def read_drives(message: JointState, field: str, may_be_nan: bool = False,

@@ -22,8 +22,8 @@ from pprs_dynamics.measurement.files.samples import Indices, Mask
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, position_spline_derivatives
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.pose_spline import FEWEST_POSES, spline_derivatives
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.ros.messages.conversions import (
     BASE,
     NANOSECONDS,
@@ -320,7 +320,7 @@ def readers_for(model: ForceModel, names: RobotNames | None = None) -> dict[str,
     tool's pose determines the drives.
     """
     readers = {TRAJECTORY: reader_for(model, names)}
-    if isinstance(model, ArmModel):
+    if isinstance(model, MechanismModel):
         try:
             tool = model.tool_pose.structure.tool
         except ModelError:
@@ -333,7 +333,7 @@ def readers_for(model: ForceModel, names: RobotNames | None = None) -> dict[str,
 def reader_for(model: ForceModel, names: RobotNames | None = None) -> RequestReader:
     """Return how trajectories for a model arrive, by the names of its robot."""
     joints, frame = names or RobotNames.of(model)
-    if isinstance(model, ArmModel):
+    if isinstance(model, MechanismModel):
         return RequestReader(JointTrajectory, lambda data, *rules: read_joint_trajectory(
             message_in(data, JointTrajectory), joints, *rules))
     if trajectories_have_known_bytes():

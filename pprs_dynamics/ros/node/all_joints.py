@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Positions of all joints of a robot, prepared beside a node that goes on answering."""
+"""Where all joints and free bodies of a robot are, prepared beside a node that answers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.simulation.export.exported_robot import TreePositions
+from pprs_dynamics.simulation.export.exported_robot import TreePose, TreePositions
 
 
 class AllJoints:
@@ -25,8 +25,8 @@ class AllJoints:
         self._model: ForceModel | None = None
         self._made: list[TreePositions | PprsError] = []
 
-    def at(self, model: ForceModel, position: Array) -> tuple[tuple[str, ...], Array] | None:
-        """Return names and positions [rad, m], (J,), for those of the drives, (D,).
+    def at(self, model: ForceModel, position: Array) -> tuple[TreePositions, TreePose] | None:
+        """Return the names, and where all is, for positions of the drives, (D,) [m, rad].
 
         None while the tree is being made.
 
@@ -44,7 +44,7 @@ class AllJoints:
             return None
         if isinstance(tree := self._made[0], PprsError):
             raise tree
-        return tree.names, tree.at(position - model.position_error(position[None])[0])
+        return tree, tree.at(position - model.position_error(position[None])[0])
 
 
 def _make(model: ForceModel, position: Array, made: list[TreePositions | PprsError]) -> None:

@@ -14,7 +14,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from pprs_dynamics.errors import ModelError, PprsError
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
     KEYS,
@@ -25,6 +24,7 @@ from pprs_dynamics.physics.model.keys import (
     is_mechanism,
     mechanism_block,
 )
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
     added_descriptor,
@@ -38,7 +38,7 @@ from pprs_dynamics.ros.node.parameters import (
     with_hint,
 )
 
-NodeModel = DriveModel | ArmModel
+NodeModel = DriveModel | MechanismModel
 Checked = TypeVar('Checked')
 DEMO = own_parameter('demo', False, 'true: without a model file this is the paper\'s robot, for '
                      'demonstrations', stays=True)
@@ -132,7 +132,7 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
 
     Attributes
     ----------
-    model : DriveModel or ArmModel
+    model : DriveModel or MechanismModel
         In force now; of one kind, and of the same drives, as long as the node runs.
     own : dict
         Values of the node's own parameters.
@@ -154,7 +154,7 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
         own = (*own, DEMO)
         declare_own(node, own)
         given = overrides(node)
-        self._kind: type[NodeModel] = ArmModel if is_mechanism(given) else DriveModel
+        self._kind: type[NodeModel] = MechanismModel if is_mechanism(given) else DriveModel
         taken_from_paper = declare_model(node)
         self._stays: dict[str, Any] = {}
         super().__init__(node, own)

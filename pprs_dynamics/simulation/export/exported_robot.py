@@ -13,8 +13,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
@@ -34,9 +36,9 @@ from pprs_dynamics.physics.mechanism.description import (
     principal_inertia,
     rotation_of,
 )
-from pprs_dynamics.physics.mechanism.linkage import survey
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.structure import build_structure
+from pprs_dynamics.physics.mechanism.tree_evaluation import survey
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.three_pprs.robot import Robot
@@ -256,8 +258,23 @@ def _platform(robot: Robot, model: DriveModel, kind: str) -> Mechanism:
                      robot.gravity)
 
 
+class TreePose(NamedTuple):
+    """Where the parts of an exported robot are.
+
+    Parameters
+    ----------
+    joints : (J,) array
+        Positions [rad, m].
+    bodies : (F, 7) array
+        Of free bodies, on the base: place [m] and quaternion, x y z w.
+    """
+
+    joints: Array
+    bodies: Array
+
+
 class TreePositions:
-    """The joints of a model's URDF; free bodies, which are no joints of a message, are left out.
+    """The joints of a model's URDF, and its free bodies, which are no joints of a message.
 
     Parameters
     ----------
@@ -266,6 +283,11 @@ class TreePositions:
     Attributes
     ----------
     names : tuple of J str
+        Joints.
+    base : str
+        The link that free bodies are told on.
+    bodies : tuple of F str
+        Links of the free bodies.
 
     Raises
     ------
@@ -277,11 +299,15 @@ class TreePositions:
         robot = export_robot(express(model, URDF), URDF)
         self._mechanism = robot.mechanism
         joints = [body for body in robot.bodies if body.kind != FREE]
+        free = [body for body in robot.bodies if body.kind == FREE]
         self.names = tuple(body.joint for body in joints)
+        self.base = robot.mechanism.structure.moved_by[0]
+        self.bodies = tuple(body.name for body in free)
         self._rows = np.array([body.row for body in joints])
+        self._free = tuple(body.row for body in free)
 
-    def at(self, position: Array) -> Array:
-        """Return the positions [rad, m], (J,), for those of the drives, (D,).
+    def at(self, position: Array) -> TreePose:
+        """Return where all is, for the positions of the drives, (D,).
 
         Raises
         ------
@@ -290,6 +316,10 @@ class TreePositions:
         """
         given = np.array(position, dtype=float)[None]
         still = np.zeros_like(given)
-        q = self._mechanism.at(given, still, still).motion.q[0]
-        t, rows = self._mechanism.structure.tables, self._rows
-        return t.ratio[rows] * q[t.coordinate[rows]] + t.offset[rows]
+        state = self._mechanism.at(given, still, still)
+        t, rows, q = self._mechanism.structure.tables, self._rows, state.motion.q[0]
+        bodies = np.empty((len(self._free), 7))
+        for k, row in enumerate(self._free):
+            bodies[k, :3] = state.motion.p[0, row]
+            bodies[k, 3:] = Rotation.from_matrix(state.motion.R[0, row]).as_quat()
+        return TreePose(t.ratio[rows] * q[t.coordinate[rows]] + t.offset[rows], bodies)

@@ -25,9 +25,9 @@ from pprs_dynamics.physics.effects.laws.joint_spring import JointSpring
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.model_file import Model, build_model
 from pprs_dynamics.physics.three_pprs.passive_friction import WholeMechanismFriction
 
@@ -78,7 +78,7 @@ class _Sorting:
     def __init__(self, model: ForceModel, kind: str) -> None:
         self.model, self.kind, self.held = model, kind, HELD[kind]
         self.loops = [loop.name for loop in model.robot.structure.loops] if isinstance(
-            model, ArmModel) else []
+            model, MechanismModel) else []
         # Joints of a format that passive joints of the model are; those without do not turn alone.
         self.passive = {
             one.name: HINGES if isinstance(model, DriveModel) else (one.name,)
@@ -142,7 +142,7 @@ class _Sorting:
                 self.kind == MJCF or not self._turns_gravity(effect))
 
     def _turns_gravity(self, effect: BodyEffect) -> bool:
-        assert isinstance(self.model, (DriveModel, ArmModel))
+        assert isinstance(self.model, (DriveModel, MechanismModel))
         robot = self.model.robot
         return bool(np.any(np.subtract(effect.changed(robot).gravity, robot.gravity)))
 
@@ -169,7 +169,7 @@ def express(model: ForceModel, kind: str) -> Expressed:
     sorting = _Sorting(model, kind)
     if isinstance(model, DriveModel):
         _sort_platform(model, sorting)
-    elif isinstance(model, ArmModel):
+    elif isinstance(model, MechanismModel):
         _sort_arm(model, sorting)
     for effect in model.effects:
         if effect.name in model.values.get(ACTIVE, ()):
@@ -197,7 +197,7 @@ def _sort_platform(model: DriveModel, sorting: _Sorting) -> None:
     sorting.exchange('equations', 'corrected')
 
 
-def _sort_arm(model: ArmModel, sorting: _Sorting) -> None:
+def _sort_arm(model: MechanismModel, sorting: _Sorting) -> None:
     """Sort rotors and friction, also of passive joints; of these no loads."""
     friction = 'friction' if model.is_described else model.block
     sorting.keep(f'{friction}.viscous', model.drives, DAMPING)
@@ -217,9 +217,9 @@ def _sort_arm(model: ArmModel, sorting: _Sorting) -> None:
 
 def _under_standard_gravity(model: ForceModel, sorting: _Sorting) -> None:
     """Take the gravity that is assumed where a file has none."""
-    if isinstance(model, ArmModel) and model.is_described:
+    if isinstance(model, MechanismModel) and model.is_described:
         sorting.exchange(f'{model.block}.gravity', STANDARD_GRAVITY)
-    elif isinstance(model, ArmModel):
+    elif isinstance(model, MechanismModel):
         # The axis is put at a slope that gives its share of it.
         most, along = -STANDARD_GRAVITY[2], model.values['axis.gravity']
         sorting.exchange('axis.gravity', min(max(along, -most), most))

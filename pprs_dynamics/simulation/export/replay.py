@@ -22,9 +22,9 @@ from pprs_dynamics.measurement.files.samples import Progress
 from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.arm_model import ArmModel
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel, Forces
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.simulation.arm_run import draw_motion
 from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState, couplings
@@ -184,7 +184,7 @@ def _excitation(model: ForceModel) -> Any:
     time = np.arange(0.0, DURATION, 1 / RATE)
     if isinstance(model, DriveModel):
         return Excitation(duration=DURATION).motion(time)
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     return draw_motion(model, DURATION, 0)
 
 

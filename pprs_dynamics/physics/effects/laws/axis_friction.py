@@ -41,9 +41,9 @@ class AxisFriction(Effect):
     def _rows(self) -> tuple[Array, Array]:
         return np.asarray(self.viscous), np.asarray(self.coulomb)
 
-    def dry(self, guide_load: Array) -> Array:
+    def dry(self, friction_load: Array) -> Array:
         """Return the dry friction in full motion [N], in the shape of the guide's load."""
-        return np.full_like(guide_load, np.asarray(self.coulomb))
+        return np.full_like(friction_load, np.asarray(self.coulomb))
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ class BaseTilt(BodyEffect):
     name: ClassVar[str] = 'base_tilt'
     acts_in = frozenset({PLATFORM, ARM})
     idealised: ClassVar[bool] = False
-    bends_columns: ClassVar[bool] = True
+    nonlinear: ClassVar[bool] = True
     linear = tuple(
         Parameter(axis, f'alpha_{axis}', 'rad', f'turn of gravity about {axis} of base', -3.2, 3.2,
                   scale=0.01, expected=(0.1, 0.1))

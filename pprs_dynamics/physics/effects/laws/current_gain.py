@@ -32,7 +32,7 @@ class CurrentGain(GainEffect):
 
     name: ClassVar[str] = 'current_gain'
     idealised: ClassVar[bool] = False
-    bends_columns: ClassVar[bool] = True
+    nonlinear: ClassVar[bool] = True
     linear = (Parameter('temperature', 'kappa', '1/K', 'by which effort is measured too large per '
                         'kelvin', -0.1, 0.1, 0.0, scale=0.001, expected=(0.002, 0.002)),
               Parameter('ripple', 'a', '1', 'height of the wave over the effort', 0.0, 0.9, 0.0,

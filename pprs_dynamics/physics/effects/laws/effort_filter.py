@@ -33,7 +33,7 @@ class EffortFilter(MeasurementEffect):
     """The amplifier's or the recorder's effort signal is smoothed before it is recorded."""
 
     name: ClassVar[str] = 'effort_filter'
-    bends_columns: ClassVar[bool] = True
+    nonlinear: ClassVar[bool] = True
     shows_at_reversals: ClassVar[bool] = True
     assumed_at_start: ClassVar[str] = 'the filter has settled at the first sample'
     linear = ()

@@ -24,7 +24,7 @@ class EffortGain(MeasurementEffect):
 
     name: ClassVar[str] = 'effort_gain'
     idealised: ClassVar[bool] = False
-    bends_columns: ClassVar[bool] = True
+    nonlinear: ClassVar[bool] = True
     # Makers state torque constants within some 10 %, as a limit.
     linear = (Parameter('gain', 'g', '1', 'by which effort is measured too large', -0.9, 9.0,
                         scale=0.05, expected=(0.04, 0.04)),)

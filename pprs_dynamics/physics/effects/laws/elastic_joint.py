@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A joint that winds up between two encoders: the motor's leads the link's by w, k w + d w' = tau.
+"""A joint that winds up: the motor's encoder leads the link by w, k w + d w' = tau.
 
-Positions are those before the gear. What the link's own encoder says is what the link does; its
-wind-up tells the load as well, k w + d w', with k and d as they explain what gear or screw pass
-on. Friction is the motor's, whose speed is as read.
+Positions are those before the gear. Without a second encoder w is tau / k, and its rates are
+neglected. Where the link has one, it says what the link does, and its wind-up what it carries:
+k w + d w' with k and d as they explain what gear or screw pass on. Friction is the motor's, whose
+speed is as read.
 """
 
 from __future__ import annotations
@@ -16,19 +17,20 @@ from typing import ClassVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import DriveRange, MeasurementEffect
+from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
-from pprs_dynamics.physics.effects.laws.lost_motion import SOFT
 
 LINK_POSITION = 'link_position'
+# Usual compliances of screws and belts, of gears and shafts [m/N, rad/(N m)].
+SOFT = (2e-6, 3e-4)
 
 
 class ElasticJoint(MeasurementEffect):
-    """Gear, shaft or belt that winds up under load, seen by an encoder on either side."""
+    """Gear, shaft or belt that winds up between an encoder on the motor and the link."""
 
     name: ClassVar[str] = 'elastic_joint'
     acts_in = frozenset({PLATFORM, ARM})
-    bends_columns: ClassVar[bool] = True
+    nonlinear: ClassVar[bool] = True
     linear = (
         Parameter('compliance', '1/k', 'm/N', 'by which the motor leads the link per load', -1.0,
                   1.0, scale=1e-6, expected=SOFT, turning=(-10.0, 10.0)),
@@ -38,19 +40,13 @@ class ElasticJoint(MeasurementEffect):
     card = Card(
         'motor position = q + w, k w + d w_dot = tau',
         'weight and inertia as of a drive that stands aside, the more the more it carries, and '
-        'shakes after jerks; the difference of the two encoders follows the load',
+        'shakes after jerks; the difference to an encoder on the link follows the load',
         'the flexspline of a harmonic drive, a belt, a long shaft or screw; more than before: a '
         'crack, a loose clamp, a worn belt',
         'lock the motor, load the link by known weights, and read its own encoder: slope and width '
         'of the loop are 1/k and the loss; without one a dial gauge does',
         'Spong, Modeling and control of elastic joint robots, ASME J. Dynamic Systems, '
         'Measurement, and Control 109, 1987')
-
-    @classmethod
-    def may_show(cls, covered: DriveRange) -> bool:
-        """Return whether there is a second encoder that moves."""
-        lowest, highest = covered.channels.get(LINK_POSITION, (0.0, 0.0))
-        return highest > lowest
 
     def loaded_position_error(self, drives: Sequence[str], transmitted: Array) -> Array:
         """Return how far encoders are ahead because of loads, (N, D) [m, rad]."""

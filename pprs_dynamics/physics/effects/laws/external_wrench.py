@@ -30,7 +30,7 @@ class ExternalWrench(BodyEffect):
 
     name: ClassVar[str] = 'external_wrench'
     acts_in = frozenset({PLATFORM, ARM})
-    bends_columns: ClassVar[bool] = True
+    nonlinear: ClassVar[bool] = True
     linear = (
         *(Parameter(name, f'F_{name[-1]}', 'N', f'force to overcome along {name[-1]} of base',
                     -1e6, 1e6, scale=1.0) for name in FORCES),

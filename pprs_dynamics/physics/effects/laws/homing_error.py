@@ -28,7 +28,7 @@ class HomingError(MeasurementEffect):
     # No force of an axis depends on its zero.
     acts_in = frozenset({PLATFORM, ARM})
     idealised: ClassVar[bool] = False
-    bends_columns: ClassVar[bool] = True
+    nonlinear: ClassVar[bool] = True
     # A homing switch or a mark is good for a millimetre or a degree; a joint that was put together
     # or counted wrongly may be off by any angle.
     linear = (Parameter('zero', 'z', 'm', 'by which positions are measured too large', -0.1, 0.1,

@@ -56,7 +56,7 @@ class Hysteresis(DriveEffect):
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
         """Return z - sgn q_dot alone and times N, and advance the memory to the last sample."""
         change = presliding(drive.position, shape['distance'], drive.memory) - drive.direction
-        return (change, drive.guide_load * change)
+        return (change, drive.friction_load * change)
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:

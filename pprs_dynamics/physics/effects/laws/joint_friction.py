@@ -105,7 +105,7 @@ def _in_joints(joints: tuple[tuple[str, float], ...], alike: tuple[tuple[str, ..
         'made_by': (_in_joints, (joints, alike))})
 
 
-class LinkageFriction(Effect):
+class ModelJointFriction(Effect):
     """The friction that a mechanism has in passive joints by its model file.
 
     Parameters

@@ -50,7 +50,7 @@ class LoadFriction(DriveEffect):
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
         """Return (N sgn q_dot,)."""
-        return (drive.guide_load * drive.direction,)
+        return (drive.friction_load * drive.direction,)
 
     @classmethod
     def may_show(cls, covered: DriveRange) -> bool:
@@ -60,4 +60,4 @@ class LoadFriction(DriveEffect):
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
         """Return what another exponent of the load adds: 2/3 in Hertzian contacts."""
-        return (tuple(other_exponent(drive.guide_load, one) for one in cls.columns(drive)),)
+        return (tuple(other_exponent(drive.friction_load, one) for one in cls.columns(drive)),)

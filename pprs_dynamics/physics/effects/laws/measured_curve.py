@@ -170,7 +170,7 @@ def variable_of(state: DriveStates, drive: str, variable: str) -> Array:
     """Return the variable of a drive's curve at all samples, (N,)."""
     name, _, other = variable.partition(' of ')
     column = state.drives.index(other or drive)
-    values: Array = getattr(state, 'guide_load' if name == 'load' else name)[:, column]
+    values: Array = getattr(state, 'friction_load' if name == 'load' else name)[:, column]
     return values
 
 

@@ -25,7 +25,7 @@ class PayloadOffset(BodyEffect):
 
     name: ClassVar[str] = 'payload_offset'
     idealised: ClassVar[bool] = False
-    bends_columns: ClassVar[bool] = True
+    nonlinear: ClassVar[bool] = True
     linear = tuple(
         Parameter(axis, f'd_{axis}', 'm', f'offset of the centre of mass along {axis} of platform',
                   -1.0, 1.0, scale=0.003)

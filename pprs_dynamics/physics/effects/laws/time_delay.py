@@ -32,7 +32,7 @@ class TimeDelay(MeasurementEffect):
 
     name: ClassVar[str] = 'time_delay'
     assumed_at_start: ClassVar[str] = 'the effort was what it is at the first sample'
-    bends_columns: ClassVar[bool] = True
+    nonlinear: ClassVar[bool] = True
     idealised: ClassVar[bool] = False
     shows_at_reversals: ClassVar[bool] = True
     linear = ()

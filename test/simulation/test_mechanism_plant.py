@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 import robots_with_loops as robots
 
-from pprs_dynamics import ArmModel, JointMotion
+from pprs_dynamics import JointMotion, MechanismModel
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.simulation.arm_forms import tilted
 from pprs_dynamics.simulation.arm_run import draw_motion
 from pprs_dynamics.simulation.drive_control import Setpoint
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
-from pprs_dynamics.simulation.linkage_plant import LinkagePlant
+from pprs_dynamics.simulation.mechanism_plant import MechanismPlant
 from pprs_dynamics.simulation.sensors import SensorSettings
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
@@ -28,11 +28,11 @@ QUIET = SensorSettings.with_effort_noise(0.0)
 TICK = 0.002
 
 
-def models(tmp_path: Path) -> dict[str, ArmModel]:
+def models(tmp_path: Path) -> dict[str, MechanismModel]:
     """Return the example robots with friction in every joint, and an arm."""
-    return {'hexapod': ArmModel.load('config/hexapod.yaml'),
-            'delta': ArmModel.load('config/delta.yaml'),
-            'arm': ArmModel.load(made_up_arm.write_arm(tmp_path, **{
+    return {'hexapod': MechanismModel.load('config/hexapod.yaml'),
+            'delta': MechanismModel.load('config/delta.yaml'),
+            'arm': MechanismModel.load(made_up_arm.write_arm(tmp_path, **{
                 key.replace('.', '__'): list(value)
                 for key, value in made_up_arm.FRICTION.items()}))}
 
@@ -42,7 +42,7 @@ def test_the_model_needs_the_efforts_under_which_the_plant_accelerates(
     tmp_path: Path, name: str,
 ) -> None:
     model = models(tmp_path)[name]
-    plant = LinkagePlant(model)
+    plant = MechanismPlant(model)
     rng, count = np.random.default_rng(3), len(plant.position)
     scale = np.array([0.1 if unit.turns else 0.02 for unit in model.units])
     q, v = plant.position + scale * rng.uniform(-1, 1, count), scale * rng.normal(size=count)
@@ -61,7 +61,7 @@ def test_it_follows_with_the_feedforward_and_applies_what_the_model_says(
     model = models(tmp_path)[name]
     motion = draw_motion(model, 8.0, 1, 1 / TICK)[:500]
     forces = model.drive_forces(motion).total
-    plant = LinkagePlant(model)
+    plant = MechanismPlant(model)
     robot = SimulatedRobot(plant, rate=1 / TICK, control=plant.gains(7.0, 0.9), sensors=QUIET)
     points = [Setpoint(*each) for each in zip(motion.position, motion.velocity, forces,
                                               strict=True)]
@@ -78,7 +78,7 @@ def test_it_follows_with_the_feedforward_and_applies_what_the_model_says(
 
 def test_the_loop_of_the_drives_is_stable(tmp_path: Path) -> None:
     """After a jump of the setpoint it comes to rest where friction lets it."""
-    plant = LinkagePlant(ArmModel.load('config/hexapod.yaml'))
+    plant = MechanismPlant(MechanismModel.load('config/hexapod.yaml'))
     robot = SimulatedRobot(plant, control=plant.gains(7.0, 0.9, command_timeout=np.inf),
                            sensors=QUIET)
     goal = plant.position + np.array([3.0, -3.0, 2.0, 0.0, 1.0, -2.0]) * 1e-3
@@ -92,7 +92,7 @@ def test_the_loop_of_the_drives_is_stable(tmp_path: Path) -> None:
 
 
 def test_it_holds_at_home_saturates_and_refuses(tmp_path: Path) -> None:
-    plant = LinkagePlant(ArmModel.load('config/hexapod.yaml'))
+    plant = MechanismPlant(MechanismModel.load('config/hexapod.yaml'))
     robot = SimulatedRobot(plant, control=plant.gains(7.0, 0.9), sensors=QUIET)
     home = plant.position.copy()
     for _ in range(50):
@@ -107,8 +107,8 @@ def test_it_holds_at_home_saturates_and_refuses(tmp_path: Path) -> None:
 
 
 def test_a_hidden_payload_is_moved_by_the_drive_that_carries_it(tmp_path: Path) -> None:
-    model = ArmModel.load(robots.five_bar().write(tmp_path))
-    plain, loaded = LinkagePlant(model), LinkagePlant(model, ['payload_mass'], seed=2)
+    model = MechanismModel.load(robots.five_bar().write(tmp_path))
+    plain, loaded = MechanismPlant(model), MechanismPlant(model, ['payload_mass'], seed=2)
     rest = np.zeros(2)
     weight = [each._equations(each.position, rest, rest)[0] for each in (plain, loaded)]
     # The tool's origin is an elbow: one drive moves it.
@@ -117,14 +117,14 @@ def test_a_hidden_payload_is_moved_by_the_drive_that_carries_it(tmp_path: Path) 
 
 
 def test_what_cannot_be_hidden_is_told(tmp_path: Path) -> None:
-    model = ArmModel.load(robots.five_bar().write(tmp_path))
+    model = MechanismModel.load(robots.five_bar().write(tmp_path))
     with pytest.raises(HiddenEffectError, match='rod_mass cannot be hidden'):
-        LinkagePlant(model, ['rod_mass'])
+        MechanismPlant(model, ['rod_mass'])
 
 
 def test_hidden_friction_by_load_follows_the_effort_of_the_moment(tmp_path: Path) -> None:
     model = models(tmp_path)['arm']
-    plain, hidden = LinkagePlant(model), LinkagePlant(model, ['load_friction'], seed=4)
+    plain, hidden = MechanismPlant(model), MechanismPlant(model, ['load_friction'], seed=4)
     (truth,) = hidden.hidden
     j = model.drives.index(truth['drives'][0])
     coefficient, reference = (truth['parameters'][key] for key in ('coefficient', 'reference'))
@@ -144,7 +144,7 @@ def test_a_tilted_base_turns_the_gravity_that_the_robot_has(
     tmp_path: Path, gravity: list[float],
 ) -> None:
     angle = 0.02
-    model = ArmModel.load(made_up_arm.write_arm(tmp_path))
+    model = MechanismModel.load(made_up_arm.write_arm(tmp_path))
     tilt = BaseTilt({'x': angle, 'y': 0.0})
     robot = replace(model.robot, gravity=tuple(gravity))
     assert tilted(np.array(gravity), angle) == pytest.approx(tilt.changed(robot).gravity)

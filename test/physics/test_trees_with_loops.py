@@ -18,14 +18,14 @@ from oracles.mujoco_loops import MujocoLoops
 from random_states import random_motion
 from scipy.spatial.transform import Rotation
 
-from pprs_dynamics import ArmModel, DriveModel, JointMotion, PlatformMotion, load_model
+from pprs_dynamics import DriveModel, JointMotion, MechanismModel, PlatformMotion, load_model
 from pprs_dynamics.errors import ModelError, PprsError, SingularityError, WorkspaceError
-from pprs_dynamics.physics.mechanism import linkage
-from pprs_dynamics.physics.mechanism.linkage_equations import Motion
-from pprs_dynamics.physics.mechanism.mechanism import Linkage
+from pprs_dynamics.physics.mechanism import tree_evaluation
+from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.tree_equations import DETERMINANT, Motion
 from pprs_dynamics.physics.model.model_file import build_model
 
 SAMPLES = 30
@@ -35,7 +35,7 @@ SIZES = {'hexapod': (0.03, 0.4, 4.0), 'delta': (0.3, 3.0, 30.0), 'five_bar': (0.
          'three_rrr': (0.2, 3.0, 30.0)}
 
 
-def states(model: ArmModel, size: tuple[float, float, float], samples: int = SAMPLES,
+def states(model: MechanismModel, size: tuple[float, float, float], samples: int = SAMPLES,
            seed: int = 0) -> JointMotion:
     """Return independent random states about home."""
     home = model.robot.structure.home[model.robot.structure.tables.drives]
@@ -46,10 +46,10 @@ def states(model: ArmModel, size: tuple[float, float, float], samples: int = SAM
 @pytest.mark.parametrize('name', ROBOTS)
 def test_efforts_are_those_of_mujoco(tmp_path: Path, name: str) -> None:
     text = ROBOTS[name]()
-    model = ArmModel.load(text.write(tmp_path))
+    model = MechanismModel.load(text.write(tmp_path))
     motion = states(model, SIZES[name])
     found = model.drive_forces(motion).total
-    moved = model.mechanism(motion).linkage
+    moved = model.mechanism(motion).links
     engine = MujocoLoops(text)
     expected = np.empty_like(found)
     for k in range(len(motion)):
@@ -60,7 +60,7 @@ def test_efforts_are_those_of_mujoco(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize('name', ROBOTS)
 def test_efforts_are_linear_in_the_regressor(tmp_path: Path, name: str) -> None:
-    model = ArmModel.load(ROBOTS[name]().write(tmp_path))
+    model = MechanismModel.load(ROBOTS[name]().write(tmp_path))
     motion = states(model, SIZES[name])
     rows = model.robot.regressor(motion.position, motion.velocity, motion.acceleration)
     total = model.drive_forces(motion).total
@@ -72,11 +72,11 @@ def test_efforts_are_linear_in_the_regressor(tmp_path: Path, name: str) -> None:
 def test_numpy_without_a_compiler_is_the_same(tmp_path: Path, name: str,
                                               monkeypatch: pytest.MonkeyPatch) -> None:
     joints = {one: {'viscous': 0.1, 'coulomb': 0.1, 'radius': 0.01} for one in friction_rows(
-        ArmModel.load(ROBOTS[name]().write(tmp_path)).robot.structure)}
-    model = ArmModel.load(ROBOTS[name]().write(tmp_path, {'joints': joints}))
+        MechanismModel.load(ROBOTS[name]().write(tmp_path)).robot.structure)}
+    model = MechanismModel.load(ROBOTS[name]().write(tmp_path, {'joints': joints}))
     motion = states(model, SIZES[name])
     compiled = model.drive_forces(motion).parts
-    monkeypatch.setattr(linkage, 'compiled_or_none', lambda function, samples: None)
+    monkeypatch.setattr(tree_evaluation, 'compiled_or_none', lambda function, samples: None)
     on_arrays, on_floats = (model.drive_forces(motion[part]).parts
                             for part in (slice(None), slice(3, 5)))
     assert set(on_arrays) == set(compiled)
@@ -88,9 +88,10 @@ def test_numpy_without_a_compiler_is_the_same(tmp_path: Path, name: str,
 @pytest.mark.parametrize('name', ROBOTS)
 def test_efforts_of_one_pass_are_those_of_the_links_that_are_kept(tmp_path: Path, name: str,
                                                                   ) -> None:
-    model = ArmModel.load(ROBOTS[name]().write(tmp_path, {'joints': {
+    model = MechanismModel.load(ROBOTS[name]().write(tmp_path, {'joints': {
         one: {'viscous': 0.1, 'torque': 0.1, 'coulomb': 0.2, 'radius': 0.02}
-        for one in friction_rows(ArmModel.load(ROBOTS[name]().write(tmp_path)).robot.structure)}}))
+        for one in friction_rows(
+            MechanismModel.load(ROBOTS[name]().write(tmp_path)).robot.structure)}}))
     motion = states(model, SIZES[name])
     quick, kept = model.mechanism(motion), model.mechanism(motion)
     kept = kept.turning_over(kept.reversal)
@@ -116,7 +117,7 @@ def test_efforts_do_not_depend_on_where_the_robot_was(tmp_path: Path, name: str,
                                                       ) -> None:
     """Poses anywhere and a little apart: with a state as without, wherever there is an answer."""
     random = np.random.default_rng(seed)
-    model = ArmModel.load(ROBOTS[name]().write(tmp_path))
+    model = MechanismModel.load(ROBOTS[name]().write(tmp_path))
     home = model.robot.structure.home[model.robot.structure.tables.drives]
     state, q, answered = model.initial_state(), home, 0
     for _ in range(STEPS):
@@ -140,13 +141,13 @@ def test_efforts_do_not_depend_on_where_the_robot_was(tmp_path: Path, name: str,
 
 def test_a_state_of_the_other_assembly_is_not_gone_on_from(tmp_path: Path) -> None:
     """A five-bar whose tip was put on the other side of its elbows: the answer is home's."""
-    model = ArmModel.load(robots.five_bar().write(tmp_path))
+    model = MechanismModel.load(robots.five_bar().write(tmp_path))
     structure = model.robot.structure
     home, evaluation = structure.home, structure.evaluation
     rest = np.zeros((1, len(structure.drives)))
     motion = JointMotion(home[None, structure.tables.drives], rest, rest)
     ends = home.copy()
-    points = {name: Linkage.of(structure, motion.position, rest, rest).frame_of(name).p[0, :2]
+    points = {name: LinkMotion.of(structure, motion.position, rest, rest).frame_of(name).p[0, :2]
               for name in ('left_rod', 'right_rod')}
     # Both rods mirrored at the line through the elbows.
     heading = np.arctan2(*(points['right_rod'] - points['left_rod'])[::-1])
@@ -157,7 +158,7 @@ def test_a_state_of_the_other_assembly_is_not_gone_on_from(tmp_path: Path) -> No
     rows, failed = evaluation.follow(motion.position, rest, rest, ends[None])
     assert failed < 0
     flipped = evaluation.motion(rows)
-    assert flipped.state[0, 1] * evaluation.at_home[1] < 0
+    assert flipped.solution[0, DETERMINANT] * evaluation.at_home[DETERMINANT] < 0
     state = model.initial_state()
     state.closed[structure] = flipped.q[0]
     found = model.drive_forces(motion, state).total
@@ -168,7 +169,7 @@ def test_a_state_of_the_other_assembly_is_not_gone_on_from(tmp_path: Path) -> No
 PAPER_FRICTION = ('friction.revolute', 'friction.spherical')
 
 
-def three_pprs(tmp_path: Path, drives: bool = False) -> tuple[DriveModel, ArmModel]:
+def three_pprs(tmp_path: Path, drives: bool = False) -> tuple[DriveModel, MechanismModel]:
     """Return the paper's robot in closed form, and as a tree with loops.
 
     Friction of the drives follows their guides' loads where it is among that of the joints.
@@ -188,7 +189,7 @@ def three_pprs(tmp_path: Path, drives: bool = False) -> tuple[DriveModel, ArmMod
     for d, name in enumerate(paper.drives if drives else ()):
         joints[name] = {key: float(values[f'friction.drives.{key}'][d])
                         for key in ('viscous', 'coulomb')}
-    model = ArmModel.load(text.write(tmp_path, {
+    model = MechanismModel.load(text.write(tmp_path, {
         'joints': joints, 'reversal_rate': float(values['friction.reversal_rate']),
         'reversal_velocity': float(values['friction.reversal_velocity'])}))
     return paper, model
@@ -233,7 +234,7 @@ def test_a_wrench_on_the_platform_loads_every_joint_as_in_the_closed_form(tmp_pa
     for added in ({}, {'effects.active': ['external_wrench'], **wrench}):
         paper, model = three_pprs(tmp_path, drives=True)
         paper = DriveModel.from_parameters({**paper.values, **added})
-        model = ArmModel.from_parameters({**model.values, **added}, model.source)
+        model = MechanismModel.from_parameters({**model.values, **added}, model.source)
         forces = paper.drive_forces(random_motion(np.random.default_rng(4), 100))
         s = forces.mechanism
         expected.append(forces.parts['active_friction'] + forces.parts['passive_friction'])
@@ -282,7 +283,7 @@ def test_an_effect_is_the_same_in_both_kernels(tmp_path: Path, name: str) -> Non
 
 
 def test_a_state_with_a_load_is_sliced_with_it(tmp_path: Path) -> None:
-    model = ArmModel.load(robots.hexapod().write(tmp_path))
+    model = MechanismModel.load(robots.hexapod().write(tmp_path))
     state = model.mechanism(states(model, SIZES['hexapod'], 8))
     wrench = np.random.default_rng(0).normal(size=(8, 6))
     loaded = state.loaded(model.robot, StructureLoad(wrench))
@@ -292,12 +293,12 @@ def test_a_state_with_a_load_is_sliced_with_it(tmp_path: Path) -> None:
 
 def test_a_gear_does_not_carry_its_rotor(tmp_path: Path) -> None:
     """The motor accelerates the rotor on its own side: only its effort grows, not the load."""
-    model = ArmModel.load(robots.five_bar().write(tmp_path))
+    model = MechanismModel.load(robots.five_bar().write(tmp_path))
     motion = states(model, SIZES['five_bar'])
-    with_rotor = ArmModel.from_parameters(
+    with_rotor = MechanismModel.from_parameters(
         {**model.values, 'robot.armature': (0.5, 0.8)}, model.source)
     before, after = model.mechanism(motion), with_rotor.mechanism(motion)
-    assert after.guide_load == pytest.approx(before.guide_load, abs=1e-12)
+    assert after.friction_load == pytest.approx(before.friction_load, abs=1e-12)
     assert after.rigid_force - before.rigid_force == pytest.approx(
         motion.acceleration * np.array([0.5, 0.8]), abs=1e-9)
 
@@ -321,22 +322,22 @@ def four_bar(coupler: float) -> robots.RobotText:
 
 def test_a_loop_that_opens_in_motion_is_refused_although_it_closed_at_home(tmp_path: Path) -> None:
     """With all links in line a joint seems free, a row seems implied; neither is, elsewhere."""
-    model = ArmModel.load(four_bar(0.4).write(tmp_path))
+    model = MechanismModel.load(four_bar(0.4).write(tmp_path))
     turn = np.linspace(0.0, 0.5, 50)[:, None]
     rest = np.zeros_like(turn)
     with pytest.raises(WorkspaceError, match=r'tip is open by .* mm.*robot\.home') as error:
         model.drive_forces(JointMotion(turn, rest, rest))
     assert 0 < error.value.sample < 50
     # A coupler that leaves the links out of line closes all the way, redundant rows and all.
-    model = ArmModel.load(four_bar(0.3).write(tmp_path))
-    moved = model.mechanism(JointMotion(turn, rest, rest)).linkage
+    model = MechanismModel.load(four_bar(0.3).write(tmp_path))
+    moved = model.mechanism(JointMotion(turn, rest, rest)).links
     ends = [moved.frame_of(link) for link in ('rod', 'rocker')]
     tips = [end.p + end.R @ np.array([x, 0, 0])
             for end, x in zip(ends, (0.3, 0.2), strict=True)]
     assert tips[0] == pytest.approx(tips[1], abs=1e-9)
 
 
-def energy(model: ArmModel, moved: Motion) -> np.ndarray:
+def energy(model: MechanismModel, moved: Motion) -> np.ndarray:
     """Return kinetic and potential energy from masses, centres and inertia alone, (N,) [J]."""
     robot, total = model.robot, 0.0
     for row, one in zip(robot.bodies, robot.inertial, strict=True):
@@ -357,9 +358,9 @@ def energy(model: ArmModel, moved: Motion) -> np.ndarray:
 def test_power_of_the_drives_is_energy_and_what_joints_rub(tmp_path: Path, name: str) -> None:
     """The drives' power against friction is that of every joint at its own rate."""
     text = ROBOTS[name]()
-    plain = ArmModel.load(text.write(tmp_path))
+    plain = MechanismModel.load(text.write(tmp_path))
     rubbing = {one: {'viscous': 0.2} for one in friction_rows(plain.robot.structure)}
-    model = ArmModel.load(text.write(tmp_path, {'joints': rubbing}))
+    model = MechanismModel.load(text.write(tmp_path, {'joints': rubbing}))
     home = plain.robot.structure.home[plain.robot.structure.tables.drives]
     h = 1e-3
     time = np.arange(-4, 5) * h
@@ -367,7 +368,7 @@ def test_power_of_the_drives_is_energy_and_what_joints_rub(tmp_path: Path, name:
     swing = SIZES[name][0] * np.sin(np.outer(time, w) + np.arange(len(home)))
     rate = SIZES[name][0] * w * np.cos(np.outer(time, w) + np.arange(len(home)))
     motion = JointMotion(home + swing, rate, -w ** 2 * swing)
-    m = plain.mechanism(motion).linkage.motion
+    m = plain.mechanism(motion).links.motion
     stored = energy(plain, m)
     weights = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280]) / h
     forces = model.drive_forces(motion)
@@ -436,23 +437,23 @@ def test_a_rod_that_spins_between_two_balls_is_held(tmp_path: Path) -> None:
             text.parts[k] = part.replace('child link="rod_1l"', 'child link="yoke_1l"')
     text.link('yoke_1l')
     text.joint('spin_1l', 'continuous', 'yoke_1l', 'rod_1l')
-    model = ArmModel.load(text.write(tmp_path))
+    model = MechanismModel.load(text.write(tmp_path))
     assert model.robot.structure.held == ('spin_1l',)
     assert model.robot.structure.mobility.freedoms == 4
-    plain = ArmModel.load(robots.delta().write(tmp_path))
+    plain = MechanismModel.load(robots.delta().write(tmp_path))
     motion = states(plain, SIZES['delta'])
     assert model.drive_forces(motion).total == pytest.approx(
         plain.drive_forces(motion).total, abs=1e-6)
 
 
 def test_out_of_reach_and_singular_are_told_at_once(tmp_path: Path) -> None:
-    legs = ArmModel.load(robots.hexapod().write(tmp_path))
+    legs = MechanismModel.load(robots.hexapod().write(tmp_path))
     home = legs.robot.structure.home[legs.robot.structure.tables.drives]
     rest = np.zeros((2, 6))
     with pytest.raises(WorkspaceError) as error:
         legs.drive_forces(JointMotion(home + np.outer([0, 1.2], np.eye(6)[0]), rest, rest))
     assert error.value.sample == 1
-    model = ArmModel.load(robots.five_bar().write(tmp_path))
+    model = MechanismModel.load(robots.five_bar().write(tmp_path))
     home = model.robot.structure.home[model.robot.structure.tables.drives]
     # Towards the pose at which both rods are in line.
     q = home + np.linspace(0, 1, 200)[:, None] * (np.array([3.1, 0.04]) - home)
@@ -463,7 +464,7 @@ def test_out_of_reach_and_singular_are_told_at_once(tmp_path: Path) -> None:
 
 def test_a_tools_poses_give_the_legs_that_geometry_gives(tmp_path: Path) -> None:
     """Of a 6-UPS leg_i = |x_i|, x_i from its universal joint to its ball."""
-    model = ArmModel.load(robots.hexapod().write(tmp_path))
+    model = MechanismModel.load(robots.hexapod().write(tmp_path))
     s, rng, samples = model.robot.structure, np.random.default_rng(2), 20
     home = model.robot.at(*(np.tile(each, (1, 1)) for each in (
         s.home[s.tables.drives], np.zeros(6), np.zeros(6))))
@@ -495,11 +496,11 @@ def test_a_tools_poses_give_the_legs_that_geometry_gives(tmp_path: Path) -> None
 @pytest.mark.parametrize('samples', [1, 8])
 def test_a_pose_past_a_singularity_is_not_answered_with_another_pose_of_the_same_legs(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: int, compiled: bool) -> None:
-    model = ArmModel.load(robots.hexapod().write(tmp_path))
+    model = MechanismModel.load(robots.hexapod().write(tmp_path))
     home = model.tool_pose.home
     turned = (Rotation.from_matrix(home.R) * Rotation.from_rotvec([0.0, 0.0, 1.7])).as_quat()
     if not compiled:
-        monkeypatch.setattr(linkage, 'compiled_or_none', lambda function, samples: None)
+        monkeypatch.setattr(tree_evaluation, 'compiled_or_none', lambda function, samples: None)
     with pytest.raises(SingularityError):
         model.drive_forces(PlatformMotion.at_rest(np.tile(home.p, (samples, 1)),
                                                   np.tile(turned, (samples, 1))))
@@ -507,24 +508,24 @@ def test_a_pose_past_a_singularity_is_not_answered_with_another_pose_of_the_same
 
 def test_friction_of_joints_leaves_loads_as_they_are_that_others_read(tmp_path: Path) -> None:
     """Columns of several threads share one state."""
-    model = ArmModel.load(robots.hexapod().write(tmp_path))
+    model = MechanismModel.load(robots.hexapod().write(tmp_path))
     state = model.mechanism(states(model, SIZES['hexapod']))
     loads = {name: each.copy() for name, each in state.reactions._asdict().items()}
     joints = np.arange(3)
     numbers = [np.full(3, value) for value in (0.3, 0.2, 0.01, 0.1)]
-    efforts = state.against_friction(linkage.JointFriction(joints, joints, *numbers))
+    efforts = state.against_friction(tree_evaluation.JointFriction(joints, joints, *numbers))
     assert np.abs(efforts).max() > 0
     for name, each in state.reactions._asdict().items():
         np.testing.assert_array_equal(each, loads[name])
 
 
 def test_a_delta_follows_places_and_refuses_what_it_cannot_turn(tmp_path: Path) -> None:
-    model = ArmModel.load(robots.delta().write(tmp_path))
+    model = MechanismModel.load(robots.delta().write(tmp_path))
     assert model.tool_pose.chosen.tolist() == [0, 1, 2]
     motion = states(model, SIZES['delta'])
-    linkage = model.mechanism(motion).linkage
+    links = model.mechanism(motion).links
     row, _ = model.robot.structure.links['platform']
-    frame, m = linkage.frame_of('platform'), linkage.motion
+    frame, m = links.frame_of('platform'), links.motion
     found = model.mechanism(PlatformMotion(
         frame.p, Rotation.from_matrix(frame.R).as_quat(), m.u[:, row], m.w[:, row], m.ud[:, row],
         m.wd[:, row]))
@@ -545,7 +546,7 @@ def test_a_mimic_joint_is_a_coupling(tmp_path: Path) -> None:
     text.joint('slide', 'prismatic', 'base', 'weight', axis=(0, 0, 1),
                more='\n    <mimic joint="turn" multiplier="-0.2" offset="0.5"/>')
     text.drives = ['turn']
-    model = ArmModel.load(text.write(tmp_path))
+    model = MechanismModel.load(text.write(tmp_path))
     q, v, a = np.random.default_rng(0).normal(size=(3, 5, 1))
     expected = 0.1 * a + 0.2 ** 2 * 3.0 * a - 0.2 * 3.0 * 9.81
     assert model.drive_forces(JointMotion(q, v, a)).total == pytest.approx(expected, abs=1e-12)
@@ -567,7 +568,7 @@ def test_what_follows_a_joint_weighs_on_it_in_either_block(tmp_path: Path, block
     path = text.write(tmp_path)
     if block == 'arm':
         path.write_text(path.read_text().replace('robot:', 'arm:').replace('drives:', 'joints:'))
-    model = ArmModel.load(path)
+    model = MechanismModel.load(path)
     q, v, a = np.random.default_rng(0).normal(size=(3, 6, 1))
     expected = 0.1 * a + 4 * (0.01 + 0.1 ** 2) * a - 2 * 0.1 * 9.81 * np.cos(2 * q)
     assert model.drive_forces(JointMotion(q, v, a)).total == pytest.approx(expected, abs=1e-12)
@@ -590,7 +591,7 @@ def test_a_robot_from_mjcf_is_that_of_mujoco(tmp_path: Path) -> None:
         '/**:\n  ros__parameters:\n    robot: {mjcf: bar.xml, base: world, tool: left_rod, '
         'drives: [a, b], gravity: [0.0, -9.81, 0.0]}\n')
     model = load_model(tmp_path / 'bar.yaml')
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     assert model.robot.structure.mobility.freedoms == 2
     import mujoco
     engine = mujoco.MjModel.from_xml_path(str(tmp_path / 'bar.xml'))
@@ -598,7 +599,7 @@ def test_a_robot_from_mjcf_is_that_of_mujoco(tmp_path: Path) -> None:
     engine.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     data = mujoco.MjData(engine)
     motion = states(model, (0.2, 2.0, 10.0))
-    found, m = model.drive_forces(motion).total, model.mechanism(motion).linkage.motion
+    found, m = model.drive_forces(motion).total, model.mechanism(motion).links.motion
     for k in range(len(motion)):
         order = [model.robot.structure.tables.coordinate[model.robot.structure.rows[name]]
                  for name in 'acbd']
@@ -619,7 +620,7 @@ def test_it_is_told_as_a_robot_with_loops(tmp_path: Path) -> None:
     assert load_model(file).title == 'a robot with loops'
     values = {**load_model(file).values, 'effects.payload_offset.x': 0.1}
     with pytest.raises(ModelError, match='acts in a robot with loops'):
-        ArmModel.from_parameters(values, str(file))
+        MechanismModel.from_parameters(values, str(file))
 
 
 def test_the_file_refuses_two_descriptions_and_none(tmp_path: Path) -> None:
@@ -652,7 +653,7 @@ def test_friction_of_passive_hinges_and_slides_turns_over_in_widths_of_their_own
     path = text.write(tmp_path, {
         'reversal_rate': 0.02, 'reversal_slide': 0.002,
         'joints': {'pin': {'torque': 3.0}, 'guide': {'torque': 5.0}}})
-    model = ArmModel.load(path)
+    model = MechanismModel.load(path)
     q, v = np.array([[0.8]]), np.array([[0.02]])
     found = model.drive_forces(JointMotion(q, v, 0 * v)).parts['passive_friction'][0, 0]
     # The block does not turn: the pin turns back as fast as the crank; x = 0.1 cos q.

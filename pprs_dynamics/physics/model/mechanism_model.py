@@ -23,18 +23,18 @@ from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import MISSING, ModelError
 from pprs_dynamics.physics.effects.effect import ARM, SINGLE_AXIS, CatalogueEffect
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
-from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.description import REVOLUTE
 from pprs_dynamics.physics.mechanism.evaluation import not_compiling_yet
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.linkage import NO_FRICTION
-from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
-from pprs_dynamics.physics.mechanism.mechanism import LinkageState, Mechanism
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism, MechanismState
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tool_pose import ToolPose
+from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
+from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION
 from pprs_dynamics.physics.model.effects_block import added_effects
 from pprs_dynamics.physics.model.force_model import ForceModel, Forces, ModelState
 from pprs_dynamics.physics.model.keys import ARM as ARM_BLOCK
@@ -68,7 +68,7 @@ TO_FILES = [OF_MECHANISM.index(axes) for axes in OF_FILES]
 
 
 @dataclass(frozen=True, kw_only=True)
-class ArmModel(ForceModel):
+class MechanismModel(ForceModel):
     """The inverse dynamic model of a mechanism.
 
     Parameters
@@ -188,7 +188,7 @@ class ArmModel(ForceModel):
             structure.lower, structure.upper, structure.effort)
 
     @classmethod
-    def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> ArmModel:
+    def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> MechanismModel:
         """Build the model from flat keys and values; see `ForceModel.from_parameters`."""
         with source_of_errors(source):
             block = mechanism_block(parameters)
@@ -221,7 +221,7 @@ class ArmModel(ForceModel):
                        values=values, source=source)
 
     @classmethod
-    def _axis(cls, parameters: Mapping[str, Any], source: str) -> ArmModel:
+    def _axis(cls, parameters: Mapping[str, Any], source: str) -> MechanismModel:
         """Build the model of an axis."""
         values = checked_values(parameters)
         robot = axis_mechanism(values['axis.mass'], gravity_in_efforts(values, 'axis.gravity'))
@@ -260,7 +260,7 @@ class ArmModel(ForceModel):
         return forces
 
     def mechanism(self, motion: JointMotion | PlatformMotion,
-                  closed: dict[Any, Array] | None = None) -> LinkageState:
+                  closed: dict[Any, Array] | None = None) -> MechanismState:
         """Return what effects take of a motion; see `drive_forces` and `ModelState.closed`."""
         closed = {} if closed is None else closed
         start, nearby = None, closed.get(self.robot.structure)
@@ -268,23 +268,23 @@ class ArmModel(ForceModel):
             # The assembly is that of the pose, whichever the same drives would find from home.
             motion, start = self.tool_pose.drives(motion, closed)
             nearby = None
-        return LinkageState(motion.position, motion.velocity, motion.acceleration, motion.time,
-                            channels=motion.channels, robot=self.robot, reversal=self.reversal,
-                            start=start, nearby=nearby, friction=self._joint_friction)
+        return MechanismState(motion.position, motion.velocity, motion.acceleration, motion.time,
+                              channels=motion.channels, robot=self.robot, reversal=self.reversal,
+                              start=start, nearby=nearby, friction=self._joint_friction)
 
     @cached_property
     def _joint_friction(self) -> JointFriction:
         """The model's own friction of joints, which is found in one pass with the efforts."""
         return next((effect.table(self.robot, self.reversal) for effect in self.effects
-                     if isinstance(effect, LinkageFriction)), NO_FRICTION)
+                     if isinstance(effect, ModelJointFriction)), NO_FRICTION)
 
-    def at_drives(self, state: LinkageState) -> LinkageState:
+    def at_drives(self, state: MechanismState) -> MechanismState:
         """Return the state in which the links follow drives that move as in another."""
         return self.mechanism(state)
 
-    def variables(self, state: LinkageState) -> dict[str, Array]:
+    def variables(self, state: MechanismState) -> dict[str, Array]:
         """Return the loads of the gears, where they are known."""
-        return {'load': state.guide_load} if self.robot.load_is_known else {}
+        return {'load': state.friction_load} if self.robot.load_is_known else {}
 
 
 def inertial_values(inertial: Array) -> dict[str, tuple[float, ...]]:

@@ -19,7 +19,17 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.arithmetic import elements
 from pprs_dynamics.physics.mechanism.evaluation import TREE_FEW, compiled_or_none
-from pprs_dynamics.physics.mechanism.linkage_equations import (
+from pprs_dynamics.physics.mechanism.packed import (
+    length_of,
+    packed_tables,
+    read_loads,
+    read_motion,
+    read_tables,
+    views,
+)
+from pprs_dynamics.physics.mechanism.tree_equations import (
+    OPEN,
+    STEPS,
     WARM_STEPS,
     Integers,
     JointFriction,
@@ -38,14 +48,6 @@ from pprs_dynamics.physics.mechanism.linkage_equations import (
     reach,
     residual,
     twist,
-)
-from pprs_dynamics.physics.mechanism.packed import (
-    length_of,
-    packed_tables,
-    read_loads,
-    read_motion,
-    read_tables,
-    views,
 )
 
 # Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
@@ -89,7 +91,7 @@ def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, st
             if nearby and s == 0:
                 if is_near(t, start, q) and reach(t, m, start, q):
                     follow(t, m, v, a)
-                    done = m.state[3] <= WARM_STEPS and is_sound(t, m, at_home)
+                    done = m.solution[STEPS] <= WARM_STEPS and is_sound(t, m, at_home)
                 if not done:
                     for c in range(coordinates):
                         start[c] = home[c]
@@ -141,12 +143,12 @@ class Evaluation:
 
     @cached_property
     def at_home(self) -> Array:
-        """`Motion.state` at home, (4,)."""
+        """`Motion.solution` at home, (4,)."""
         still = np.zeros((3, 1, len(self.tables.drives)))
         still[0] = self.home[self.tables.drives]
         rows, _ = self.follow(*still)
-        state: Array = self.motion(rows).state[0]
-        return state
+        solution: Array = self.motion(rows).solution[0]
+        return solution
 
     def motion(self, rows: Array) -> Motion:
         """Return by name what rows of `follow` hold."""
@@ -297,7 +299,7 @@ class Evaluation:
         if stages & MOTION:
             q, v, a = np.moveaxis(given, 1, -1)
             if not reach(t, m, self.home if start is None else start.T, q):
-                size = m.state[0]
+                size = m.solution[OPEN]
                 return int(np.argmax(~(size < np.inf) | (size == np.max(size))))
             follow(t, m, v, a)
             found[:, :count] = m.q.T
@@ -326,7 +328,7 @@ def survey(t: Tables, q: Array, columns: Integers) -> tuple[Array, Array, Motion
     places = np.full((len(q), 2), -1)
     places[columns, 0] = np.arange(len(columns))
     place(t, one)
-    gaps = np.array([residual(t, one, r) for r in range(len(t.rows))])
+    residuals = np.array([residual(t, one, r) for r in range(len(t.rows))])
     J = np.zeros((len(t.rows), len(columns)))
     jacobian(t, one, places, J, np.empty((len(J), 0)))
-    return gaps, J, m
+    return residuals, J, m

@@ -23,11 +23,11 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
-from pprs_dynamics.physics.effects.laws.joint_friction import LinkageFriction
+from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.linkage_equations import JointFriction
-from pprs_dynamics.physics.mechanism.mechanism import Linkage
-from pprs_dynamics.physics.model.arm_model import ArmModel
+from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
+from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, draw_form, truth
 from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion, one_able_joint
 from pprs_dynamics.simulation.drive_control import ControlSettings
@@ -50,12 +50,12 @@ OF_MOMENT = tuple(name for name in FORMS if name not in ('hysteresis', 'drive_in
 HIDDEN = (*OF_MOMENT, *BODIES, 'base_tilt')
 
 
-class LinkagePlant:
+class MechanismPlant:
     """A mechanism under efforts of its drives; it starts at home, an arm amid its ranges.
 
     Parameters
     ----------
-    model : ArmModel
+    model : MechanismModel
         Of which the mechanism and its own friction count, and no added effects.
     names : sequence of str
         Of `HIDDEN`, or 'random': physics that the model lacks.
@@ -88,7 +88,7 @@ class LinkagePlant:
         For a name of none.
     """
 
-    def __init__(self, model: ArmModel, names: Sequence[str] = (), seed: int = 0,
+    def __init__(self, model: MechanismModel, names: Sequence[str] = (), seed: int = 0,
                  scale: float = 1.0, rate: float = 500.0) -> None:
         self.time_step = 1 / (rate * math.ceil(1 / (rate * LONGEST_STEP)))
         self.model, self.engine = model, ArmEngine(model)
@@ -103,7 +103,7 @@ class LinkagePlant:
             for one in (model.friction.viscous, model.friction.coulomb, model.offset.value))
         self._width = reversal.widths(len(s.drives))
         self._passive = [effect.table(model.robot, reversal) for effect in model.effects
-                         if isinstance(effect, LinkageFriction)]
+                         if isinstance(effect, ModelJointFriction)]
         self._pushes: list[tuple[int, str, dict[str, float], JointMoment]] = []
         self.hidden = [self._hide(name, motion, efforts, random, scale)
                        for name in _drawn(names, random)]
@@ -173,10 +173,10 @@ class LinkagePlant:
         """
         self.position = np.array(position, dtype=float)
         self.velocity = np.zeros_like(self.position) if velocity is None else np.array(velocity)
-        linkage = self._linkage(self.position, self.velocity, self._rest, self.structure.home)
-        self._closed = linkage.motion.q[0]
+        links = self._links(self.position, self.velocity, self._rest, self.structure.home)
+        self._closed = links.motion.q[0]
         self._acceleration = np.zeros_like(self.position)
-        self._held = linkage.efforts(self.model.robot)[0]
+        self._held = links.efforts(self.model.robot)[0]
 
     def step(self, effort: Array) -> None:
         """Advance by one time step under constant efforts (D,).
@@ -216,9 +216,9 @@ class LinkagePlant:
             [s]
         """
         last = self._acceleration
-        M, bias, linkage = self._equations(position, velocity, last)
+        M, bias, links = self._equations(position, velocity, last)
         push = effort - bias - self._offset + self._stops(position, velocity)
-        rows, coefficients = self._joints(linkage)
+        rows, coefficients = self._joints(links)
         a, found = last, last
         for _ in range(ROUNDS):
             mid = start + ahead * a
@@ -235,26 +235,26 @@ class LinkagePlant:
             a = np.where(turns, (a + found) / 2, found)
         return found
 
-    def _linkage(self, position: Array, velocity: Array, acceleration: Array, start: Array,
-                 ) -> Linkage:
-        return Linkage.of(self.structure, position[None], velocity[None], acceleration[None],
-                          start[None])
+    def _links(self, position: Array, velocity: Array, acceleration: Array, start: Array,
+               ) -> LinkMotion:
+        return LinkMotion.of(self.structure, position[None], velocity[None], acceleration[None],
+                             start[None])
 
     def _equations(self, position: Array, velocity: Array, acceleration: Array,
-                   ) -> tuple[Array, Array, Linkage]:
+                   ) -> tuple[Array, Array, LinkMotion]:
         """Return T' M T, all forces that do not depend on the acceleration, and the motion."""
-        linkage = self._linkage(position, velocity, acceleration, self._closed)
-        self._closed = linkage.motion.q[0]
+        links = self._links(position, velocity, acceleration, self._closed)
+        self._closed = links.motion.q[0]
         engine, state = self.engine, self.engine.state
-        T = state.rates(linkage)
-        needed, M = engine.inverse(linkage.motion)
+        T = state.rates(links)
+        needed, M = engine.inverse(links.motion)
         mass = T.T @ M @ T
         pushed = T.T @ needed
         self._load = np.abs(pushed)
         bias = pushed - mass @ acceleration
-        return mass + np.diag(self.model.robot.armature), bias, linkage
+        return mass + np.diag(self.model.robot.armature), bias, links
 
-    def _joints(self, linkage: Linkage) -> tuple[Array, Any]:
+    def _joints(self, links: LinkMotion) -> tuple[Array, Any]:
         """Return relative rates of rubbing joints per rate of drives (K, 3, D), and their law.
 
         The law gives friction over rate, (K,), of rates (K, 3): a hinge's stand in the first.
@@ -263,11 +263,11 @@ class LinkagePlant:
         rows = [np.concatenate((np.eye(count)[:, None], np.zeros((count, 2, count))), axis=1)]
         laws = [(self._viscous, self._coulomb, self._width)]
         if self._passive:
-            W = linkage.twists[0][0]
-            loads = linkage.loads(self.engine.robot)
+            W = links.twists[0][0]
+            loads = links.loads(self.engine.robot)
             for table in self._passive:
-                rows.append(_relative(self.structure.tables, linkage.motion, table, W))
-                load = _loads(linkage.motion, loads, table)
+                rows.append(_relative(self.structure.tables, links.motion, table, W))
+                load = _loads(links.motion, loads, table)
                 laws.append((table.viscous, table.torque + table.lever * load, table.width))
         viscous, dry, width = (np.concatenate([law[k] for law in laws]) for k in range(3))
 
@@ -317,7 +317,7 @@ def _relative(t: Any, m: Any, table: JointFriction, W: Array) -> Array:
     """Return relative rates per rate of drives, (K, 3, D); a hinge's stand in the first row."""
     rates = np.zeros((len(table.joint), 3, W.shape[-1]))
     hinges, loops = table.joint[table.joint >= 0], table.loop[table.loop >= 0]
-    rates[table.joint >= 0, 0] = t.ratio[hinges, None] * m.T[0, t.coordinate[hinges]]
+    rates[table.joint >= 0, 0] = t.ratio[hinges, None] * m.drive_to_joint[0, t.coordinate[hinges]]
     rates[table.loop >= 0] = W[t.loop_b[loops]] - W[t.loop_a[loops]]
     return rates
 

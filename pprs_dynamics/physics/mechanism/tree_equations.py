@@ -63,6 +63,8 @@ LOOP_A, LOOP_B, PATH_START, PATH_END = 0, 1, 2, 3
 LOOP, KIND, AXES = 0, 1, 2
 JOINT, SIGN = 0, 1
 UNIT = 2  # column of `row_reals`
+# Of `Motion.solution`.
+OPEN, DETERMINANT, CONDITION, STEPS = 0, 1, 2, 3
 
 
 def _part(table: Array, of: int, at: int | slice) -> Array:
@@ -207,16 +209,15 @@ class Motion(NamedTuple):
         link, at its origin.
     loops : (L OF_CLOSURE, 3) array
         Frames of the closures.
-    T : (C, D) array
-    J, inverse : (passive, passive) arrays
-        Scratch, and the inverse of J_p.
-    by_drives : (passive, D) array
-        Scratch.
-    gaps : (passive, 1) array
-        Scratch.
-    state : (4,) array
-        Largest row before the last step; determinant and condition number of J_p; steps of Newton
-        in the last stride.
+    drive_to_joint : (C, D) array
+        T: rates of all coordinates per rate of each drive.
+    inverse : (passive, passive) array
+        Of J_p.
+    solution : (4,) array
+        Largest row before the last step (OPEN); determinant and condition number of J_p; steps of
+        Newton in the last stride.
+    J, by_drives, residuals : arrays
+        Scratch: J_p as it is eliminated, J_a, and rows.
     """
 
     q: Any
@@ -224,12 +225,12 @@ class Motion(NamedTuple):
     a: Any
     links: Any
     loops: Any
-    T: Any
-    J: Any
+    drive_to_joint: Any
     inverse: Any
+    solution: Any
+    J: Any
     by_drives: Any
-    gaps: Any
-    state: Any
+    residuals: Any
 
     @property
     def R(self) -> Any:
@@ -440,14 +441,14 @@ def reach(t: Tables, m: Motion, start: Any, goal: Any) -> bool:
     zero, count = 0.0 * goal[0], len(t.passive)
     for c in range(len(m.q)):
         m.q[c] = start[c] + zero
-    m.state[0] = m.state[3] = need = size = zero
+    m.solution[OPEN] = m.solution[STEPS] = need = size = zero
     for d in range(len(t.drives)):
         m.q[t.drives[d]] = goal[d]
         need = larger(need, abs(goal[d] - start[t.drives[d]]) / t.stride[d])
     if not count:
         return True
     if not everywhere(need < MOST_STRIDES):
-        m.state[0] = need + 1.0
+        m.solution[OPEN] = need + 1.0
         return False
     strides = largest(need)
     for k in range(1, strides + 1):
@@ -455,25 +456,25 @@ def reach(t: Tables, m: Motion, start: Any, goal: Any) -> bool:
             c = t.drives[d]
             m.q[c] = goal[d] + (1.0 - k / strides) * (start[c] - goal[d])
         for n in range(MOST_STEPS):
-            m.state[3] = 1.0 + n + zero
+            m.solution[STEPS] = 1.0 + n + zero
             place(t, m)
             size = zero
             for r in range(count):
-                m.gaps[r, 0] = residual(t, m, r)
-                size = larger(size, abs(m.gaps[r, 0]))
+                m.residuals[r, 0] = residual(t, m, r)
+                size = larger(size, abs(m.residuals[r, 0]))
             jacobian(t, m, t.places, m.J, m.by_drives)
-            solve(m.J, m.gaps, t)
+            solve(m.J, m.residuals, t)
             step = zero
             for r in range(count):
-                step = larger(step, abs(m.gaps[r, 0]))
+                step = larger(step, abs(m.residuals[r, 0]))
             share = LONGEST_STEP / larger(step, LONGEST_STEP + 0.0 * step)
             for r in range(count):
-                m.q[t.passive[r]] -= share * m.gaps[r, 0]
+                m.q[t.passive[r]] -= share * m.residuals[r, 0]
             if everywhere(larger(step, size) < CLOSED):
                 break
         if not everywhere(size < CLOSED):
             break
-    m.state[0] = size
+    m.solution[OPEN] = size
     return everywhere(size < CLOSED)
 
 
@@ -492,10 +493,10 @@ def is_sound(t: Tables, m: Motion, at_home: Any) -> bool:
     ----------
     t, m : Tables, Motion
     at_home : (4,) array
-        `m.state` there.
+        `m.solution` there.
     """
-    if len(t.passive) and not everywhere((m.state[1] * at_home[1] > 0.0) & (
-            m.state[2] < WORST_CONDITION * at_home[2])):
+    if len(t.passive) and not everywhere((m.solution[DETERMINANT] * at_home[DETERMINANT] > 0.0) & (
+            m.solution[CONDITION] < WORST_CONDITION * at_home[CONDITION])):
         return False
     for r in range(len(t.passive), len(t.rows)):
         if not everywhere(abs(residual(t, m, r)) < OPEN_IN_MOTION * t.row_reals[r, UNIT]):
@@ -514,7 +515,7 @@ def follow(t: Tables, m: Motion, v: Any, a: Any) -> None:
     v, a : (D,) arrays
     """
     count, drives = len(t.passive), len(t.drives)
-    T, inverse, by_drives, passive = m.T, m.inverse, m.by_drives, t.passive
+    T, inverse, by_drives, passive = m.drive_to_joint, m.inverse, m.by_drives, t.passive
     zero = 0.0 * m.q[0]
     for c in range(len(m.v)):
         m.v[c] = zero
@@ -526,7 +527,7 @@ def follow(t: Tables, m: Motion, v: Any, a: Any) -> None:
         m.a[t.drives[d]] = a[d]
         T[t.drives[d], d] = 1.0
     place(t, m)
-    m.state[1] = m.state[2] = zero
+    m.solution[DETERMINANT] = m.solution[CONDITION] = zero
     if count:
         jacobian(t, m, t.places, m.J, by_drives)
         there = zero
@@ -535,14 +536,14 @@ def follow(t: Tables, m: Motion, v: Any, a: Any) -> None:
                 x = m.J[r, c] * t.passive_unit[c] / t.row_reals[r, UNIT]
                 there = there + x * x
                 inverse[r, c] = 1.0 if r == c else 0.0
-        m.state[1] = solve(m.J, inverse, t)
+        m.solution[DETERMINANT] = solve(m.J, inverse, t)
         # The condition number takes all of the inverse, so that it serves for the rest as well.
         back = zero
         for c in range(count):
             for r in range(count):
                 x = inverse[c, r] * t.row_reals[r, UNIT] / t.passive_unit[c]
                 back = back + x * x
-        m.state[2] = sqrt(there * back)
+        m.solution[CONDITION] = sqrt(there * back)
         # Drives innermost: their sums do not wait for one another.
         for c in range(count):
             k = passive[c]
@@ -558,11 +559,11 @@ def follow(t: Tables, m: Motion, v: Any, a: Any) -> None:
     accelerations(t, m)
     if count:
         for r in range(count):
-            m.gaps[r, 0] = row_acceleration(t, m, r)
+            m.residuals[r, 0] = row_acceleration(t, m, r)
         for c in range(count):
             x = zero
             for r in range(count):
-                x = x + inverse[c, r] * m.gaps[r, 0]
+                x = x + inverse[c, r] * m.residuals[r, 0]
             m.a[passive[c]] = -x
         accelerations(t, m)
 
@@ -582,7 +583,7 @@ def predict(t: Tables, m: Motion, goal: Any, start: Any) -> None:
         moved = goal[d] - start[t.drives[d]]
         start[t.drives[d]] = goal[d]
         for c in range(len(t.passive)):
-            start[t.passive[c]] += m.T[t.passive[c], d] * moved
+            start[t.passive[c]] += m.drive_to_joint[t.passive[c], d] * moved
 
 
 def velocities(t: Tables, m: Motion) -> None:
@@ -743,7 +744,7 @@ def _inertia_times(links: Any, j: int, inertial: Any, v: Vector) -> Vector:
 
 def to_drives(t: Tables, m: Motion, of_tree: Any, efforts: Any) -> None:
     """Fill in the drives' efforts T' tau for efforts of the tree's coordinates."""
-    T, passive, driven = m.T, t.passive, t.drives
+    T, passive, driven = m.drive_to_joint, t.passive, t.drives
     for d in range(len(driven)):
         x = of_tree[driven[d]] + 0.0
         for c in range(len(passive)):
@@ -786,7 +787,7 @@ def twist(t: Tables, m: Motion, of_turns: Any, of_origins: Any) -> None:
         for d in range(drives):
             w = column(of_turns, 3 * i, d)
             u = plus(column(of_origins, 3 * i, d), product(w, arm))
-            own = times(t.ratio[j] * m.T[k, d], z)
+            own = times(t.ratio[j] * m.drive_to_joint[k, d], z)
             if t.joints[j, TURNS]:
                 w = plus(w, own)
             else:

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pprs_dynamics import ArmModel, DriveModel, JointMotion, PprsError, load_model
+from pprs_dynamics import DriveModel, JointMotion, MechanismModel, PprsError, load_model
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import ModelError, UnreadableFileError
@@ -61,7 +61,7 @@ def mujoco_torques(text: str, motion: JointMotion, gravity: tuple[float, ...] = 
 
 
 def test_torques_are_those_of_mujoco(tmp_path: Path) -> None:
-    model = ArmModel.load(arm.write_arm(tmp_path))
+    model = MechanismModel.load(arm.write_arm(tmp_path))
     motion = states()
     assert model.drive_forces(motion).total == pytest.approx(
         mujoco_torques(arm.urdf(), motion), abs=1e-9)
@@ -72,7 +72,7 @@ def test_a_payload_is_a_body_more_to_mujoco(tmp_path: Path) -> None:
     body = ('<link name="load"><inertial><mass value="2.5"/><origin xyz="0.03 -0.05 0.08"/>'
             '<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0" ixz="0" iyz="0"/></inertial></link>'
             '<joint name="grip" type="fixed"><parent link="flange"/><child link="load"/></joint>')
-    model = ArmModel.load(arm.write_arm(tmp_path))
+    model = MechanismModel.load(arm.write_arm(tmp_path))
     values = dict(zip(('mass', 'x', 'y', 'z', 'xx', 'yy', 'zz'), (mass, *centre, *inertia),
                       strict=True))
     effect = PayloadMass.bound(model.robot).from_file(values)
@@ -83,7 +83,7 @@ def test_a_payload_is_a_body_more_to_mujoco(tmp_path: Path) -> None:
 
 
 def test_a_tilted_base_is_another_gravity_to_mujoco(tmp_path: Path) -> None:
-    model = ArmModel.load(arm.write_arm(tmp_path))
+    model = MechanismModel.load(arm.write_arm(tmp_path))
     motion = states()
     tilted = BaseTilt({'x': 0.1, 'y': 0.0}).apply(model.mechanism(motion))
     gravity = (0.0, 9.81 * np.sin(0.1), -9.81 * np.cos(0.1))
@@ -92,7 +92,7 @@ def test_a_tilted_base_is_another_gravity_to_mujoco(tmp_path: Path) -> None:
 
 
 def test_an_upward_wrench_holds_what_a_mass_weighs(tmp_path: Path) -> None:
-    model = ArmModel.load(arm.write_arm(tmp_path))
+    model = MechanismModel.load(arm.write_arm(tmp_path))
     rest = JointMotion(states().position, *np.zeros((2, SAMPLES, 3)))
     names = [p.name for p in ExternalWrench.parameters]
     wrench = ExternalWrench({name: 9.81 if name == 'force_z' else 0.0 for name in names})
@@ -102,7 +102,7 @@ def test_an_upward_wrench_holds_what_a_mass_weighs(tmp_path: Path) -> None:
 
 
 def test_torques_are_linear_in_the_regressor(tmp_path: Path) -> None:
-    model = ArmModel.load(arm.write_arm(tmp_path, joints=('reach', 'turn', 'swing')))
+    model = MechanismModel.load(arm.write_arm(tmp_path, joints=('reach', 'turn', 'swing')))
     motion = states()
     rows = model.robot.regressor(motion.position, motion.velocity, motion.acceleration)
     assert rows @ model.robot.inertial.ravel() == pytest.approx(
@@ -112,8 +112,8 @@ def test_torques_are_linear_in_the_regressor(tmp_path: Path) -> None:
 def test_joints_in_another_order_permute_the_torques(tmp_path: Path) -> None:
     motion = states()
     order = [2, 0, 1]
-    model = ArmModel.load(arm.write_arm(tmp_path))
-    other = ArmModel.load(arm.write_arm(tmp_path, joints=tuple(arm.JOINTS[k] for k in order)))
+    model = MechanismModel.load(arm.write_arm(tmp_path))
+    other = MechanismModel.load(arm.write_arm(tmp_path, joints=tuple(arm.JOINTS[k] for k in order)))
     moved = JointMotion(*(values[:, order] for values in (
         motion.position, motion.velocity, motion.acceleration)))
     assert other.drive_forces(moved).total == pytest.approx(
@@ -124,15 +124,15 @@ def test_joints_that_are_left_out_stand_at_zero(tmp_path: Path) -> None:
     motion = states()
     held = JointMotion(*(values * [1, 0, 1] for values in (
         motion.position, motion.velocity, motion.acceleration)))
-    part = ArmModel.load(arm.write_arm(tmp_path, joints=('turn', 'reach')))
+    part = MechanismModel.load(arm.write_arm(tmp_path, joints=('turn', 'reach')))
     found = part.drive_forces(JointMotion(*(values[:, [0, 2]] for values in (
         held.position, held.velocity, held.acceleration)))).total
-    whole = ArmModel.load(arm.write_arm(tmp_path))
+    whole = MechanismModel.load(arm.write_arm(tmp_path))
     assert found == pytest.approx(whole.drive_forces(held).total[:, [0, 2]], abs=1e-9)
 
 
 def test_friction_armature_and_offset_add_up(tmp_path: Path) -> None:
-    model = ArmModel.load(arm.write_arm(tmp_path))
+    model = MechanismModel.load(arm.write_arm(tmp_path))
     real = arm.real_arm(tmp_path, **{'arm.armature': (1.0, 2.0, 3.0)})
     motion = states()
     v = motion.velocity
@@ -173,7 +173,7 @@ def test_joints_that_share_a_transmission_need_the_turns_of_its_motors(tmp_path:
     path = arm.write_arm(tmp_path, arm.urdf(more=TRANSMISSION),
                          friction__motors='{left: {turn: 1.0, swing: 1.0}}')
     model = load_model(path)
-    assert isinstance(model, ArmModel)
+    assert isinstance(model, MechanismModel)
     assert model.robot.motors == {'left': (1.0, 1.0, 0.0)}
 
 
@@ -231,9 +231,10 @@ def test_the_fingerprint_is_that_of_the_description_not_of_its_place(tmp_path: P
     first, second = tmp_path / 'a', tmp_path / 'b'
     for folder in (first, second):
         folder.mkdir()
-    models = [ArmModel.load(arm.write_arm(folder)) for folder in (first, second)]
+    models = [MechanismModel.load(arm.write_arm(folder)) for folder in (first, second)]
     assert models[0].fingerprint == models[1].fingerprint
-    heavier = ArmModel.load(arm.write_arm(second, arm.urdf().replace('value="1.5"', 'value="1.6"')))
+    heavier = MechanismModel.load(
+        arm.write_arm(second, arm.urdf().replace('value="1.5"', 'value="1.6"')))
     assert heavier.fingerprint != models[0].fingerprint
 
 
@@ -347,12 +348,12 @@ def test_bounds_of_parameters_are_in_the_unit_of_the_drive(
     tmp_path: Path, effect: str, parameter: str, turning: float, pushing: float,
 ) -> None:
     """A zero may be off by any angle, and by a decimetre."""
-    values = ArmModel.load(arm.write_arm(tmp_path)).values
+    values = MechanismModel.load(arm.write_arm(tmp_path)).values
     force = {} if effect == 'homing_error' else {'force': 1.0}
 
-    def with_one(drive: str, value: float) -> ArmModel:
+    def with_one(drive: str, value: float) -> MechanismModel:
         block = {**force, parameter: value}
-        return ArmModel.from_parameters({**values, 'effects.active': [effect], **{
+        return MechanismModel.from_parameters({**values, 'effects.active': [effect], **{
             f'effects.{effect}.{drive}.{key}': number for key, number in block.items()}})
 
     assert with_one('turn', turning).effects[-1].to_file()['turn'][parameter] == turning
