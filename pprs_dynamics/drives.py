@@ -57,8 +57,8 @@ def common_unit(units: Sequence[DriveUnits], unit: str) -> str:
     return ' or '.join(sorted({one.of(unit) for one in units})) or unit
 
 
-# What may be measured of drives beside their motion and effort, and its unit in one that pushes; the
-# position of the link, behind the gear, where a second encoder tells it.
+# What may be measured of drives beside their motion and effort, and its unit in one that pushes:
+# also the position of the link, behind the gear, where a second encoder tells it.
 CHANNELS = {'temperature': 'degC', 'pressure': 'Pa', 'link_position': 'm'}
 
 # A column of a table by its name, or by its number from 1. `name[k]` is element k, from 0, of a

@@ -118,6 +118,15 @@ def test_an_elastic_joint_is_found_with_its_compliance(tmp_path: Path) -> None:
     assert told['swing.loss'].value == pytest.approx(LOSS, abs=0.01)
 
 
+def test_what_efforts_do_not_show_the_second_encoder_tells(tmp_path: Path) -> None:
+    model = made_up_arm.real_arm(tmp_path)
+    found = diagnose(model, [wound_up(model, 2e-5, LOSS)])
+    assert not found.effects
+    said, = (one for one in found.warnings if 'second encoder' in one)
+    assert 'link of swing' in said
+    assert '2e-05 rad/(N m), ' in said
+
+
 def test_a_zero_that_is_off_is_none(tmp_path: Path) -> None:
     model = made_up_arm.real_arm(tmp_path)
     found = diagnose(model, [wound_up(model, 0.0, shift=0.02)])

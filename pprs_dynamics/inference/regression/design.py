@@ -476,8 +476,8 @@ class Design:
         """Return what positions of a drive that are measured wrong do to all, (k, M) by drive.
 
         What a play does is not in proportion to it. Around a model that has the effect it is told
-        by steps of `SHARE` of what it has; else, of what the effect is `not_linear_in`, by the one of
-        `SIZES` that alone would explain most of the drive's error.
+        by steps of `SHARE` of what it has; else, of what the effect is `not_linear_in`, by the one
+        of `SIZES` that alone would explain most of the drive's error.
         """
         name = self.drives[drive]
         there = next((one for one in self.model.effects

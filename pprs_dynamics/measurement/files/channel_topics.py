@@ -108,7 +108,7 @@ def _told(topic: str, kind: str, message: Any, joints: tuple[str, ...],
 
 
 def write_channels(writer: Any, samples: Samples, stamps: Indices) -> None:
-    """Write what was measured as sensor_msgs, on `/<drive>/<channel>`, positions on `/<channel>`."""
+    """Write what was measured on `/<drive>/<channel>`, positions of links on `/<channel>`."""
     store: Any = None
     for channel in samples.channels.keys() - {channel for channel, _ in SENSORS.values()}:
         store = message_types() if store is None else store

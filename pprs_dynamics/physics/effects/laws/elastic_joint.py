@@ -61,9 +61,22 @@ class ElasticJoint(MeasurementEffect):
             if k < 0 or not np.any(w := windup[:, :, k]):
                 continue
             load = transmitted[:, k]
-            stiffness, damping, constant = np.linalg.lstsq(
-                np.stack((w[0], w[1], np.ones_like(load)), axis=1), load, rcond=None)[0]
-            said = stiffness * w[0] + damping * w[1] + constant
+            stiffness, _, said = told_by_windup(load, w)
             error[0, :, k] = values['compliance'] * (said - load) - values['loss'] * w[1]
             error[2, :, k] = values['compliance'] * stiffness * w[2]
         return error
+
+
+def told_by_windup(load: Array, windup: Array) -> tuple[float, float, Array]:
+    """Return stiffness, damping, and the load that a second encoder tells, (N,).
+
+    Parameters
+    ----------
+    load : (N,) array
+        What gear or screw pass on by the model [N, N m].
+    windup : (2 or 3, N) array
+        Position less that of the link, and its rate.
+    """
+    columns = np.stack((windup[0], windup[1], np.ones_like(load)), axis=1)
+    found = np.linalg.lstsq(columns, load, rcond=None)[0]
+    return float(found[0]), float(found[1]), columns @ found
