@@ -361,7 +361,7 @@ def _windup(recording: Recording, read: DriveMotion) -> Array | None:
     """Return by how much encoders lead links, with its rates, (3, N, D), None without a second."""
     if LINK_POSITION not in recording.channels:
         return None
-    link = _channels(recording, np.arange(len(recording.time)))[LINK_POSITION]
+    link = _channels(recording, np.arange(len(recording.time), dtype=float))[LINK_POSITION]
     ahead = np.nan_to_num(recording.position - link)
     return np.stack(smoothed_as(read, replace(recording, position=ahead), lambda values: values))
 

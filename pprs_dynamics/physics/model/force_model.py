@@ -511,5 +511,6 @@ class ForceModel(ABC):
 
     def windup_error(self, transmitted: Array, windup: Array) -> Array:
         """Return what second encoders say beside that, of position and its rates, (3, N, D)."""
-        return np.sum([one.windup_error(self.drives, transmitted, windup)
-                       for one in self.misreadings], axis=0)
+        errors: Array = np.sum([one.windup_error(self.drives, transmitted, windup)
+                                for one in self.misreadings], axis=0)
+        return errors

@@ -51,7 +51,8 @@ class ElasticJoint(MeasurementEffect):
     def loaded_position_error(self, drives: Sequence[str], transmitted: Array) -> Array:
         """Return how far encoders are ahead because of loads, (N, D) [m, rad]."""
         softness = [self.drives.get(name, {}).get('compliance', 0.0) for name in drives]
-        return transmitted * np.array(softness)
+        error: Array = transmitted * np.array(softness)
+        return error
 
     def windup_error(self, drives: Sequence[str], transmitted: Array, windup: Array) -> Array:
         """Return what the second encoder says otherwise than loads, of positions and rates."""
