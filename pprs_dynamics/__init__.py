@@ -62,17 +62,16 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.model.mechanism_model import MechanismModel
     from pprs_dynamics.physics.model.model_file import build_model, load_model
 
-__all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'MechanismModel', 'Array',
-           'Card', 'CatalogueEffect', 'ChangeResult', 'ComparisonResult',
-           'ConvergenceError', 'DiagnosisResult', 'DriveEffect', 'DriveForces', 'DriveModel',
-           'DriveRange', 'DriveSamples', 'EffectError', 'Excitation', 'ExperimentResult',
-           'FitResult', 'GainEffect', 'HelicalPath', 'JointMotion', 'LimitError',
-           'MeasurementEffect', 'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError',
-           'MotionLimits', 'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session',
-           'SimulationResult', 'SingularityError', 'StructureEffect', 'UnknownNameError',
-           'UnreadableFileError', 'WorkspaceError', 'adopt', 'adopt_all', 'build_model', 'changed',
-           'compare', 'diagnose', 'fit', 'load_model', 'next_experiment', 'read_recording',
-           'simulate', 'write_recording']
+__all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'Array', 'Card', 'CatalogueEffect',
+           'ChangeResult', 'ComparisonResult', 'ConvergenceError', 'DiagnosisResult',
+           'DriveEffect', 'DriveForces', 'DriveModel', 'DriveRange', 'DriveSamples', 'EffectError',
+           'Excitation', 'ExperimentResult', 'FitResult', 'GainEffect', 'HelicalPath',
+           'JointMotion', 'LimitError', 'MeasurementEffect', 'MechanismModel',
+           'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError', 'MotionLimits',
+           'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session', 'SimulationResult',
+           'SingularityError', 'StructureEffect', 'UnknownNameError', 'UnreadableFileError',
+           'WorkspaceError', 'adopt', 'adopt_all', 'build_model', 'changed', 'compare', 'diagnose',
+           'fit', 'load_model', 'next_experiment', 'read_recording', 'simulate', 'write_recording']
 __version__ = '0.1.0'
 
 # Loaded at first use: `pprs --help` and a node's refusal need neither numpy nor a model.
