@@ -331,10 +331,10 @@ CLOSED_FORMS = {
     'drive_spring': ({'stiffness': 20.0, 'rest': 0.01, 'hardening': 0.2},
                      lambda t: 20.0 * (t.position - 0.01)
                      + 20.0 / 0.04 * (t.position - 0.01) ** 3),
-    'stop_contact': ({'stiffness': 300.0, 'side': -1.0, 'middle': 0.01, 'reach': 0.02,
+    'stop_contact': ({'stiffness': 50.0, 'side': 1.0, 'middle': -0.02, 'reach': 0.01,
                       'damping': 2.0},
-                     lambda t: -300.0 * np.clip(-0.01 - t.position, 0, None) ** 1.5
-                     * (1 - 2.0 * t.velocity)),
+                     lambda t: 50.0 * np.clip(t.position + 0.01, 0, None) ** 1.5
+                     * (1 + 2.0 * t.velocity)),
     'force_ripple': ({'force': 0.5, 'pitch': 0.005, 'phase': 0.3, 'second': 0.4,
                       'second_phase': -1.0},
                      lambda t: 0.5 * np.sin(2 * np.pi * t.position / 0.005 + 0.3)
