@@ -260,7 +260,7 @@ def test_what_may_be_lack_of_fit_is_told_once_it_stands_out_of_the_noise(
     ranking = select(MODEL, [recording], DECISIONS)
     assert names(ranking.map_set) == ['joint_friction', 'tool_drag']
     assert ('joint_friction' in names(ranking.reported)) is stands_out
-    assert [one.candidate.name for one in ranking.remainders] == [
+    assert [one.candidate.name for one in ranking.absorbed] == [
         'joint_friction'] * (not stands_out)
 
 
@@ -331,9 +331,9 @@ def test_every_decision_has_a_unit_and_a_reason() -> None:
 
 
 def test_no_number_decides_outside_the_table() -> None:
-    page = (Path(__file__).parents[2] / 'docs' / 'diagnosis.md').read_text()
+    page = (Path(__file__).parents[2] / 'docs' / 'decisions.md').read_text()
     told = {name for name, *_ in DECISIONS.table()}
-    bounds = page.partition('### Bounds of the effort and of the accuracy')[2].partition('##')[0]
+    bounds = page.partition('## Bounds of the effort and of the accuracy')[2].partition('##')[0]
     inference = Path(search_module.__file__).parents[1]
     found = set()
     for room in ('regression', 'search', 'diagnosis'):

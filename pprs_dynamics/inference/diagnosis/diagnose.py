@@ -37,6 +37,7 @@ from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import paired_gain, rms
 from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.search.absorbed import Absorbed
 from pprs_dynamics.inference.search.candidates import (
     DURING,
     SINCE,
@@ -67,7 +68,6 @@ from pprs_dynamics.inference.search.fitted_model import (
     parts_of,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.form import Remainder
 from pprs_dynamics.inference.search.held_out import hold_out
 from pprs_dynamics.inference.search.noise_floors import noise_floors
 from pprs_dynamics.inference.search.possible_totals import left_at_nothing
@@ -368,10 +368,10 @@ class _Answer:
                    else 'effect' if effects else 'adequate')
         moved = [one for one in calibrations(final.fits, final.found, final.widths)
                  if abs(one.after - one.before) > self.decisions.sure * one.std]
-        remainders = () if self.is_dated else self.ranking.remainders
+        absorbed = () if self.is_dated else self.ranking.absorbed
         return Diagnosis(
             verdict, tuple(effects), sets, unconfirmed, self._candidates(),
-            self._suspects(), depends, tuple(map(self._within_model_error, remainders)),
+            self._suspects(), depends, tuple(map(self._within_model_error, absorbed)),
             self._sets(), self._barred(), tuple(moved),
             find_cautions(self.fits, self.map_set, effects), first.notes,
             first.given, self.adopted, first.residuals, self.remaining, noise, floors,
@@ -382,40 +382,47 @@ class _Answer:
 
     def _effects(self) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""
-        fits, ordered, steps = self.fits, self.ranking.order, self.ranking.path
-        final = self.final
-        if not ordered:
+        order, path = self.ranking.order, self.ranking.path
+        if not order:
             return []
         errors = [root_mean_square(self.ranking.first.design.residuals.error),
-                  *(linear_error(fits, step) for step in steps[1:-1]),
+                  *(linear_error(self.fits, step) for step in path[1:-1]),
                   root_mean_square(self.remaining)]
-        if self.validate:
-            models = [self.ranking.first.design.given,
-                      *(settled(fits, one).model for one in steps[1:-1]), final.model]
-            held_out = [self._error_held_out(one) for one in models]
-        else:
+        held_out = self._errors_held_out(errors[0])
+        return [self._effect(candidate, self.ranking.shares[k], errors[k:k + 2], held_out[k:k + 2])
+                for k, candidate in enumerate(order)]
+
+    def _errors_held_out(self, given: float) -> list[float]:
+        """Return the held-out errors of the given model, and with one effect after the other."""
+        path = self.ranking.path
+        if not self.validate:
             # Nothing is fitted in the model as given: all of its error is held out.
-            held_out = [errors[0], *(hold_out(fits, step).error for step in steps[1:])]
-        found = []
-        for k, candidate in enumerate(ordered):
-            last = next(c for c in final.found.effects if c.effect is candidate.effect)
-            said = averaged(estimate(final.fits, final.found, last), self._nearly(candidate))
-            without = self._told(self.ranking.best_without(candidate),
-                                 self.ranking.best_with(candidate))
-            in_model = self._in_model(candidate, said.parameters)
-            impossible = why_impossible(candidate.effect, said.parameters, self.decisions) or (
-                self._why_less_than_nothing(candidate))
-            # Numbers that stand for each other in part are uncertain each, and not together.
-            nothing = '' if without.cost > self.decisions.rival_margin else why_nothing(
-                candidate.effect, said.parameters, in_model)
-            found.append(FoundEffect(
-                candidate.effect, self.design.named(candidate.drives), said.parameters,
-                final.fits.library.force(final.found, last, self.remaining.shape),
-                without.cost, errors[k], errors[k + 1], held_out[k], held_out[k + 1],
-                said.at_bound, self.ranking.shares[k], self._certainty(candidate),
-                impossible or nothing, bool(impossible),
-                without, in_model, moments=said.moments))
-        return found
+            return [given, *(hold_out(self.fits, step).error for step in path[1:])]
+        models = [self.ranking.first.design.given,
+                  *(settled(self.fits, step).model for step in path[1:-1]), self.final.model]
+        return [rms(measure_residuals(model, self.validate)[0]) for model in models]
+
+    def _effect(self, candidate: EffectCandidate, share: float, errors: Sequence[float],
+                held_out: Sequence[float]) -> FoundEffect:
+        """Return an effect of the reported set, with the errors before it and with it."""
+        final = self.final
+        last = next(c for c in final.found.effects if c.effect is candidate.effect)
+        estimates = averaged(estimate(final.fits, final.found, last), self._nearly(candidate))
+        parameters = estimates.parameters
+        without = self._told(self.ranking.best_without(candidate),
+                             self.ranking.best_with(candidate))
+        in_model = self._in_model(candidate, parameters)
+        impossible = why_impossible(candidate.effect, parameters, self.decisions) or (
+            self._why_less_than_nothing(candidate))
+        # Numbers that stand for each other in part are uncertain each, and not together.
+        nothing = '' if without.cost > self.decisions.rival_margin else why_nothing(
+            candidate.effect, parameters, in_model)
+        return FoundEffect(
+            candidate.effect, self.design.named(candidate.drives), parameters,
+            final.fits.library.force(final.found, last, self.remaining.shape), without.cost,
+            errors[0], errors[1], held_out[0], held_out[1], estimates.at_bound, share,
+            self._certainty(candidate), impossible or nothing, bool(impossible), without,
+            in_model, moments=estimates.moments)
 
     def _why_less_than_nothing(self, candidate: EffectCandidate) -> str:
         """Return where recordings speak for less than no friction or inertia, as a clause."""
@@ -438,17 +445,17 @@ class _Answer:
             course = candidate.course
             if course is not None and course.kind == DURING:
                 continue  # what passes is no property of the machine
-            said = estimate(fits, found, candidate, are_drives_known=True)
+            estimates = estimate(fits, found, candidate, are_drives_known=True)
             effects.append(FoundEffect(
-                candidate.effect, self.design.named(candidate.drives), said.parameters,
+                candidate.effect, self.design.named(candidate.drives), estimates.parameters,
                 fits.library.force(found, candidate, self.remaining.shape),
                 fits.evaluate(found.without(candidate)).total - found.total, errors[k],
-                errors[k + 1], held_out[k], held_out[k + 1], said.at_bound,
+                errors[k + 1], held_out[k], held_out[k + 1], estimates.at_bound,
                 (errors[k] - errors[k + 1]) / errors[0],
-                in_model=self._in_model(candidate, said.parameters),
+                in_model=self._in_model(candidate, estimates.parameters),
                 course=None if course is None else replace(
                     course, begin=course.begin - begun, end=course.end - begun),
-                moments=said.moments))
+                moments=estimates.moments))
         return effects
 
     def _passing(self) -> list[Statement]:
@@ -505,10 +512,6 @@ class _Answer:
         return found if not candidate.effect.is_of_one_place or any(
             one.given[k] for one in candidate.components if one.given
             for k, c in enumerate(one.effect.coefficients) if c.name in one.names) else {}
-
-    def _error_held_out(self, model: ForceModel) -> float:
-        """Return the error of a model on the recordings that are not fitted [N]."""
-        return rms(measure_residuals(model, self.validate)[0])
 
     def _nearly(self, candidate: EffectCandidate) -> list[tuple[float, Estimates]]:
         """Return what sets that are nearly as good say of an effect, and what they cost more."""
@@ -619,12 +622,12 @@ class _Answer:
         names = tuple((c.name, self.design.named(c.drives)) for c in found.candidates)
         return RankedSet(names, self.ranking.difference(found, best), found.barred)
 
-    def _within_model_error(self, remainder: Remainder) -> WithinModelError:
-        force = self.fits.library.force(remainder.found, remainder.candidate,
+    def _within_model_error(self, absorbed: Absorbed) -> WithinModelError:
+        force = self.fits.library.force(absorbed.beside, absorbed.candidate,
                                         self.design.residuals.measured.shape)
         return WithinModelError(
-            remainder.candidate.name, self.design.named(remainder.candidate.drives),
-            float(np.sqrt(np.mean(force ** 2, axis=0)).max()), remainder.of)
+            absorbed.candidate.name, self.design.named(absorbed.candidate.drives),
+            float(np.sqrt(np.mean(force ** 2, axis=0)).max()), absorbed.of)
 
 
 def _for_json(shares: Mapping[str, float]) -> dict[str, float | None]:

@@ -178,15 +178,22 @@ class Regression:
         full: Array = precision + (1e-9 * scale + 1e-300) * np.eye(size)
         return full
 
-    def products(self, a: Block, b: Block | None, d: int) -> Array:
-        """Return the band sums of a block's rows with another's, or with the base and error."""
-        key = (a, b, d)
-        if key not in self._products:
+    def products(self, a: Block, others: Sequence[Block | None], d: int) -> list[Array]:
+        """Return band sums of a block's rows with those of others; None: the base and error.
+
+        Of those that are not known all at once: a call is dearer than a product.
+        """
+        for b in others:
             if b is not None and (b, a, d) in self._products:
-                return self._products[b, a, d].transpose(0, 2, 1)
-            other = self.base[d] if b is None else b.rows[d]
-            self._products[key] = self.series[d].products(a.rows[d], other)
-        return self._products[key]
+                self._products[a, b, d] = self._products[b, a, d].transpose(0, 2, 1)
+        new = [b for b in others if (a, b, d) not in self._products]
+        if new:
+            rows = [self.base[d] if b is None else b.rows[d] for b in new]
+            found = self.series[d].products(a.rows[d], np.concatenate(rows))
+            for b, part in zip(new, np.split(found, np.cumsum(list(map(len, rows)))[:-1], axis=2),
+                               strict=True):
+                self._products[a, b, d] = part
+        return [self._products[a, b, d] for b in others]
 
     def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
         """Return the equations of a drive, kept: sets that follow each other differ on few."""
@@ -328,7 +335,7 @@ class Regression:
     def _beside(self, fit: JointFit, block: Block) -> tuple[Array, Array, Array]:
         """Return own sums of products, those with what is left, and full products of a block."""
         taken, b = Columns(self, block.rows).projected(fit)
-        S = np.sum([np.tensordot(self.weights(fit, d), self.products(block, block, d), 1)
+        S = np.sum([np.tensordot(self.weights(fit, d), self.products(block, [block], d)[0], 1)
                     for d in block.rows], axis=0)
         return S - taken @ fit.covariance @ taken.T, b, S
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from scipy.special import log_ndtr
 
 from pprs_dynamics.arrays import Array
@@ -125,23 +125,27 @@ class Prior:
 
         A number beyond its tolerance is held back by a prior that is much steeper there.
         """
+        if not len(side):
+            return Posterior(self.mean, gram, 0.0, 0.0)
         b = side - gram @ self.mean
         beyond = np.zeros(len(b))
         for _ in range(MOST_LIMITED):
             H = gram + self.precision + np.diag(BEYOND_TOLERANCE * np.abs(beyond))
             scale = 1 / np.sqrt(np.einsum('ii->i', H))
-            factor = cho_factor(H * np.outer(scale, scale) + 1e-12 * np.eye(len(H)),
-                                check_finite=False)
-            away = scale * cho_solve(factor, scale * (
-                b + BEYOND_TOLERANCE * DEVIATIONS * beyond), check_finite=False)
+            factor, minor = dpotrf(H * np.outer(scale, scale) + 1e-12 * np.eye(len(H)))
+            if minor:
+                raise np.linalg.LinAlgError(f'minor {minor} of the normal equations is negative')
+            away = scale * dpotrs(factor, scale * (
+                b + BEYOND_TOLERANCE * DEVIATIONS * beyond))[0]
             now = np.sign(away) * (self.limited & (np.abs(away) > DEVIATIONS))
             if np.array_equal(now, beyond):
                 break
             beyond = now
-        covariance = cho_solve(factor, np.eye(len(H)), check_finite=False) * np.outer(scale, scale)
+        upper = np.triu(dpotri(factor)[0])
+        covariance = (upper + np.triu(upper, 1).T) * np.outer(scale, scale)
         penalty = float(away @ self.precision @ away + BEYOND_TOLERANCE * np.sum(
             np.abs(beyond) * (np.abs(away) - DEVIATIONS) ** 2))
-        log_det = 2 * float(np.log(np.diag(factor[0])).sum() - np.log(scale).sum())
+        log_det = 2 * float(np.log(np.diag(factor)).sum() - np.log(scale).sum())
         log_det += self._both_sides(away, np.diag(covariance), beyond)
         return Posterior(self.mean + away, covariance, penalty, log_det - self.log_det)
 
@@ -187,8 +191,8 @@ class Fitted(Protocol):
     base_index: dict[int, np.typing.NDArray[np.int_]]
     base_products: dict[int, Array]
 
-    def products(self, a: Block, b: Block | None, d: int) -> Array:
-        """Return band sums of products of two blocks' rows on a drive."""
+    def products(self, a: Block, others: Sequence[Block | None], d: int) -> list[Array]:
+        """Return band sums of products of a block's rows with others' on a drive."""
 
     def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
         """Return those of a drive and the blocks that it feels."""
@@ -219,15 +223,14 @@ class DriveEquations:
         spots: list[tuple[Block, slice]] = []
         for block in acting:
             spot = slice(at, at + block.size)
-            with_base = regression.products(block, None, d)
+            spots.append((block, spot))
+            with_base, *pairs = regression.products(block, [None, *(b for b, _ in spots)], d)
             gram[:, spot, :first] = with_base[:, :, :-1]
             gram[:, :first, spot] = with_base[:, :, :-1].transpose(0, 2, 1)
             side[:, spot] = with_base[:, :, -1]
-            for other, place in [*spots, (block, spot)]:
-                pair = regression.products(block, other, d)
+            for (_, place), pair in zip(spots, pairs, strict=True):
                 gram[:, spot, place] = pair
                 gram[:, place, spot] = pair.transpose(0, 2, 1)
-            spots.append((block, spot))
             at += block.size
         self.gram, self.side, self.squares = gram, side, base[:, -1, -1]
         self._flat = gram.reshape(count, -1)

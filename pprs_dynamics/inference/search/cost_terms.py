@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from operator import add, sub
 
 
 @dataclass(frozen=True)
@@ -50,16 +51,14 @@ class CostTerms:
     @property
     def total(self) -> float:
         """The cost."""
-        return sum(self.to_dict().values())
+        return float(sum(vars(self).values()))
 
     def __add__(self, other: CostTerms) -> CostTerms:
-        mine, theirs = self.to_dict(), other.to_dict()
-        return CostTerms(**{name: mine[name] + theirs[name] for name in mine})
+        return CostTerms(*map(add, vars(self).values(), vars(other).values()))
 
     def __sub__(self, other: CostTerms) -> CostTerms:
-        mine, theirs = self.to_dict(), other.to_dict()
-        return CostTerms(**{name: mine[name] - theirs[name] for name in mine})
+        return CostTerms(*map(sub, vars(self).values(), vars(other).values()))
 
     def to_dict(self) -> dict[str, float]:
         """Return the terms by name."""
-        return {one.name: getattr(self, one.name) for one in fields(self)}
+        return dict(vars(self))

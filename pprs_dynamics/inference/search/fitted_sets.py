@@ -105,10 +105,12 @@ class FittedSets:
             fit = self.regression.fit(())
             return CandidateSet((), fit, self._terms(fit))
         start = self.evaluate(()).fit.amplitudes
-        # The size of its forces, in proportion to which friction is in doubt, need not be
-        # exact: the noise of the empty set does, and steps of it, whose columns are kept.
-        nuisance = self._nuisance_blocks(candidates, self.regression.at(
-            self.blocks(candidates), start))
+        nuisance: Nuisance = {}
+        if any(self.library.leaves_open(one) for c in candidates for one in c.components):
+            # The size of its forces, in proportion to which friction is in doubt, need not be
+            # exact: the noise of the empty set does, and steps of it, whose columns are kept.
+            nuisance = self._nuisance_blocks(candidates, self.regression.at(
+                self.blocks(candidates), start))
         fit = self.regression.fit(self.blocks(candidates, nuisance), start)
         bodies = {one: self.library.block(one) for c in candidates for one in c.components
                   if issubclass(one.effect, AddedBody) and one.effect.has_extent}

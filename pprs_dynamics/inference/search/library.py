@@ -296,6 +296,10 @@ class Library:
                 if np.any(values) and d in self.regression.series}
         return self._nuisance[component]
 
+    def leaves_open(self, component: Component) -> bool:
+        """Return whether there are columns for what a component's form leaves open."""
+        return self.term(component).bare is not None or bool(self.nuisance_rows(component))
+
     def price(self, candidate: Candidate) -> CostTerms:
         """Return the price of everything that was chosen."""
         return self.prices.of_candidate(candidate, self.component_price)

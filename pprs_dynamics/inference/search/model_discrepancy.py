@@ -70,7 +70,7 @@ def whitened_square(regression: Regression, found: CandidateSet, block: Block,
     c = found.fit.of(block)
     for d in drives & set(block.rows):
         gram = np.tensordot(regression.weights(found.fit, d),
-                            regression.products(block, block, d), 1)
+                            regression.products(block, [block], d)[0], 1)
         total += float(c @ gram @ c)
     return total
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.regression.design import CarriedOver, Design
+from pprs_dynamics.inference.search.absorbed import Absorbed, without_absorbed
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
@@ -26,7 +27,6 @@ from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_model import linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.form import Remainder, without_remainders
 from pprs_dynamics.inference.search.relinearisation import search_around_fitted
 from pprs_dynamics.inference.search.scan import Place
 from pprs_dynamics.inference.search.search import Search, patterns_of
@@ -70,7 +70,7 @@ class Ranking:
         Their sets, by cost.
     map_set, reported : CandidateSet
         Of the last: that of lowest cost, and without what is within the model error of others.
-    remainders : tuple of Remainder
+    absorbed : tuple of Absorbed
         What is.
     without : mapping of Candidate to CandidateSet
         The reported set without each of its candidates.
@@ -91,7 +91,7 @@ class Ranking:
     of_last: tuple[CandidateSet, ...] = field(repr=False)
     map_set: CandidateSet
     reported: CandidateSet
-    remainders: tuple[Remainder, ...]
+    absorbed: tuple[Absorbed, ...]
     without: Mapping[Candidate, CandidateSet] = field(repr=False)
     order: tuple[EffectCandidate, ...] = field(repr=False)
     path: tuple[CandidateSet, ...] = field(repr=False)
@@ -103,18 +103,18 @@ class Ranking:
     def of(cls, first: FittedSets, last: Search, map_set: CandidateSet,
            refuted: frozenset[Place] = frozenset()) -> Ranking:
         """Return the ranking of the sets of two searches, and of what the answer needs beside."""
-        map_set, reported, remainders = without_remainders(last, map_set)
-        return cls._reporting(first, last.fits, last.patterns, map_set, reported, remainders,
+        map_set, reported, absorbed = without_absorbed(last, map_set)
+        return cls._reporting(first, last.fits, last.patterns, map_set, reported, absorbed,
                               refuted)
 
     @classmethod
     def _reporting(cls, first: FittedSets, last: FittedSets, patterns: tuple[PatternLibrary, ...],
-                   map_set: CandidateSet, reported: CandidateSet, remainders: tuple[Remainder, ...],
+                   map_set: CandidateSet, reported: CandidateSet, absorbed: tuple[Absorbed, ...],
                    refuted: frozenset[Place]) -> Ranking:
         without = {gone: last.evaluate(reported.without(gone)) for gone in reported.candidates}
         order, path = _falling(last, map_set, reported)
         return cls(first, last, patterns, _by_cost(first.sets), _by_cost(last.sets), map_set,
-                   reported, remainders, MappingProxyType(without), order, path, refuted)
+                   reported, absorbed, MappingProxyType(without), order, path, refuted)
 
     def less(self, gone: EffectCandidate) -> Ranking:
         """Return the ranking without one of the reported effects.
@@ -128,7 +128,7 @@ class Ranking:
             return _searched(FittedSets(self.first.design, self.first.decisions), refuted)
         reported = self.last.pruned(self.without[gone])
         return replace(self._reporting(self.first, self.last, self.patterns, self.map_set, reported,
-                                       self.remainders, refuted), exact=self.exact)
+                                       self.absorbed, refuted), exact=self.exact)
 
     def claiming_nothing(self) -> Ranking:
         """Return the ranking with nothing reported, under the noise that the best set leaves."""
@@ -223,7 +223,7 @@ class Ranking:
     @property
     def _judged(self) -> list[CandidateSet]:
         """Sets without what is within the model error of others, which pays but is not reported."""
-        ignored = {one.candidate.name for one in self.remainders}
+        ignored = {one.candidate.name for one in self.absorbed}
         return [one for one in self.sets
                 if not ignored & {candidate.name for candidate in one.candidates}]
 
@@ -253,7 +253,7 @@ class Ranking:
         To have what is within the model error of others makes no rival.
         """
         mine = {candidate.claim: candidate.name for candidate in self.reported.effects}
-        ignored = {one.candidate.name for one in self.remainders}
+        ignored = {one.candidate.name for one in self.absorbed}
         rivals = []
         for other in self.sets:
             if other.cost > self.map_set.cost + margin:

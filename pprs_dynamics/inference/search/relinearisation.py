@@ -64,22 +64,22 @@ class ExactSet:
     @classmethod
     def of(cls, fits: FittedSets, found: CandidateSet) -> ExactSet:
         """Return a set of some fits around its own model."""
-        last, moved = fits, found
+        around, moved = fits, found
         try:
             for _ in range(MOST_STEPS):
-                last, moved = linearised(last, moved, alone=True)
-                before, moved = moved, of_same_claims(last, moved)
+                around, moved = linearised(around, moved, alone=True)
+                before, moved = moved, of_same_claims(around, moved)
                 if moved is before:
                     break
-            one = settled(last, moved)
+            turning = settled(around, moved)
             # Widths that are not settled are columns yet, and not the model's.
-            model = fitted_model(last, moved) if one.fits is last else one.model
-            exact = exact_forces(one.fits.design, model)
+            model = fitted_model(around, moved) if turning.fits is around else turning.model
+            exact = exact_forces(turning.fits.design, model)
         except PprsError:
             return cls(found, fits.design.point, parts_of(fits, found)[1], np.inf)
-        return cls(moved, last.design.point, parts_of(last, moved)[1],
-                   one.found.cost + squared(one.fits, one.found,
-                                            exact - linear_prediction(one.fits, one.found)))
+        nonlinear = exact - linear_prediction(turning.fits, turning.found)
+        return cls(moved, around.design.point, parts_of(around, moved)[1],
+                   turning.found.cost + squared(turning.fits, turning.found, nonlinear))
 
 
 def search_around_fitted(first: Search, report: Callable[[float], None],
@@ -90,18 +90,18 @@ def search_around_fitted(first: Search, report: Callable[[float], None],
     by itself; the next search is around the one that costs least so, until none costs less. Only
     exact costs, which do not depend on where a search was, decide between sets.
     """
-    search, exact, at = first, dict[Claims, ExactSet](), None
+    search, exact_sets, reached = first, dict[Claims, ExactSet](), None
     search.run(until_nonlinear=True)
     for number in range(MOST_SEARCHES):
-        for one in _shortlist(search.fits, first.fits.decisions.rival_margin):
-            known = exact.get(one.claims)
-            if known is None or one.cost < known.cost - LEAST_CHANGE:
-                new = ExactSet.of(search.fits if one.is_nonlinear else first.fits, one)
-                exact[one.claims] = new if known is None else min(known, new, key=_cost)
-        best = min(exact.values(), key=_cost)
-        if best is at or _is_where(search, best):
+        for listed in _shortlist(search.fits, first.fits.decisions.rival_margin):
+            known = exact_sets.get(listed.claims)
+            if known is None or listed.cost < known.cost - LEAST_CHANGE:
+                new = ExactSet.of(search.fits if listed.is_nonlinear else first.fits, listed)
+                exact_sets[listed.claims] = new if known is None else min(known, new, key=_cost)
+        best = min(exact_sets.values(), key=_cost)
+        if best is reached or _is_where(search, best):
             break
-        at, point = best, best.point
+        reached, point = best, best.point
         search.release()
         if point is None:
             search = first
@@ -113,7 +113,7 @@ def search_around_fitted(first: Search, report: Callable[[float], None],
                                                      0.4 / MOST_SEARCHES))
         search.run(best.found.candidates)
     return (search, search.fits.evaluate(best.found.candidates),
-            {claims: one.cost for claims, one in exact.items()})
+            {claims: one.cost for claims, one in exact_sets.items()})
 
 
 def _cost(one: CandidateSet | ExactSet) -> float:
@@ -123,8 +123,8 @@ def _cost(one: CandidateSet | ExactSet) -> float:
 def _shortlist(fits: FittedSets, margin: float) -> list[CandidateSet]:
     """Return the cheapest set of each claim that may be the best once costs are exact.
 
-    Within a margin; where the columns are not bent by the best set, of those that bend them any:
-    tilts, wrenches and offsets of a payload look nearly alike there.
+    Within a margin; where the best set is nonlinear and the point is not its own, any nonlinear
+    one: tilts, wrenches and offsets of a payload look nearly alike there.
     """
     best, near = fits.best, dict[Claims, CandidateSet]()
     is_beyond = not _has_nonlinear(fits.design.point, parts_of(fits, best)[1])

@@ -241,18 +241,24 @@ class Search:
             if any(isinstance(one, EffectCandidate) for one in pair):
                 yield from self._instead(best, best.without(*pair), REPLACEMENTS)
         for candidate in best.effects:
-            for component in candidate.components if len(candidate.components) > 1 else ():
-                # On one of its drives it, or some of its coefficients, may stand for another.
-                fewer = [(self.fits.library.variant(component, names),)
-                         for names in candidate.effect.variants
-                         if set(names) < set(component.names)]
-                for kept in ((), *fewer):
-                    rest = exchanged(best, candidate, with_instead(candidate, component, *kept))
-                    yield from self._instead(best, rest, REPLACEMENTS, component.drive)
-            for other in self._alternatives(candidate):
-                yield exchanged(best, candidate, other)
+            yield from self._instead_on_a_drive(best, candidate)
+            for shaped in self._alternatives(candidate):
+                yield exchanged(best, candidate, shaped)
             if len(candidate.hypotheses) > 1:
                 yield from self._two_for(best, candidate)
+
+    def _instead_on_a_drive(self, best: CandidateSet, candidate: EffectCandidate,
+                            ) -> Iterator[Candidates]:
+        """Yield sets in which another effect stands for one on one of its drives.
+
+        There it, or some of its coefficients, may stand for the other one.
+        """
+        for component in candidate.components if len(candidate.components) > 1 else ():
+            fewer = [(self.fits.library.variant(component, names),)
+                     for names in candidate.effect.variants if set(names) < set(component.names)]
+            for kept in ((), *fewer):
+                rest = exchanged(best, candidate, with_instead(candidate, component, *kept))
+                yield from self._instead(best, rest, REPLACEMENTS, component.drive)
 
     def _instead(self, best: CandidateSet, rest: Candidates, count: int | None,
                  drive: int | None = None) -> list[Candidates]:
