@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from inspect import getdoc
 from pathlib import Path
@@ -38,7 +39,8 @@ from pprs_dynamics.physics.three_pprs.forward_kinematics import (
 SECONDS, RATE = 20.0, 200.0
 # What an effect's force is drawn over, where it is not the drive's velocity.
 OVER = {'counterbalance': 'position', 'current_gain': 'effort',
-        'drive_inertia': 'acceleration', 'drive_spring': 'position', 'effort_gain': 'effort',
+        'drive_inertia': 'acceleration', 'drive_spring': 'position',
+        'eccentric_encoder': 'position', 'effort_gain': 'effort',
         'effort_offset': 'time',
         'force_ripple': 'position', 'friction_drift': 'time',
         'homing_error': 'position', 'link_mass': 'position', 'joint_friction': 'velocity',
@@ -51,6 +53,7 @@ TYPICAL = {'asymmetric_friction': {'force_forward': 0.8, 'force_backward': 0.4},
            'counterbalance': {'force': 10.0, 'stiffness': 0.0, 'ratio': 0.6, 'position': 0.0},
            'current_gain': {'temperature': 0.002},
            'coupled_drives': {'wrist.coulomb': 1.0},
+           'eccentric_encoder': {'amplitude': 0.001, 'phase': 0.0, 'pitch': 0.2},
            'elastic_joint': {'compliance': 1e-4},
            'friction_temperature': {'coulomb': -0.02, 'viscous': -0.2, 'reference': 40.0},
            'hysteresis': {'force': 0.5, 'distance': 0.002},
@@ -122,8 +125,15 @@ def arm_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, 
         motion = made_up_arm.motion(SECONDS, RATE, seed=3)
         changed = build_model({**model.values, **block(effect, 'swing')}, model.source)
     assert isinstance(changed, MechanismModel)
-    plain = model.drive_forces(motion)
-    added = changed.drive_forces(motion).total - plain.total
+    plain, at = model.drive_forces(motion), motion
+    if changed.misreadings:  # as in `platform_law`
+        read = motion.position + changed.position_error(motion.position)
+        rate = np.gradient(read, motion.time, axis=0)
+        at = replace(motion, position=read, velocity=rate,
+                     acceleration=np.gradient(rate, motion.time, axis=0))
+    added = changed.drive_forces(at).total - plain.total
+    if changed.misreadings:
+        added = -added
     joint = int(np.argmax((added ** 2).sum(axis=0)))
     return ({'time': motion.time, 'position': motion.position[:, joint],
              'velocity': motion.velocity[:, joint], 'acceleration': motion.acceleration[:, joint],

@@ -209,8 +209,8 @@ FORMS: dict[str, JointForm] = {
 }
 # Of the arm as a whole: the payload's size as a share of the arm's mass, and so on.
 OF_ARM = ('payload_mass', 'link_mass', 'base_tilt', 'external_wrench', 'effort_gain', 'time_delay',
-          'effort_filter', 'homing_error', 'lost_motion', 'joint_friction', 'coupled_drives',
-          'current_gain', 'elastic_joint')
+          'effort_filter', 'homing_error', 'lost_motion', 'eccentric_encoder', 'joint_friction',
+          'coupled_drives', 'current_gain', 'elastic_joint')
 NAMES = (*FORMS, *OF_ARM)
 
 

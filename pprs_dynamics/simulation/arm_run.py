@@ -10,7 +10,7 @@ of the arm is that of the model file, hidden effects have forms of their own (`a
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,6 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
-from pprs_dynamics.physics.mechanism.closures import ROWS
 from pprs_dynamics.physics.mechanism.description import (
     Frame,
     body_at,
@@ -30,8 +29,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
-from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Motion
+from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.mechanism.urdf import expanded
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.simulation.arm_forms import (
@@ -46,8 +44,9 @@ from pprs_dynamics.simulation.arm_forms import (
     tilted,
     truth,
 )
+from pprs_dynamics.simulation.engine_loops import ClosedMotion, EngineLoops, cross
 from pprs_dynamics.simulation.engine_model import load_engine
-from pprs_dynamics.simulation.engine_state import EngineState, couplings
+from pprs_dynamics.simulation.engine_state import EngineState
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 from pprs_dynamics.simulation.sensors import ButterworthFilter, EffortFilter
 from pprs_dynamics.simulation.temperatures import REFERENCE, Climate, read_thermometers
@@ -59,10 +58,14 @@ HARMONICS = 8
 FASTEST, WIDEST = 0.35, 1.5  # of the top speed; from the middle of the range [rad, m]
 QUICKEST = 3.0  # [rad/s^2, m/s^2]
 SHIFT_OF_SLIDE = 0.1  # [m/rad], zero errors of a robot's legs over those of turning joints
+# Of an encoder's radius, beside its axis; and the step for derivatives [rad].
+ON_JOINT, ON_MOTOR = (0.01, 0.03), (0.02, 0.08)
+ANGLE_STEP = 1e-3
 SHRINK, SHRINKS = 0.8, 20  # of a motion until its loops close throughout
 ENCODER = 2e-5  # [rad, m]
 COLOURED, CORRELATION = 0.36, 0.95  # share of the noise's variance, and from sample to sample
 COMPILER = {'fusestatic': 'true', 'balanceinertia': 'false'}
+SLOWEST = 1e-9  # of the width in which friction turns over, below which tanh(x) / x is 1
 LEAST = 1e-9  # [kg, kg m^2], of bodies that another's inertia contains
 
 
@@ -91,8 +94,8 @@ class ArmRun:
 class ArmEngine:
     """MuJoCo's model of a mechanism.
 
-    Its inertia, gravity and derivatives; loops are projected out exactly: of all efforts of the
-    tree's joints and forces of the closures those are taken in which no passive joint is driven.
+    Its kinematics, inertia, gravity and reactions: of the model it has the numbers, and how the
+    description is assembled.
 
     Parameters
     ----------
@@ -123,6 +126,9 @@ class ArmEngine:
                       for row in {0, *structure.rows.values(), *structure.tables.loop_a.tolist(),
                                   *structure.tables.loop_b.tolist(), *robot.bodies.tolist()} if row}
         self.links[0] = 0
+        self._names = {row: name for name, row in structure.rows.items()}
+        self.loops = EngineLoops(self.state, self.links)
+        self._last: tuple[JointMotion, ClosedMotion] | None = None
         for row, parameters in zip(robot.bodies, robot.inertial, strict=True):
             self._set_body(self.links[int(row)], parameters)
         mujoco.mj_setConst(self.model, self.data)
@@ -186,14 +192,45 @@ class ArmEngine:
         self.gravity = tilted(self.gravity, angle)
         return truth('base_tilt', None, {'x': angle, 'y': 0.0}, 'about x')
 
-    def inverse(self, motion: Motion) -> tuple[Array, Array]:
-        """Return efforts of all joints of the tree, (nv,), and its inertia, at one sample."""
+    def inverse(self, position: Array, velocity: Array, acceleration: Array,
+                ) -> tuple[Array, Array, Array]:
+        """Return efforts of all joints of the tree, (nv,), its inertia, and rates (nv, D).
+
+        For a motion of the drives, (D,) each, that goes on from where the engine is.
+        """
         self.model.opt.gravity[:] = self.root.R.T @ self.gravity
-        self.state.put(motion, 0)
+        rates = self.loops.put(position, velocity, acceleration)
         self.engine.mj_inverse(self.model, self.data)
         inertia = np.empty((self.model.nv, self.model.nv))
         self.engine.mj_fullM(self.model, self.data, inertia)
-        return self.data.qfrc_inverse, inertia
+        return self.data.qfrc_inverse, inertia, rates
+
+    def home(self) -> None:
+        """Put the engine where the description is assembled."""
+        drives = self.structure.home[None, self.structure.tables.drives]
+        rest = np.zeros_like(drives)
+        self.state.put(self.robot.at(drives, rest, rest).motion, 0)
+        self.loops.forget()
+
+    def closed(self, motion: JointMotion) -> ClosedMotion:
+        """Return the engine's own motion along one of the drives."""
+        if self._last is None or self._last[0] is not motion:
+            self.home()
+            self._last = motion, self.loops.follow(motion)
+        return self._last[1]
+
+    def _needed(self, motion: JointMotion) -> Iterator[tuple[int, Array, Array]]:
+        """Yield samples, efforts of all joints of the tree (nv,), and rates (nv, D) of a motion.
+
+        The engine is there.
+        """
+        self.model.opt.gravity[:] = self.root.R.T @ self.gravity
+        closed, data = self.closed(motion), self.data
+        for k in range(len(motion)):
+            data.qpos[:], data.qvel[:], data.qacc[:] = (
+                closed.position[k], closed.velocity[k], closed.acceleration[k])
+            self.engine.mj_inverse(self.model, data)
+            yield k, data.qfrc_inverse + self._of_wrench(), closed.rates[k]
 
     def torques(self, motion: JointMotion, passive: Mapping[str, Array] | None = None) -> Array:
         """Return inverse dynamics along a motion, (N, D).
@@ -204,18 +241,73 @@ class ArmEngine:
         passive : mapping of str to (N,) array, optional
             Efforts against friction of passive joints, by joint.
         """
-        m = self.robot.at(motion.position, motion.velocity, motion.acceleration).motion
-        self.model.opt.gravity[:] = self.root.R.T @ self.gravity
         found = np.empty_like(motion.position)
-        data = self.data
-        for k in range(len(motion)):
-            self.state.put(m, k)
-            self.engine.mj_inverse(self.model, data)
-            needed = data.qfrc_inverse + self._of_wrench()
+        for k, needed, rates in self._needed(motion):
             for name, effort in (passive or {}).items():
                 needed[self.state.dof(name)] += effort[k]
-            found[k] = self.state.driven(needed, self._constraints())
+            found[k] = rates.T @ needed
         return found
+
+    def joint_friction(self, motion: JointMotion, joints: JointFriction) -> Array:
+        """Return efforts against friction of passive joints along a motion, (N, D).
+
+        Friction is c w + (T + mu r F) tanh(w / width), F what the joint transmits without it:
+        across the axis of a hinge, and all of it in a closure.
+        """
+        found = np.empty_like(motion.position)
+        for k, needed, rates in self._needed(motion):
+            found[k] = rates.T @ self.rubbing(joints, needed, rates.T @ needed)
+        return found
+
+    def rubbing(self, joints: JointFriction, needed: Array, efforts: Array) -> Array:
+        """Return efforts of the tree's joints against friction where the engine is, (nv,)."""
+        rows, coefficients = self.friction_of(joints, needed, efforts)
+        rates = rows @ self.data.qvel
+        found: Array = np.einsum('k,ki,kin->n', coefficients(rates), rates, rows)
+        return found
+
+    def friction_of(self, joints: JointFriction, needed: Array, efforts: Array,
+                    ) -> tuple[Array, Callable[[Array], Array]]:
+        """Return relative velocities of rubbing joints by the engine's, (K, 3, nv), and a law.
+
+        The law gives friction over rate, (K,), of rates (K, 3): a hinge's stand in the first.
+        """
+        loads, data = self.transmitted(needed, efforts), self.data
+        turns = self.loops.relative(self.loops.frames()[1][1])[1]
+        hinges, closures = np.flatnonzero(joints.joint >= 0), np.flatnonzero(joints.loop >= 0)
+        names = [self._names[int(row)] for row in joints.joint[hinges]]
+        rows = np.zeros((len(joints.joint), 3, self.model.nv))
+        rows[hinges, 0, [self.state.dof(name) for name in names]] = 1.0
+        rows[closures] = turns[joints.loop[closures]]
+        force = np.empty((len(joints.joint), 3))
+        bodies = [self.links[int(row)] for row in joints.joint[hinges]]
+        force[hinges] = cross(data.cfrc_int[bodies, 3:],
+                              data.xaxis[[self.state.number(name) for name in names]])
+        force[closures] = loads[joints.loop[closures], :3]
+        dry = joints.torque + joints.lever * np.sqrt(np.sum(force * force, axis=1))
+
+        def coefficients(rates: Array) -> Array:
+            x = np.maximum(np.linalg.norm(rates, axis=1) / joints.width, SLOWEST)
+            found: Array = joints.viscous + dry * np.tanh(x) / (x * joints.width)
+            return found
+
+        return rows, coefficients
+
+    def transmitted(self, needed: Array, efforts: Array) -> Array:
+        """Return what closures transmit where the engine is, (L, 6), and have it find the rest."""
+        data = self.data
+        forces = self.loops.transmitted(needed, efforts)
+        self.loops.apply(forces)
+        row, frame = self.structure.links[self.structure.tool]
+        if self.wrench.any():
+            body = self.links[row]
+            at = Frame(data.xmat[body].reshape(3, 3), data.xpos[body]).of_point(frame.p)
+            force, moment = (self.root.R.T @ part for part in (self.wrench[:3], self.wrench[3:]))
+            data.xfrc_applied[body, :3] -= force
+            data.xfrc_applied[body, 3:] -= moment + np.cross(at - data.xipos[body], force)
+        self.engine.mj_rnePostConstraint(self.model, data)
+        data.xfrc_applied[:] = 0.0
+        return forces
 
     def _of_wrench(self) -> Array:
         """Return the efforts of all joints with which the tool applies the wrench, (nv,)."""
@@ -225,36 +317,6 @@ class ArmEngine:
         self.engine.mj_applyFT(self.model, self.data, self.root.R.T @ self.wrench[:3],
                                self.root.R.T @ self.wrench[3:], at, body, efforts)
         return efforts
-
-    def _constraints(self) -> Array:
-        """Return derivatives of the closures and couplings, (r, nv)."""
-        structure, t, nv = self.structure, self.structure.tables, self.model.nv
-        rows: list[Array] = []
-        for k, loop in enumerate(structure.loops):
-            sides = []
-            for row, R, p in ((int(t.loop_a[k]), t.a_R[k], t.a_p[k]),
-                              (int(t.loop_b[k]), t.b_R[k], t.b_p[k])):
-                body = self.links[row]
-                at = self.root.inverse if row == 0 else Frame(
-                    self.data.xmat[body].reshape(3, 3), self.data.xpos[body])
-                sides.append((body, at @ Frame(R, p)))
-            (a, frame_a), (b, frame_b) = sides
-            linear, angular = np.zeros((2, 3, nv))
-            for body, sign in ((b, 1.0), (a, -1.0)):
-                J_p, J_r = np.zeros((2, 3, nv))
-                self.engine.mj_jac(self.model, self.data, J_p, J_r, frame_b.p, body)
-                linear += sign * J_p
-                angular += sign * J_r
-            A, B = frame_a.R, frame_b.R
-            for kind, (i, j, g, h), (f, s) in ROWS[loop.kind]:
-                rows.append(A[:, i] @ linear if kind == TRANSLATION else
-                            (f * np.cross(B[:, j], A[:, i]) + s * np.cross(B[:, h], A[:, g]))
-                            @ angular)
-        for name, leader, ratio, _ in couplings(structure):
-            coupling = np.zeros(nv)
-            coupling[self.state.dof(name)], coupling[self.state.dof(leader)] = 1.0, -ratio
-            rows.append(coupling)
-        return np.array(rows).reshape(-1, nv)
 
 
 def _bare(path: Path) -> str:
@@ -334,7 +396,7 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
         For another name.
     """
     random = np.random.default_rng(seed)
-    motion = draw_motion(model, duration, path_seed)
+    motion = read = draw_motion(model, duration, path_seed)
     choices = sorted((*(name for name in FORMS if able_joints(name, model, motion)),
                       'payload_mass'))
     chosen = tuple(str(random.choice(choices)) if name == 'random' else name for name in names)
@@ -342,8 +404,11 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
     engine = ArmEngine(model)
     if progress is not None:
         progress(0.1)
-    plain = engine.torques(motion)
     hidden: list[dict[str, Any]] = []
+    if 'eccentric_encoder' in chosen:
+        motion, drawn = _behind_encoder(model, read, random, scale)
+        hidden.append(drawn)
+    plain = engine.torques(motion)
     if 'payload_mass' in chosen:
         hidden.append(engine.hide_payload(random, scale, 0.05))
     if 'link_mass' in chosen:
@@ -355,7 +420,7 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
         hidden.append(engine.hide_link_mass(random, scale, links))
     passive = {}
     if 'joint_friction' in chosen:
-        name, effort, parameters = _hidden_joint(model, motion, plain, random, scale)
+        name, effort, parameters = _hidden_joint(model, engine, motion, plain, random, scale)
         passive[name] = effort
         hidden.append(truth('joint_friction', None, {
             f'{name}.{key}': value for key, value in parameters.items()},
@@ -425,16 +490,18 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
         hidden.append(truth('homing_error', [model.drives[joint]], {
             model.drives[joint]: {'zero': float(shift[joint])}}, 'positions shifted'))
     sigma = np.full(len(largest), noise) if noise is not None else 0.005 * largest
-    position = motion.position + lead + shift
+    beside = lead + shift
     measured = efforts + _noise(random, efforts.shape) * sigma
     channels = {}
     if thermometers or {*chosen} & {'friction_temperature', 'current_gain'}:
         channels['temperature'] = read_thermometers(motion.time, temperature)
     if link_encoders or 'elastic_joint' in chosen:
         second = np.random.default_rng((seed, SECOND))  # not mounted at quite the same angle
-        channels['link_position'] = (position + second.normal(0, MOUNTED, len(largest))
-                                     + ENCODER * second.uniform(-0.5, 0.5, position.shape))
-    position = position + windup + ENCODER * random.uniform(-0.5, 0.5, position.shape)
+        channels['link_position'] = (
+            motion.position + beside + second.normal(0, MOUNTED, len(largest))
+            + ENCODER * second.uniform(-0.5, 0.5, beside.shape))
+    position = read.position + beside + windup + ENCODER * random.uniform(
+        -0.5, 0.5, beside.shape)
     return ArmRun(motion, position, measured, tuple(hidden), channels)
 
 
@@ -469,6 +536,44 @@ def _wind_up(model: MechanismModel, motion: JointMotion, loads: Array, random: n
         'tau / tau_0 = x + x^3 / 4, x = w / w_0, a share of it late by a relaxation')
 
 
+def _behind_encoder(model: MechanismModel, read: JointMotion, random: np.random.Generator,
+                    scale: float) -> tuple[JointMotion, dict[str, Any]]:
+    """Return the motion of an arm one of whose encoders is beside its axis, and which.
+
+    Its control follows what the encoders say.
+    """
+    able = [j for j, unit in enumerate(model.units) if unit.turns or model.gear_ratios[j] > 1]
+    if not able:
+        raise HiddenEffectError('eccentric_encoder needs a joint that turns, or the gear_ratio of '
+                                'one that slides')
+    j = able[int(random.integers(len(able)))]
+    ratio = model.gear_ratios[j]
+    # On the motor, or on the joint behind its gear.
+    if ratio == 1 or (model.units[j].turns and random.random() < 0.5):
+        ratio = 1.0
+    beside = scale * float(random.uniform(*(ON_JOINT if ratio == 1 else ON_MOTOR)))
+    phase = float(random.uniform(-np.pi, np.pi))
+
+    def behind(q: Array) -> Array:
+        """Return the angles of the disc, of radius 1, of which the head reads q."""
+        x = ratio * q + phase
+        found: Array = q - np.arctan2(beside * np.sin(x), 1 + beside * np.cos(x)) / ratio
+        return found
+
+    position, velocity, acceleration = (
+        np.array(values) for values in (read.position, read.velocity, read.acceleration))
+    q, v, step = read.position[:, j], read.velocity[:, j], ANGLE_STEP / ratio
+    before, at, after = (behind(q + move) for move in (-step, 0.0, step))
+    slope = (after - before) / (2 * step)
+    position[:, j], velocity[:, j] = at, slope * v
+    acceleration[:, j] = (slope * read.acceleration[:, j]
+                          + (after - 2 * at + before) / step ** 2 * v ** 2)
+    moved = replace(read, position=position, velocity=velocity, acceleration=acceleration)
+    return moved, truth('eccentric_encoder', [model.drives[j]], {model.drives[j]: {
+        'amplitude': beside / ratio, 'phase': phase, 'pitch': 2 * np.pi / ratio}},
+        'q - atan(e sin(x) / (1 + e cos(x))) / n, x = n q + phi, behind what is read as q')
+
+
 def _lost_motion(model: MechanismModel, motion: JointMotion, loads: Array,
                  random: np.random.Generator, scale: float) -> tuple[bool, Array, dict[str, Any]]:
     """Return whether loads drive a clearance, by how much its encoder leads (N, D), and how.
@@ -489,8 +594,9 @@ def _lost_motion(model: MechanismModel, motion: JointMotion, loads: Array,
         'b / 2 x / sqrt(x^2 + (0.02 x_max)^2), x the load or the speed')
 
 
-def _hidden_joint(model: MechanismModel, motion: JointMotion, plain: Array,
-                  random: np.random.Generator, scale: float) -> tuple[str, Array, dict[str, float]]:
+def _hidden_joint(model: MechanismModel, engine: ArmEngine, motion: JointMotion, plain: Array,
+                  random: np.random.Generator, scale: float,
+                  ) -> tuple[str, Array, dict[str, float]]:
     """Return dry friction of a passive joint: its name, efforts against it (N,), and size."""
     structure = model.robot.structure
     joints = [name for name, (row, _) in friction_rows(structure).items()
@@ -498,10 +604,8 @@ def _hidden_joint(model: MechanismModel, motion: JointMotion, plain: Array,
     if not joints:
         raise HiddenEffectError('joint_friction needs a passive joint')
     name = str(random.choice(joints))
-    m = model.robot.at(motion.position, motion.velocity, motion.acceleration).motion
-    row = structure.rows[name]
-    c, ratio = structure.tables.coordinate[row], structure.tables.ratio[row]
-    rate, felt = ratio * m.v[:, c], np.abs(ratio * m.drive_to_joint[:, c]).max(axis=0)
+    closed, dof = engine.closed(motion), engine.state.dof(name)
+    rate, felt = closed.velocity[:, dof], np.abs(closed.rates[:, dof]).max(axis=0)
     # As large on the drive that feels it most as a hidden force on a drive is.
     d = int(np.argmax(felt))
     torque = scale * SIZE(random) * float(np.abs(plain[:, d]).max()) / float(felt[d])
@@ -563,10 +667,8 @@ def _own_friction(model: MechanismModel, engine: ArmEngine, motion: JointMotion)
         + np.asarray(model.offset.value))
     for effect in model.effects:
         if isinstance(effect, ModelJointFriction):
-            state = model.mechanism(motion).loaded(
-                replace(engine.robot, gravity=tuple(engine.gravity.tolist())),
-                StructureLoad(np.tile(engine.wrench, (len(motion), 1))))
-            friction = friction + effect.force(state)
+            friction = friction + engine.joint_friction(
+                motion, effect.table(model.robot, model.reversal))
     return friction
 
 

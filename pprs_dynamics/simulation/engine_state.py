@@ -12,7 +12,6 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.description import Frame
-from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
 from pprs_dynamics.physics.mechanism.structure import Structure
 
 LEAST_SINGULAR = 1e-10  # of the largest singular value; closures may say a thing twice
@@ -44,6 +43,7 @@ class EngineState:
         self.engine, self.model, self.data = engine, model, engine.MjData(model)
         self.structure, self.root = structure, root
         self.joints = {int(k): name for k in range(model.njnt) if (name := model.joint(k).name)}
+        self._numbers = {name: k for k, name in self.joints.items()}
 
     @cached_property
     def drives(self) -> list[int]:
@@ -52,10 +52,18 @@ class EngineState:
 
     def dof(self, joint: str) -> int:
         """Return the degree of freedom of a joint of one coordinate."""
-        return int(self.model.joint(joint).dofadr[0])
+        return int(self.model.jnt_dofadr[self.number(joint)])
+
+    def place(self, joint: str) -> int:
+        """Return where the position of a joint of one coordinate is among the engine's."""
+        return int(self.model.jnt_qposadr[self.number(joint)])
+
+    def number(self, joint: str) -> int:
+        """Return the number of a joint in the engine."""
+        return self._numbers[joint]
 
     @cached_property
-    def _standing(self) -> Array:
+    def standing(self) -> Array:
         """Degrees of freedom of joints that are locked or held."""
         structure = self.structure
         held = set(structure.mobility.held.tolist())
@@ -100,17 +108,6 @@ class EngineState:
         data.qpos[at] = ratio * m.q[k, c] + t.offset[rows]
         data.qvel[dofs], data.qacc[dofs] = ratio * m.v[k, c], ratio * m.a[k, c]
 
-    def rates(self, links: LinkMotion) -> Array:
-        """Return the engine's velocities per rate of the drives at a motion's first sample."""
-        t, m = self.structure.tables, links.motion
-        T = np.zeros((self.model.nv, len(t.drives)))
-        _, dofs, rows = self._hinged
-        T[dofs] = t.ratio[rows, None] * m.drive_to_joint[0, t.coordinate[rows]]
-        for _, v, row in self._free:
-            W, U = (each[0, row] for each in links.twists)
-            T[v:v + 3], T[v + 3:v + 6] = self.root.R.T @ U, m.R[0, row].T @ W
-        return T
-
     def driven(self, needed: Array, rows: Array) -> Array:
         """Return the drives' efforts, (D,), that with forces of closures give what is needed.
 
@@ -128,6 +125,6 @@ class EngineState:
         columns[dofs, np.arange(len(dofs))] = 1.0
         columns[:, len(dofs):] = rows.T
         # Joints that stand are driven by whatever holds them.
-        moved = np.setdiff1d(np.arange(self.model.nv), self._standing)
+        moved = np.setdiff1d(np.arange(self.model.nv), self.standing)
         return np.linalg.lstsq(columns[moved], needed[moved],
                                rcond=LEAST_SINGULAR)[0][:len(dofs)]

@@ -25,20 +25,17 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
-from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, draw_form, truth
-from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion, one_able_joint
+from pprs_dynamics.simulation.arm_run import SLOWEST, ArmEngine, draw_motion, one_able_joint
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 from pprs_dynamics.simulation.plant import UnsolvedError
 from pprs_dynamics.simulation.temperatures import Climate
 
-LONGEST_STEP = 0.002  # [s]; a hexapod's takes 0.3 to 1 ms of processor time, for real time
+LONGEST_STEP = 0.002  # [s]; a hexapod's takes 1.2 ms of processor time, for real time
 ROUNDS = 12  # of friction's coefficients in a step
 SOLVED = 1e-6  # of the width in which friction turns over, between rounds
-SLOWEST = 1e-9  # of that width, below which tanh(x) / x is 1
 # Stops at the ends of ranges: a spring of that frequency with the drive's inertia at home, damped.
 STOP_FREQUENCY, STOP_DAMPING = 40.0, 0.3  # [Hz], of critical
 BEYOND = 1.0  # of a range behind its stop, from which on the motion means nothing
@@ -173,10 +170,11 @@ class MechanismPlant:
         """
         self.position = np.array(position, dtype=float)
         self.velocity = np.zeros_like(self.position) if velocity is None else np.array(velocity)
-        links = self._links(self.position, self.velocity, self._rest, self.structure.home)
-        self._closed = links.motion.q[0]
+        self.engine.home()
+        self.engine.loops.put(self.position, self.velocity, self._rest)
         self._acceleration = np.zeros_like(self.position)
-        self._held = links.efforts(self.model.robot)[0]
+        self._held = self._rest
+        self._held = self.holding(self.position) - self._offset
 
     def step(self, effort: Array) -> None:
         """Advance by one time step under constant efforts (D,).
@@ -216,9 +214,9 @@ class MechanismPlant:
             [s]
         """
         last = self._acceleration
-        M, bias, links = self._equations(position, velocity, last)
+        M, bias, T = self._equations(position, velocity, last)
         push = effort - bias - self._offset + self._stops(position, velocity)
-        rows, coefficients = self._joints(links)
+        rows, coefficients = self._joints(T)
         a, found = last, last
         for _ in range(ROUNDS):
             mid = start + ahead * a
@@ -235,45 +233,37 @@ class MechanismPlant:
             a = np.where(turns, (a + found) / 2, found)
         return found
 
-    def _links(self, position: Array, velocity: Array, acceleration: Array, start: Array,
-               ) -> LinkMotion:
-        return LinkMotion.of(self.structure, position[None], velocity[None], acceleration[None],
-                             start[None])
-
     def _equations(self, position: Array, velocity: Array, acceleration: Array,
-                   ) -> tuple[Array, Array, LinkMotion]:
-        """Return T' M T, all forces that do not depend on the acceleration, and the motion."""
-        links = self._links(position, velocity, acceleration, self._closed)
-        self._closed = links.motion.q[0]
-        engine, state = self.engine, self.engine.state
-        T = state.rates(links)
-        needed, M = engine.inverse(links.motion)
+                   ) -> tuple[Array, Array, Array]:
+        """Return T' M T, all forces that do not depend on the acceleration, and T (nv, D)."""
+        needed, M, T = self.engine.inverse(position, velocity, acceleration)
+        self._needed = needed.copy()
         mass = T.T @ M @ T
         pushed = T.T @ needed
         self._load = np.abs(pushed)
         bias = pushed - mass @ acceleration
-        return mass + np.diag(self.model.robot.armature), bias, links
+        return mass + np.diag(self.model.robot.armature), bias, T
 
-    def _joints(self, links: LinkMotion) -> tuple[Array, Any]:
+    def _joints(self, T: Array) -> tuple[Array, Any]:
         """Return relative rates of rubbing joints per rate of drives (K, 3, D), and their law.
 
         The law gives friction over rate, (K,), of rates (K, 3): a hinge's stand in the first.
         """
         count = len(self._rest)
         rows = [np.concatenate((np.eye(count)[:, None], np.zeros((count, 2, count))), axis=1)]
-        laws = [(self._viscous, self._coulomb, self._width)]
-        if self._passive:
-            W = links.twists[0][0]
-            loads = links.loads(self.engine.robot)
-            for table in self._passive:
-                rows.append(_relative(self.structure.tables, links.motion, table, W))
-                load = _loads(links.motion, loads, table)
-                laws.append((table.viscous, table.torque + table.lever * load, table.width))
-        viscous, dry, width = (np.concatenate([law[k] for law in laws]) for k in range(3))
+        laws = []
+        for table in self._passive:
+            own, law = self.engine.friction_of(table, self._needed, T.T @ self._needed)
+            rows.append(own @ T)
+            laws.append(law)
+        ends = np.cumsum([len(one) for one in rows])
 
         def coefficients(rates: Array) -> Array:
-            x = np.maximum(np.sqrt(np.einsum('ki,ki->k', rates, rates)) / width, SLOWEST)
-            return viscous + dry * np.tanh(x) / (x * width)
+            x = np.maximum(np.abs(rates[:count, 0]) / self._width, SLOWEST)
+            return np.concatenate((
+                self._viscous + self._coulomb * np.tanh(x) / (x * self._width),
+                *(law(rates[start:end]) for law, start, end in zip(
+                    laws, ends[:-1], ends[1:], strict=True))))
 
         return np.concatenate(rows), coefficients
 
@@ -311,21 +301,3 @@ def _drawn(names: Sequence[str], random: np.random.Generator) -> list[str]:
             raise HiddenEffectError(f'{name} cannot be hidden in such a robot while it moves, must '
                                     f'be one of {", ".join(HIDDEN)}')
     return drawn
-
-
-def _relative(t: Any, m: Any, table: JointFriction, W: Array) -> Array:
-    """Return relative rates per rate of drives, (K, 3, D); a hinge's stand in the first row."""
-    rates = np.zeros((len(table.joint), 3, W.shape[-1]))
-    hinges, loops = table.joint[table.joint >= 0], table.loop[table.loop >= 0]
-    rates[table.joint >= 0, 0] = t.ratio[hinges, None] * m.drive_to_joint[0, t.coordinate[hinges]]
-    rates[table.loop >= 0] = W[t.loop_b[loops]] - W[t.loop_a[loops]]
-    return rates
-
-
-def _loads(m: Any, loads: Any, table: JointFriction) -> Array:
-    """Return the force that each joint transmits across its axis [N], of a ball all of it, (K,)."""
-    force = np.empty((len(table.joint), 3))
-    hinges = table.joint[table.joint >= 0]
-    force[table.joint >= 0] = np.cross(loads.f[0, hinges], m.z[0, hinges])
-    force[table.loop >= 0] = loads.F[0, table.loop[table.loop >= 0]]
-    return np.sqrt(np.einsum('ki,ki->k', force, force))

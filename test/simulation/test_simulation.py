@@ -788,15 +788,16 @@ CONTAINERS = (
     'pprs_dynamics.physics.mechanism.structure_load',
     'pprs_dynamics.physics.mechanism.joint_series', 'pprs_dynamics.physics.model.mechanism_model',
     'pprs_dynamics.physics.model.limits')
-# Robots by URDF are built in MuJoCo from what was read of their file: joints, loops and names. Of
-# equations they share one: the friction that the model file itself gives passive joints, which
-# hides nothing. All that is hidden, and the rigid body, is the engine's or a form of its own.
+# Robots by URDF are built in MuJoCo from what was read of their file: joints, loops, names and
+# numbers, friction's among them. Kinematics, loops, reactions and friction are the engine's, or
+# forms of their own; `test_engine_loops.py` holds them against the model.
 DESCRIPTION = tuple(f'pprs_dynamics.physics.mechanism.{name}' for name in (
-    'description', 'urdf', 'structure', 'closures', 'mechanism', 'tree_equations',
-    'passive_joints'))
-OF_ARMS = {'engine_state.py': DESCRIPTION,
+    'description', 'urdf', 'structure', 'mechanism', 'tree_equations', 'passive_joints'))
+OF_ARMS = {**dict.fromkeys(('engine_state.py', 'engine_loops.py'), DESCRIPTION),
            **dict.fromkeys(('arm_run.py', 'mechanism_plant.py'), (
                *DESCRIPTION, 'pprs_dynamics.physics.effects.laws.joint_friction'))}
+# Of the equations, which are compiled functions over tables, names and kinds of rows alone.
+NAMES_OF_TABLES = {'AXES', 'KIND', 'LOOP', 'TRANSLATION', 'JointFriction'}
 
 
 def test_the_simulation_shares_no_physics_with_the_model() -> None:
@@ -807,6 +808,8 @@ def test_the_simulation_shares_no_physics_with_the_model() -> None:
                 other = node.module.startswith('pprs_dynamics.') and not node.module.startswith(
                     ('pprs_dynamics.simulation', 'pprs_dynamics.errors', 'pprs_dynamics.arrays'))
                 assert not other or node.module in (*CONTAINERS, *OF_ARMS.get(file.name, ())), file
+                if node.module.endswith('tree_equations'):
+                    assert {one.name for one in node.names} <= NAMES_OF_TABLES, file
 
 
 def test_a_missing_engine_is_told_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -122,11 +122,10 @@ class FittedTerm:
         chosen = [term.names.index(name) for name in self.names] or [0]
         rows = {d: values[chosen] for d, values in term.rows.items()}
         if self.shape:
-            assert self.drive is not None
             every = np.zeros(len(term.names) or 1)
             every[chosen] = self.values
-            rows[self.drive] = np.concatenate(
-                (rows[self.drive], design.slope_rows(term, every)))
+            slopes = design.slope_rows(term, every)
+            rows = {d: np.concatenate((values, slopes[d])) for d, values in rows.items()}
         return rows
 
 

@@ -150,7 +150,7 @@ class Design:
     carried: CarriedOver | None = None
     _moved: dict[tuple[Any, ...], tuple[Reconstruction, ...]] = field(
         default_factory=dict, repr=False, compare=False)
-    _own_rows: dict[tuple[type[CatalogueEffect], int], Array] = field(
+    _own_rows: dict[tuple[type[CatalogueEffect], int], Mapping[int, Array]] = field(
         default_factory=dict, repr=False, compare=False)
 
     @property
@@ -397,16 +397,16 @@ class Design:
         assert issubclass(effect, DriveEffect)
         shape = {p.name: values[p.name] for p in effect.shape}
         if (effect, term.drive) not in self._own_rows:
-            self._own_rows[effect, term.drive] = self.drive_rows(effect, term.drive, shape)
+            self._own_rows[effect, term.drive] = self.term(effect, term.drive, shape).rows
         before = self._own_rows[effect, term.drive]
         if not term.names:  # what it does is all in its shape, and that is no change
-            return {term.drive: -before[0]}
+            return {d: -rows[0] for d, rows in before.items()}
         if shape == dict(term.shape):
             return {}
         known = effect.to_coefficients(values)
-        rows = term.rows[term.drive]  # of all coefficients, or of the first, which scans have
-        c = np.array([known[name] for name in term.names])[:len(rows)]
-        return {term.drive: c @ (rows - before[:len(rows)])}
+        c = np.array([known[name] for name in term.names])
+        # Rows are of all coefficients, or of the first, which scans have.
+        return {d: c[:len(rows)] @ (rows - before[d][:len(rows)]) for d, rows in term.rows.items()}
 
     def drive_rows(self, effect: type[DriveEffect], drive: int,
                    shape: Mapping[str, float]) -> Array:
@@ -546,11 +546,8 @@ class Design:
             rate = np.gradient(planned, recording.time)
             found = np.stack((planned, rate, np.gradient(rate, recording.time)))
         else:
-            position = read.recorded.position[:, [drive]]
-            error = effect.position_error(name, position)
             found = np.zeros((3, len(recording.time)))
-            found[0] = error[0, 0] if len(error) else 0.0
-            if np.ptp(error):  # what is constant needs no smoothing
+            if np.any(effect.position_error(name, read.recorded.position[:, [drive]])):
                 found = np.concatenate(
                     misread([effect], name, read.recorded, read.read, drive), axis=1).T
         load = recording.transmitted[:, [drive]]
@@ -580,8 +577,8 @@ class Design:
         return [Term(effect, drive, shape, {drive: block}) for shape, block
                 in zip(shapes, rows, strict=True)]
 
-    def slope_rows(self, term: Term, coefficients: Array) -> Array:
-        """Return the derivatives of a term's force by its shape parameters, (s, M) [N].
+    def slope_rows(self, term: Term, coefficients: Array) -> dict[int, Array]:
+        """Return the derivatives of a term's forces by its shape parameters, (s, M) by drive [N].
 
         Parameters
         ----------
@@ -591,16 +588,16 @@ class Design:
         """
         assert term.drive is not None
         assert issubclass(term.effect, DriveEffect)
-        before = coefficients @ term.rows[term.drive]
-        slopes = []
+        slopes: dict[int, list[Array]] = {d: [] for d in term.rows}
         for parameter in term.effect.shape:
             value = term.shape[parameter.name]
             moved = {**term.shape, parameter.name: parameter.moved(value, SHAPE_STEP)}
-            after = coefficients @ self.drive_rows(term.effect, term.drive, moved)
-            if term.course is not None:
-                after = after * term.course
-            slopes.append((after - before) / SHAPE_STEP)
-        return np.stack(slopes)
+            after = self.term(term.effect, term.drive, moved)
+            for d, rows in term.rows.items():
+                change = coefficients @ after.rows[d] * (
+                    1.0 if term.course is None else term.course) - coefficients @ rows
+                slopes[d].append(change / SHAPE_STEP)
+        return {d: np.stack(rows) for d, rows in slopes.items()}
 
     def present_rows(self, column: PresentCoefficient | PresentShape) -> dict[int, Array]:
         """Return the rows, (M,) by drive, of what the model's effects may be otherwise."""
@@ -617,7 +614,8 @@ class Design:
         assert drive is not None
         weights = there.to_coefficients(values)
         slopes = self.slope_rows(term, np.array([weights[name] for name in term.names] or [1.0]))
-        return {drive: slopes[column.effect.shape.index(column.parameter)]}
+        at = column.effect.shape.index(column.parameter)
+        return {d: rows[at] for d, rows in slopes.items()}
 
     def friction(self) -> ActiveFriction | AxisFriction | None:
         """Return the friction that the model has in its drives."""

@@ -42,6 +42,7 @@ from pprs_dynamics.physics.three_pprs.robot import Geometry
 if TYPE_CHECKING:
     from pprs_dynamics.measurement.files.recording import Recording
 
+POSITION_STEP = 1e-4  # [m, rad], for derivatives of errors by positions
 CHUNK = 16_000  # samples at a time; a million at once would take gigabytes
 Motion = PlatformMotion | JointMotion
 
@@ -319,14 +320,29 @@ def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recordin
             read: DriveMotion, drive: int | None = None) -> tuple[Array, Array, Array]:
     """Return the errors of position, velocity and acceleration that were measured, (N, D) each.
 
-    Smoothed as these are; of one drive (N, 1).
+    Smoothed as these are, but for functions of the position, whose rates follow from its own; of
+    one drive (N, 1).
     """
-    def error(position: Array) -> Array:
-        position = position if drive is None else position[:, [drive]]
-        errors: Array = np.sum([one.position_error(names, position) for one in effects], axis=0)
-        return errors
+    chosen = slice(None) if drive is None else [drive]
 
-    return smoothed_as(read, recording, error)
+    def errors(of: Sequence[MeasurementEffect], position: Array) -> Array:
+        found = np.zeros_like(position)
+        for one in of:
+            found += one.position_error(names, position)
+        return found
+
+    q, v, a = (each[:, chosen] for each in (read.position, read.velocity, read.acceleration))
+    functions = [one for one in effects if one.is_of_position]
+    before, at, after = (errors(functions, q + step) for step in (-POSITION_STEP, 0.0,
+                                                                  POSITION_STEP))
+    slope = (after - before) / (2 * POSITION_STEP)
+    found = at, slope * v, slope * a + (after - 2 * at + before) / POSITION_STEP ** 2 * v ** 2
+    others = [one for one in effects if not one.is_of_position]
+    if not others:
+        return found
+    smoothed = smoothed_as(read, recording,
+                           lambda position: errors(others, position[:, chosen]))
+    return found[0] + smoothed[0], found[1] + smoothed[1], found[2] + smoothed[2]
 
 
 def _followed_rightly(
@@ -339,7 +355,7 @@ def _followed_rightly(
     q, q_dot, q_ddot = misread(model.misreadings, model.drives, recording, read)
     drives = replace(read, position=read.position - q, velocity=read.velocity - q_dot,
                      acceleration=read.acceleration - q_ddot)
-    if np.any(q_dot):
+    if np.any(q_dot) and not all(one.is_of_position for one in model.misreadings):
         drives = smoothed_again(drives, recording,
                                 lambda position: position - model.position_error(position))
     followed = follow(model, time, drives, progress)

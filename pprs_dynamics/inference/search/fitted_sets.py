@@ -285,11 +285,9 @@ class FittedSets:
         """Return derivatives by the shapes of a set, of unit prior, for the components with any."""
         slopes = []
         for one in (one for one in found.blocks if one.effect.shape):
-            assert one.drive is not None
             rows = self.design.slope_rows(self.library.term(one),
                                           one.total(found.coefficients(one)))
-            slopes.append((one, self.regression.block({one.drive: rows},
-                                                      precision=np.eye(len(rows)))))
+            slopes.append((one, self.regression.block(rows, np.eye(len(one.effect.shape)))))
         return slopes
 
     def _reach(self, component: Component) -> dict[str, float]:

@@ -147,10 +147,10 @@ class Library:
         self._nuisance: dict[Component, dict[int, Array]] = {}
         self._prices: dict[Component, CostTerms] = {}
         self.local = {d: DriveLibrary(design, regression, d) for d in regression.drives}
-        self.spanning = [placed(design, effect, d, {}, names)
+        self.spanning = [placed(design, effect, d, shape, names)
                          for effect in searched_in_drives(design) if effect.shifts_positions()
                          for d in regression.drives if design.acts_on(effect, d)
-                         for names in effect.variants]
+                         for shape in shapes_of(design, effect, d) for names in effect.variants]
         self.structure = [self._placed(term, names) for term in design.structure
                           for names in term.effect.variants
                           if any(np.any(rows[[term.names.index(name) for name in names]])

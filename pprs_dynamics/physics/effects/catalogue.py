@@ -26,6 +26,7 @@ from pprs_dynamics.physics.effects.laws.coupled_drives import CoupledDrives
 from pprs_dynamics.physics.effects.laws.current_gain import CurrentGain
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
+from pprs_dynamics.physics.effects.laws.eccentric_encoder import EccentricEncoder
 from pprs_dynamics.physics.effects.laws.effort_filter import EffortFilter
 from pprs_dynamics.physics.effects.laws.effort_gain import EffortGain
 from pprs_dynamics.physics.effects.laws.effort_offset import EffortOffset
@@ -73,6 +74,7 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         CurrentGain,
         DriveInertia,
         DriveSpring,
+        EccentricEncoder,
         EffortFilter,
         EffortGain,
         EffortOffset,

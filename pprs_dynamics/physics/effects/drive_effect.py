@@ -229,6 +229,8 @@ class MeasurementEffect(DriveEffect):
 
     is_measurement = True
     not_linear_in: ClassVar[tuple[str, ...]] = ()
+    # Whether its errors of positions are smooth functions of the position alone.
+    is_of_position: ClassVar[bool] = False
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

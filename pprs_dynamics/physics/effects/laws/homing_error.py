@@ -29,6 +29,7 @@ class HomingError(MeasurementEffect):
     acts_in = frozenset({PLATFORM, ARM})
     idealised: ClassVar[bool] = False
     nonlinear: ClassVar[bool] = True
+    is_of_position: ClassVar[bool] = True
     # A homing switch or a mark is good for a millimetre or a degree; a joint that was put together
     # or counted wrongly may be off by any angle.
     linear = (Parameter('zero', 'z', 'm', 'by which positions are measured too large', -0.1, 0.1,

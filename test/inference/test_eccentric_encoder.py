@@ -1,0 +1,144 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Encoders beside their axis: the wave, its columns, and what it is told apart from."""
+
+from __future__ import annotations
+
+import made_up_arm
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pprs_dynamics import DriveModel, MechanismModel
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.residuals.reconstruction import reconstruct
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.laws.eccentric_encoder import EccentricEncoder
+from pprs_dynamics.physics.model.model_file import build_model
+
+JOINT = 1
+GEAR = 20.0
+PITCH = 2 * np.pi / GEAR
+
+
+@pytest.fixture(scope='module')
+def arm(tmp_path_factory):
+    return made_up_arm.real_arm(tmp_path_factory.mktemp('arm'), **{
+        'arm.gear_ratio': (1.0, GEAR, 1.0)})
+
+
+def with_effect(arm, name, **values):
+    found = build_model({**arm.values, 'effects.active': [name], **{
+        f'effects.{name}.swing.{key}': value for key, value in values.items()}}, arm.source)
+    assert isinstance(found, MechanismModel)
+    return found
+
+
+def with_wave(arm, amplitude=0.002, phase=0.7, pitch=PITCH):
+    return with_effect(arm, 'eccentric_encoder', amplitude=amplitude, phase=phase, pitch=pitch)
+
+
+def disc(q: np.ndarray, beside: float, turns: float, phase: float) -> np.ndarray:
+    """Return what the head of a disc beside its axis reads, turned as fast as the joint or more."""
+    x = turns * q + phase
+    return q + np.arctan2(beside * np.sin(x), 1 - beside * np.cos(x)) / turns
+
+
+def recorded(arm, read=lambda q: q, model=None, seed=1):
+    """Record a motion whose encoder on the swing reads otherwise, by a model's forces."""
+    moved = made_up_arm.motion(20.0)
+    model = arm if model is None else model
+    forces = model.measured(model.drive_forces(moved)).total
+    position = moved.position + model.position_error(moved.position)
+    position[:, JOINT] = read(position[:, JOINT])
+    noise = np.random.default_rng(seed)
+    return Recording.from_arrays(
+        'run', moved.time, position + 2e-5 * noise.uniform(-0.5, 0.5, position.shape), None,
+        forces + 0.2 * noise.normal(size=forces.shape), arm.drives)
+
+
+def test_a_wave_is_read_too_much_and_no_force(arm):
+    moved = made_up_arm.motion(5.0)
+    model = with_wave(arm)
+    error = model.position_error(moved.position)
+    assert_allclose(error[:, JOINT], 0.002 * np.sin(GEAR * moved.position[:, JOINT] + 0.7),
+                    atol=1e-15)
+    assert not error[:, [0, 2]].any()
+    assert_allclose(model.drive_forces(moved).total, arm.drive_forces(moved).total)
+
+
+def test_coefficients_are_those_of_the_wave():
+    values = {'amplitude': 0.3, 'phase': -2.1}
+    again = EccentricEncoder.from_coefficients(EccentricEncoder.to_coefficients(values))
+    assert again == pytest.approx(values)
+
+
+def test_columns_are_differences_of_models(arm):
+    run = recorded(arm, model=with_wave(arm, 0.004, 0.0))
+    design = Design.of(arm, [run])
+    term = design.term(EccentricEncoder, JOINT, {'pitch': PITCH})
+    less, more = (Design.of(with_wave(arm, size, 0.0), [run]) for size in (0.003, 0.004))
+    for d, alike in ((0, 0.98), (JOINT, 0.999)):  # friction of the reach is another, too
+        change, column = (more.forces - less.forces)[:, d], 0.001 * term.rows[d][0]
+        assert np.corrcoef(change, column)[0, 1] > alike
+        assert column @ change / (column @ column) == pytest.approx(1.0, abs=0.02)
+
+
+def test_rates_of_the_error_are_those_of_the_motion(arm):
+    """Where a control follows the encoder, the link moves by a wave that no encoder shows."""
+    moved = made_up_arm.motion(20.0)
+    run = recorded(arm)
+    found = reconstruct(with_wave(arm, 0.002, 0.7), run)
+    inside = slice(200, -200)
+    at = np.interp(found.time, moved.time, moved.position[:, JOINT])
+    v = np.interp(found.time, moved.time, moved.velocity[:, JOINT])
+    a = np.interp(found.time, moved.time, moved.acceleration[:, JOINT])
+    x = GEAR * at + 0.7
+    expected = a - 0.002 * (GEAR * np.cos(x) * a - GEAR ** 2 * np.sin(x) * v ** 2)
+    error = (found.acceleration[:, JOINT] - expected)[inside]
+    assert error.std() < 0.05 * (expected - a)[inside].std()
+
+
+def test_slopes_are_differences_of_shapes_on_all_drives(arm):
+    design = Design.of(arm, [recorded(arm)])
+    term = design.term(EccentricEncoder, JOINT, {'pitch': PITCH})
+    slopes = design.slope_rows(term, np.array([1e-3, 0.0]))
+    further = design.term(EccentricEncoder, JOINT, {'pitch': PITCH * np.exp(1e-2)})
+    for d in (0, JOINT):
+        change = 1e-3 * (further.rows[d][0] - term.rows[d][0]) / 1e-2
+        assert slopes[d].shape == (1, len(change))
+        assert np.corrcoef(slopes[d][0], change)[0, 1] > 0.99
+
+
+@pytest.mark.parametrize(('turns', 'beside'), [(1.0, 0.02), (GEAR, 0.06)])
+def test_a_disc_beside_its_axis_is_found(arm, turns, beside):
+    found = diagnose(arm, [recorded(arm, lambda q: disc(q, beside, turns, 0.5))])
+    assert [(one.name, one.drives) for one in found.effects] == [('eccentric_encoder', ('swing',))]
+    told = found.effects[0].parameters
+    assert told['swing.pitch'].value == pytest.approx(2 * np.pi / turns, rel=0.1)
+    assert told['swing.amplitude'].value == pytest.approx(beside / turns, rel=0.15)
+
+
+@pytest.mark.parametrize(('name', 'values'), [
+    ('homing_error', {'zero': 0.015}),
+    ('force_ripple', {'force': 1.5, 'phase': 0.4, 'pitch': PITCH}),
+    ('current_gain', {'temperature': 0.0, 'ripple': 0.06, 'phase': 0.3, 'reference': 20.0,
+                      'pitch': PITCH}),
+    ('', {})])
+def test_what_it_is_taken_for_stays_what_it_is(arm, name, values):
+    model = with_effect(arm, name, **values) if name else arm
+    found = diagnose(arm, [recorded(arm, model=model)])
+    assert [one.name for one in found.effects] == ([name] if name else [])
+
+
+def test_a_slide_without_a_lead_and_a_3_pprs_do_not_have_it(arm):
+    design = Design.of(arm, [recorded(arm)])
+    assert [design.acts_on(EccentricEncoder, d) for d in range(3)] == [True, True, False]
+    with pytest.raises(ModelError, match='eccentric_encoder'):
+        build_model({**DriveModel.load().values, 'effects.active': ['eccentric_encoder'],
+                     'effects.eccentric_encoder.lift_1.amplitude': 1e-4,
+                     'effects.eccentric_encoder.lift_1.phase': 0.0,
+                     'effects.eccentric_encoder.lift_1.pitch': 0.005})
