@@ -11,7 +11,7 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo demo-feedforward test test-nodes test-others fuzz reproduce feedforward localisation score adoption benchmark \
-	naming reliability reliability-full experiments decisions mutants fleet workbench docs lint clean
+	naming reference reliability reliability-full experiments decisions mutants fleet workbench docs lint clean
 
 help:
 	@echo 'make demo       install into $(VENV); a hidden effect is found, added, and the error falls'
@@ -29,6 +29,7 @@ help:
 	@echo 'make reliability   fuzz, soak, parameter storms and restarts of the node (15 minutes)'
 	@echo 'make reliability-full   the same at full size (an hour or two)'
 	@echo 'make naming     the naming benchmark: this package and its peers (an hour; NAMING=small: minutes)'
+	@echo 'make reference  how small a change since a reference run is told, on one path and on another (minutes)'
 	@echo 'make experiments   how often a designed experiment settles what was ambiguous (long; it can be stopped)'
 	@echo 'make decisions  the score with each chosen number of the diagnosis halved and doubled (an hour)'
 	@echo 'make mutants    mistakes put into the modules that decide: which of them the tests see (two hours)'
@@ -83,6 +84,10 @@ score: $(VENV)/.test
 
 adoption: $(VENV)/.test
 	$(BIN)/python -m benchmarks.scores.adoption 24
+
+reference: $(VENV)/.test
+	$(BIN)/python -m benchmarks.scores.reference
+	$(BIN)/python -m benchmarks.scores.reference --path 1
 
 benchmark: $(VENV)/.test
 	$(BIN)/python -m benchmarks.speed.model

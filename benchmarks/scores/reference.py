@@ -3,11 +3,12 @@
 
 """How small a change since a reference run is told, on an arm with forces of no catalogue.
 
-    python -m benchmarks.scores.reference --seeds 5 --drift 0.05
+    python -m benchmarks.scores.reference --seeds 5 --drift 0.05 --path 1
 
-A made-up arm of two turning joints and a sliding one moves along one path, 20 s, with cables and
+A made-up arm of two turning joints and a sliding one moves along a path, 20 s, with cables and
 worn guides that pull as no effect of the catalogue does. Of each run they are otherwise by
-`--drift` of themselves. One run is the reference; each other has a change, and noise of its own.
+`--drift` of themselves. One run, on path 0, is the reference; each other, on `--path`, has a
+change, and noise of its own.
 Told is in how many runs what was changed is first, alone, holds its value, and what is beside it.
 """
 
@@ -95,9 +96,9 @@ def unknown_forces(moved: JointMotion, drift: Array) -> Array:
     return force
 
 
-def record(machine: MechanismModel, seed: int, drift: float) -> Recording:
-    """Return a run of a machine, its drift and noise of a seed."""
-    moved, random = joint_motion(DURATION), np.random.default_rng(seed)
+def record(machine: MechanismModel, seed: int, drift: float, path: int = 0) -> Recording:
+    """Return a run of a machine on a path, its drift and noise of a seed."""
+    moved, random = joint_motion(DURATION, seed=path), np.random.default_rng(seed)
     state = machine.initial_state(0.0)
     forces = machine.measured(machine.drive_forces(moved, state), state).total
     effort = (forces + unknown_forces(moved, drift * random.normal(size=(2, 3)))
@@ -107,7 +108,7 @@ def record(machine: MechanismModel, seed: int, drift: float) -> Recording:
                                  effort, machine.drives)
 
 
-def score(seeds: int, drift: float) -> list[dict[str, Any]]:
+def score(seeds: int, drift: float, path: int) -> list[dict[str, Any]]:
     """Return a row for each change: how often it is told, and how sure."""
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / 'made_up.urdf').write_text(URDF)
@@ -120,7 +121,7 @@ def score(seeds: int, drift: float) -> list[dict[str, Any]]:
             counts: dict[str, float] = {}
             beside = 0
             for seed in range(seeds):
-                run = record(change.model(base), 1 + number * seeds + seed, drift)
+                run = record(change.model(base), 1 + number * seeds + seed, drift, path)
                 found = diagnose(base, [run], reference=reference)
                 for key, right in change.told(found).items():
                     counts[key] = counts.get(key, 0) + right
@@ -136,9 +137,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--seeds', type=int, default=5)
     parser.add_argument('--drift', type=float, default=0.05)
+    parser.add_argument('--path', type=int, default=0)
     options = parser.parse_args(sys.argv[1:])
     print('change | value | first | alone | holds | beside')
-    score(options.seeds, options.drift)
+    score(options.seeds, options.drift, options.path)
 
 
 if __name__ == '__main__':

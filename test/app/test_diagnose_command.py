@@ -155,8 +155,8 @@ MISTAKES = {
     ('run.csv', '--validate', 'run.csv'): 'what is held out must be another recording',
     ('run.csv', '--adopt-all'): '--adopt-all: no --output FILE is given',
     ('run.csv', '--output', 'x.yaml'): '--output: it is given without --adopt-all',
-    ('run.csv', '--adopt-all', '--output', 'x.yaml', '--reference'):
-        '--reference: it is given with --adopt-all',
+    ('run.csv', '--adopt-all', '--output', 'x.yaml', '--refit', '--reference'):
+        '--refit: it is given with --reference',
     ('nowhere.csv',): 'nowhere.csv: No such file',
     ('run.csv', '--model', 'nowhere.yaml'): 'nowhere.yaml: no such file',
     ('empty.csv',): 'empty.csv: ',

@@ -337,7 +337,7 @@ def test_a_refused_effect_does_not_end_the_walk(monkeypatch: pytest.MonkeyPatch)
                                evidence=100.0) for name in ('force_ripple', 'coulomb_friction')]
     asked: list[str] = []
 
-    def found(model: tuple[str, ...], *_: object) -> SimpleNamespace:
+    def found(model: tuple[str, ...], *_: object, **__: object) -> SimpleNamespace:
         left = tuple(one for one in effects if one.name not in model)
         return SimpleNamespace(effects=left, indistinguishable=(), depends_on=())
 

@@ -72,6 +72,7 @@ def test_one_that_stands_is_told_within_two_seconds_and_recovers() -> None:
 
 @pytest.mark.parametrize(('given', 'reason'), [
     ({'left': 0.01}, 'end 10 ms after they are sent'),
+    ({'left': -0.01}, 'ended 10 ms before they are sent'),
     ({'moves_at_end': True}, 'allow_nonzero_velocity_at_trajectory_end'),
     ({'efforts': False}, 'no command interface `effort`'),
     ({'joints': ('a', 'b', 'gripper')}, 'joint gripper, too'),

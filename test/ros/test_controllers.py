@@ -113,6 +113,7 @@ def test_the_files_name_the_drives_in_the_order_of_commands(name: str) -> None:
     else:
         assert set(given['state_interfaces']) == {'position', 'velocity'}
         assert set(given['gains']) == set(DRIVES)
+        assert given['cmd_timeout'] == 0.0  # any other ends feedforward's hold, too
 
 
 ALONG = np.linspace(0.0, HelicalPath.duration, 48)  # [s] of a path from rest to rest

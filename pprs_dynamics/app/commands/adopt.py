@@ -32,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_recordings(parser)
     arguments.add_as_it_is(parser)
     arguments.add_validation(parser)
+    arguments.add_reference(parser)
     arguments.add_model_output(parser, 'model file to write')
     parser.add_argument('--force', action='store_true',
                         help='adopt it in spite of objections, which the ledger then holds')
@@ -47,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     inputs = read_inputs(options, screen)
     with staged_bar(screen) as progress:
         result = adopt(inputs.model, options.effect, inputs, force=options.force,
-                       progress=progress)
+                       progress=progress, reference=options.reference)
     tell(result, options, screen, lambda: result.page(options.output))
     if not result.adopted:
         return 1

@@ -63,7 +63,8 @@ def _adopt_all(diagnosis: DiagnosisResult, options: argparse.Namespace, screen: 
     inputs = diagnosis.inputs
     with staged_bar(screen) as progress:
         result = adopt_all(inputs.model, inputs, refit=options.refit, diagnosis=diagnosis,
-                           topic=options.topic, progress=progress)
+                           topic=options.topic, progress=progress,
+                           reference=options.reference)
     screen.print(result.view(options.details))
     if options.json:
         write_json(options.json, {**diagnosis.to_dict(), 'adoption': result.to_dict()})
@@ -83,9 +84,9 @@ def _check(options: argparse.Namespace) -> None:
     if options.refit is not None and not options.adopt_all:
         raise arguments.UsageError('--refit: it is given without --adopt-all, which adds what the '
                                    'base model is fitted again beside')
-    if options.adopt_all and options.reference is not None:
-        raise arguments.UsageError('--reference: it is given with --adopt-all, but effects are '
-                                   'added to what the model lacks by itself: take one of them out')
+    if options.refit is not None and options.reference is not None:
+        raise arguments.UsageError('--refit: it is given with --reference, but the base is that of '
+                                   'the reference: fit it to that by pprs fit')
     if options.output and not options.adopt_all:
         raise arguments.UsageError('--output: it is given without --adopt-all, but nothing is '
                                    'written to it then; --json and --report write the answer')

@@ -11,10 +11,11 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.front_door.diagnose import DiagnosisResult
-from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings, stage
+from pprs_dynamics.app.front_door.inputs import Given, Inputs, Model, Progress, Recordings, stage
 from pprs_dynamics.app.front_door.result import Result, data_frame
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt as adopt_effect
+from pprs_dynamics.inference.adoption.adopt import original
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.loop import REFUSED, AdoptionRun
 from pprs_dynamics.inference.adoption.loop import adopt_all as adopt_effects
@@ -194,7 +195,7 @@ class AdoptionRunResult(Result):
 def adopt(model: Model, effect: str, recordings: Recordings, validate: Recordings = (), *,
           force: bool = False, diagnosis: DiagnosisResult | None = None,
           topic: str | None = None, progress: Progress | None = None, as_it_is: bool = False,
-          ) -> AdoptionResult:
+          reference: Given | None = None) -> AdoptionResult:
     """Add an effect to a model: fit it, check it on data it was not fitted to, take or refuse it.
 
     Parameters
@@ -211,6 +212,9 @@ def adopt(model: Model, effect: str, recordings: Recordings, validate: Recording
         Of this model on these recordings, where it is known: it is not made again.
     topic, progress, as_it_is : optional
         As in `compare`.
+    reference : path, Recording, or a sequence of them, optional
+        As in `diagnose`: the effect is a change since then, fitted and judged beside what was
+        there already.
 
     Returns
     -------
@@ -226,20 +230,22 @@ def adopt(model: Model, effect: str, recordings: Recordings, validate: Recording
     inputs = Inputs.of(
         model, recordings, validate, topic, progress, as_it_is=as_it_is).require_measurements()
     request = requested(effect, inputs.model)
+    inputs = inputs.since(reference, original(inputs.model))
     return AdoptionResult(inputs, adopt_effect(
         inputs.model, request, inputs.fitted, inputs.held_out, force,
         stage(progress, f'adopting {request.name}'),
-        None if diagnosis is None else diagnosis.diagnosis))
+        None if diagnosis is None else diagnosis.diagnosis, inputs.reference))
 
 
 def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *,
               refit: Recordings | None = None, diagnosis: DiagnosisResult | None = None,
-              topic: str | None = None, progress: Progress | None = None) -> AdoptionRunResult:
+              topic: str | None = None, progress: Progress | None = None,
+              reference: Given | None = None) -> AdoptionRunResult:
     """Diagnose and adopt until nothing more can be told.
 
     Parameters
     ----------
-    model, recordings, validate, diagnosis, topic, progress
+    model, recordings, validate, diagnosis, topic, progress, reference
         As in `adopt`.
     refit : path, Recording, or a sequence of them, optional
         To which the base model is then fitted again, as `fit` does, beside what was adopted; it
@@ -257,6 +263,7 @@ def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *
         As `compare`.
     """
     inputs = Inputs.of(model, recordings, validate, topic, progress).require_recordings()
+    inputs = inputs.since(reference, original(inputs.model))
     again: list[Recording] = []
     if refit is not None:
         require_open_numbers(inputs.model)
@@ -264,7 +271,7 @@ def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *
                           progress, as_it_is=inputs.as_it_is).fitted or inputs.fitted
     run = adopt_effects(
         inputs.model, inputs.fitted, inputs.held_out, inputs.ledger.entered, progress,
-        None if diagnosis is None else diagnosis.diagnosis)
+        None if diagnosis is None else diagnosis.diagnosis, inputs.reference)
     if not again or not run.adopted:
         return AdoptionRunResult(inputs, run)
     return AdoptionRunResult(inputs, run, refit_base(

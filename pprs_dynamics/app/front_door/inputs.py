@@ -12,11 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from pprs_dynamics.errors import MisreadError, PprsError, UnreadableFileError
-from pprs_dynamics.inference.residuals.conventions import find_mistakes
+from pprs_dynamics.inference.residuals.conventions import with_mistakes
 from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
 from pprs_dynamics.inference.residuals.mistakes import (
-    OtherReading,
-    columns_line,
     no_measurements,
 )
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
@@ -68,6 +66,8 @@ class Inputs:
     as_it_is : bool
         Whether recordings are taken as their names and units say, whatever they look like.
     reference : Reference, optional
+    reference_paths : tuple of str, optional
+        Its files; none of them: those that the model file names.
         Run since which it is asked what has changed.
     """
 
@@ -80,6 +80,7 @@ class Inputs:
     topic: str = ''
     as_it_is: bool = False
     reference: Reference | None = None
+    reference_paths: tuple[str, ...] | None = None
 
     @classmethod
     def of(cls, model: Model, recordings: Recordings, validate: Recordings = (),
@@ -183,8 +184,10 @@ class Inputs:
         return replace(self, recordings=fewer, validation=held_out,
                        paths=self.paths - {name}).require_recordings()
 
-    def since(self, reference: Given | None) -> Inputs:
+    def since(self, reference: Given | None, model: ForceModel | None = None) -> Inputs:
         """Return this with reference runs, () for the model's own; as it is for None.
+
+        They are fitted to the model, or to another one that is given.
 
         Raises
         ------
@@ -194,7 +197,9 @@ class Inputs:
         from pprs_dynamics.inference.fit.reference_runs import read_reference
 
         return self if reference is None else replace(self, reference=read_reference(
-            self.model, listed_recordings(reference), [*self.fitted, *self.held_out]))
+            model or self.model, listed_recordings(reference), [*self.fitted, *self.held_out],
+            self.as_it_is), reference_paths=tuple(
+                str(one) for one in listed_recordings(reference) if not isinstance(one, Recording)))
 
     def require_recordings(self) -> Inputs:
         """Return this, or raise InputError where there is no recording to fit to."""
@@ -233,7 +238,7 @@ class Inputs:
         if not {*self.recordings, *self.validation} <= self.paths:
             return replace(PLACEHOLDERS, model=self.model_path)
         return GivenFiles(tuple(self.recordings), tuple(self.validation), self.model_path,
-                          self.topic)
+                          self.topic, self.reference_paths)
 
     @property
     def ledger(self) -> LedgerBook:
@@ -254,22 +259,6 @@ def read_checked(model: ForceModel, path: File, topic: str | None = None,
                  progress: Progress | None = None) -> Recording:
     """Read a recording of a model's drives; what its numbers rather mean is in its findings."""
     return with_mistakes(model, _read(model, path, topic, progress))
-
-
-def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False) -> Recording:
-    """Return a recording with what its numbers rather mean among its findings.
-
-    Raises
-    ------
-    MisreadError
-        With `refuse`, where it looks as if it were in other units, signs or another order than it
-        says.
-    """
-    mistakes = find_mistakes(model, recording)
-    readings = [one for one in mistakes if isinstance(one, OtherReading)]
-    if refuse and readings:
-        raise MisreadError(recording.name, [one.what for one in readings], [columns_line(readings)])
-    return replace(recording, findings=(*mistakes, *recording.findings))
 
 
 def _read(model: ForceModel, path: File, topic: str | None, progress: Progress | None,

@@ -517,7 +517,8 @@ class Session:
                  report: Callable[[float], None]) -> Adoption:
         self._await_diagnosis(report)
         answer: Adoption = run_in_process(
-            partial(adopt, diagnosis=self.diagnosis), fits.model, request, fits.recordings,
+            partial(adopt, diagnosis=self.diagnosis, reference=inputs.reference), fits.model,
+            request, fits.recordings,
             inputs.held_out, force, report=lambda share: report(0.9 * share))
         if answer.adopted:
             after = TickFits(inputs.ledger.entered(answer), fits.recordings,

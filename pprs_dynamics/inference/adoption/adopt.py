@@ -26,8 +26,9 @@ from pprs_dynamics.inference.adoption.fit_curve import (
     without_curve,
 )
 from pprs_dynamics.inference.adoption.fit_effect import StandingError, fit_effect
-from pprs_dynamics.inference.adoption.request import EffectRequest
+from pprs_dynamics.inference.adoption.request import EffectRequest, EffectRequestError
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import PairedGain, paired_gain, rms
@@ -50,6 +51,7 @@ def adopt(
     model: ForceModel, request: EffectRequest | CurveRequest, recordings: Sequence[Recording],
     validate: Sequence[Recording] = (), force: bool = False,
     progress: Callable[[float], None] | None = None, diagnosis: Diagnosis | None = None,
+    reference: Reference | None = None,
 ) -> Adoption:
     """Return a model with an effect, or why it should not have it.
 
@@ -70,11 +72,14 @@ def adopt(
     diagnosis : Diagnosis, optional
         On the same recordings, where it is known already: of `original(model)`, and for a curve
         of the model itself. The fit is made with its decisions.
+    reference : Reference, optional
+        Since which the effect is a change; of `original(model)` or what that was then. Errors are
+        then those beyond what it shows as well.
 
     Raises
     ------
     EffectRequestError
-        For an effect that cannot act in what the model is of.
+        For an effect that cannot act in what the model is of, and for a curve since a reference.
     CurveError
         Where the recordings cannot give the curve.
     PprsError
@@ -82,6 +87,10 @@ def adopt(
     """
     report = progress or (lambda share: None)
     if isinstance(request, CurveRequest):
+        if reference is not None:
+            raise EffectRequestError(f'{request.name}: a curve holds what was there before, too, '
+                                     'must be an effect where it is to be a change since a '
+                                     'reference')
         if diagnosis is None:
             diagnosis = diagnose(model, recordings, (),
                                  lambda share: report(DIAGNOSIS_BEFORE_CURVE * share))
@@ -90,15 +99,17 @@ def adopt(
     start = original(model)
     request = request.placed(start)
     if diagnosis is None:
-        diagnosis = diagnose(start, recordings, (), lambda share: report(DIAGNOSIS * share))
-    case = _Case(model, start, request, recordings, validate, force, diagnosis)
+        diagnosis = diagnose(start, recordings, (), lambda share: report(DIAGNOSIS * share),
+                             reference=reference)
+    case = _Case(model, start, request, recordings, validate, force, diagnosis, reference)
     named = next((one for one in diagnosis.effects if one.name == request.name), None)
     # Where the recordings call for it, beside what else they call for, is known by now.
     placed = replace(request, drives=named.drives) if named and not request.drives else request
     try:
         fitted = fit_effect(start, placed, recordings,
                             lambda share: report(DIAGNOSIS + (FIT - DIAGNOSIS) * share),
-                            diagnosis.decisions)
+                            diagnosis.decisions,
+                            None if reference is None else reference.carried_over)
     except (ModelError, StandingError) as error:
         return case.without_model(str(error))
     if fitted is None:
@@ -154,6 +165,7 @@ class _Case:
     validate: Sequence[Recording]
     force: bool
     diagnosis: Diagnosis
+    reference: Reference | None = None
 
     @property
     def held_out(self) -> str:
@@ -164,14 +176,21 @@ class _Case:
     def residuals(self, after: ForceModel) -> tuple[Residuals, Residuals]:
         """Return those of the model as given and of another on the recordings."""
         before = (self.diagnosis.residuals if self.start is self.model
-                  else measure_residuals(self.model, self.recordings)[0])
-        return before, measure_residuals(after, self.recordings)[0]
+                  else self._beyond(self.recordings, self.model)[0])
+        return before, self._beyond(self.recordings, after)[0]
+
+    def _beyond(self, recordings: Sequence[Recording], *models: ForceModel) -> list[Residuals]:
+        """Return the residuals of models, less what the reference shows as well."""
+        found = [measure_residuals(one, recordings)[0] for one in models]
+        if self.reference is None:
+            return found
+        shown = self.reference.shown_by(recordings)
+        return [replace(one, measured=one.measured - shown) for one in found]
 
     def validated(self, plain: ForceModel, fitted: ForceModel, noises: dict[str, NoiseSpectrum],
                   ) -> tuple[tuple[float, float], PairedGain]:
         """Return errors on the validation recordings, and what the effect gains."""
-        given, before, after = (measure_residuals(one, self.validate)[0]
-                                for one in (self.model, plain, fitted))
+        given, before, after = self._beyond(self.validate, self.model, plain, fitted)
         # What the model's own numbers gain by being fitted is not the effect's.
         return (rms(given), rms(after)), paired_gain(before, after, noises)
 
@@ -182,8 +201,8 @@ class _Case:
 
     def without_model(self, reason: str) -> Adoption:
         """Return the refusal of an effect whose fit gives no model."""
-        before, _ = measure_residuals(self.model, self.recordings)
-        held_out = rms(measure_residuals(self.model, self.validate)[0] if self.validate else before)
+        (before,) = self._beyond(self.recordings, self.model)
+        held_out = rms(self._beyond(self.validate, self.model)[0] if self.validate else before)
         refused = self.answer(self.model, self.request.drives, [reason], [], before, before,
                               (held_out, held_out), {})
         return replace(refused, adopted=False, forced=False,
@@ -205,7 +224,8 @@ class _Case:
             tuple(remarks), parameters, calibrated, rivals, self.model, after, residuals_before,
             residuals_after, rms(residuals_before), rms(residuals_after), *held_out,
             VALIDATION if self.validate else BLOCKS, self.diagnosis.noise_floor,
-            self.diagnosis.noise_floors, curve, moments or {})
+            self.diagnosis.noise_floors, curve, moments or {},
+            () if self.reference is None else self.reference.names)
 
 
 def _adopt_curve(case: _Case, request: CurveRequest, report: Callable[[float], None]) -> Adoption:

@@ -52,6 +52,8 @@ class Adoption:
         Of a measured curve, with its band.
     moments : mapping of str to Estimate
         First moments of added bodies: see `Estimates`.
+    reference : tuple of str
+        Runs since which the effect is a change; errors are beyond what they show as well.
     """
 
     request: EffectRequest | CurveRequest
@@ -77,6 +79,7 @@ class Adoption:
     noise_floors: dict[str, float]
     curve: FittedCurve | None = None
     moments: Mapping[str, Estimate] = field(default_factory=dict)
+    reference: tuple[str, ...] = ()
 
     @property
     def unit(self) -> str:
@@ -101,4 +104,5 @@ class Adoption:
             'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
             **({'moments': {key: one.to_dict() for key, one in self.moments.items()}}
                if self.moments else {}),
+            **({'reference': list(self.reference)} if self.reference else {}),
             'calibrated': [one.to_dict() for one in self.calibrated]}

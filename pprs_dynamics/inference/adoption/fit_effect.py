@@ -13,7 +13,7 @@ import numpy as np
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
-from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.design import CarriedOver, Design
 from pprs_dynamics.inference.residuals.paired_errors import PairedGain
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
@@ -102,8 +102,11 @@ class EffectFit:
 def fit_effect(
     model: ForceModel, request: EffectRequest, recordings: Sequence[Recording],
     progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
+    carry_over: Callable[[Design], CarriedOver] | None = None,
 ) -> EffectFit | None:
     """Return the model with an effect, new or with other numbers; None where it cannot act.
+
+    `carry_over` says what a reference run knows of the recordings.
 
     Raises
     ------
@@ -116,6 +119,7 @@ def fit_effect(
     """
     report = progress or (lambda share: None)
     design = Design.of(model, recordings, lambda share: report(0.3 * share), request.name)
+    design = design.beside(carry_over and carry_over(design))
     _require_motion(design, request)
     fits = FittedSets(design, decisions)
     without = fits.evaluate(())

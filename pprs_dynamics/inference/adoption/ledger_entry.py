@@ -67,6 +67,7 @@ class LedgerBook:
             spans=tuple(time for one in self.fitted for time in one.span),
             validation=tuple(one.name for one in self.validation),
             validation_sha256=tuple(one.sha256 for one in self.validation),
+            reference=adoption.reference,
             held_out_on=adoption.held_out_on,
             error_before=_rounded(adoption.error_before),
             error_after=_rounded(adoption.error_after),

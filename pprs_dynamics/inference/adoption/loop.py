@@ -14,6 +14,7 @@ from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -59,6 +60,7 @@ def adopt_all(
     model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
     record: Callable[[Adoption], ForceModel] = lambda adoption: adoption.after,
     progress: Callable[[str, float], None] | None = None, diagnosis: Diagnosis | None = None,
+    reference: Reference | None = None,
 ) -> AdoptionRun:
     """Adopt what recordings call for, until a diagnosis finds nothing, or cannot tell.
 
@@ -79,6 +81,8 @@ def adopt_all(
         Called with what is being done and the share of it that is done.
     diagnosis : Diagnosis, optional
         Of the model as given, where it is known already; its decisions hold for all others.
+    reference : Reference, optional
+        As in `adopt`.
 
     Raises
     ------
@@ -95,7 +99,8 @@ def adopt_all(
     while True:
         if diagnosis is None:
             diagnosis = diagnose(original(model), recordings, (),
-                                 lambda share: report('diagnosing', share), decisions)
+                                 lambda share: report('diagnosing', share), decisions,
+                                 reference=reference)
         found = _next(diagnosis, {step.effect for step in refused})
         if found is None and refused:
             reasons = '; '.join(f'{step.effect}: {step.reason}' for step in refused)
@@ -111,7 +116,7 @@ def adopt_all(
         name = found.name
         step = adopt(model, EffectRequest(found.effect, found.drives), recordings, validate,
                      progress=lambda share: report(f'adopting {name}', share),  # noqa: B023
-                     diagnosis=diagnosis)
+                     diagnosis=diagnosis, reference=reference)
         steps.append(step)
         if not step.adopted:
             refused.append(step)

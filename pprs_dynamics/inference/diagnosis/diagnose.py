@@ -334,6 +334,8 @@ class _Answer:
         self.remaining = ranking.first.design.residuals.measured - exact_forces(
             self.design, self.final.model) - self.design.carried_forces(
                 self.final.found.fit.coefficients)
+        for d, series in self.fits.regression.series.items():
+            self.remaining[:, d] -= series.open_forces(self.remaining[:, d])
         # Before a constant form is believed.
         self.dated_fits, self.dated = with_courses(
             self.fits, self.reported, ranking.alone.values()) if claims else (

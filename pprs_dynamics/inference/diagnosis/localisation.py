@@ -225,8 +225,7 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str]) -> Statem
     Ranks of the sizes of innovations stand for them, so that noise need not be Gaussian.
     """
     regression, d = library.regression, library.d
-    series = regression.series[d]
-    white = regression.whitened(fit, d, series.inverse(regression.remaining(fit, d)))
+    white = regression.innovations(fit, d)
     n = len(white)
     shares = (_ranks(np.abs(white)) - 0.5) / n
     ranked = np.array([NormalDist().inv_cdf(share) for share in shares.tolist()])

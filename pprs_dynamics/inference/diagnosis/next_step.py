@@ -38,12 +38,15 @@ class GivenFiles:
         '' for the default.
     topic : str
         '' where none was chosen.
+    reference : tuple of str, optional
+        Runs since which it is asked what has changed; none of them: those of the model file.
     """
 
     recordings: tuple[str, ...] = ('RECORDING',)
     validate: tuple[str, ...] = ()
     model: str = ''
     topic: str = ''
+    reference: tuple[str, ...] | None = None
 
     def command(self, *words: str, held_out: bool = False) -> str:
         """Return a command of `pprs` on the recordings, then options; quoted for a shell.
@@ -60,6 +63,8 @@ class GivenFiles:
         given = ['pprs', *words[:first], *self.recordings]
         if held_out:
             given += [part for name in self.validate for part in ('--validate', name)]
+        if self.reference is not None and words[0] in ('adopt', 'diagnose'):
+            given += ['--reference', *self.reference]
         for option, value in (('--model', self.model), ('--topic', self.topic)):
             given += [option, value] if value else []
         return shlex.join([*given, *words[first:]])
@@ -124,7 +129,7 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                 replace(files, recordings=(SECOND,)).command('diagnose'))
     repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
     if diagnosis.depends_on:
-        if (curve := _curve(diagnosis)) is not None:
+        if diagnosis.since is None and (curve := _curve(diagnosis)) is not None:
             return ('Look at that place on the machine. A measured curve takes the error away '
                     'until the cause is known', files.command(
                         'adopt', curve, '--output', files.output('with_curve.yaml'), held_out=True))

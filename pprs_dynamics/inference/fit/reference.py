@@ -36,6 +36,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
@@ -49,6 +50,7 @@ from pprs_dynamics.inference.fit.arm_fit import (
 from pprs_dynamics.inference.regression.base_columns import BaseColumn, ReferenceDirection
 from pprs_dynamics.inference.regression.design import CarriedOver, Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.residuals.bands import LEAST_OPEN, DriveSeries, OpenForces
 from pprs_dynamics.inference.residuals.measuring import MOTION, join_tables, treated_table
 from pprs_dynamics.inference.residuals.reconstruction import Reconstruction, reconstruct
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -68,16 +70,20 @@ LEAST_VARIANCE = 0.05  # of the kernel, that a further state must bring
 SLOW = 0.3  # of the rms speed of a drive: within it direction turns over
 # Tried: in standard deviations of the positions, and in turns of the directions.
 LENGTHS = tuple((position, speed) for position in (0.5, 1.5) for speed in (0.7, 2.0))
-OWN_LENGTHS = (0.3, 1.0)  # of what is of one drive's own state
+# The same of what is of one drive's own state.
+OWN_LENGTHS = tuple((position, speed) for position in (0.3, 1.0, 3.0) for speed in (0.5, 1.5))
 FIRST_SIZE = 0.4  # of a process, over the error: from which its size is fitted
 LEAST_SIZE = 1e-9  # [N, N m], of a process that does nothing
 ROUNDS = 3  # of the size of the process
+LEAST_TOLD = 1.0  # coefficients, from which the size of a process is taken
 LEAST_INFORMATION = 0.1  # of a direction of the base, in units of its prior's
 LEAST_LENGTH = 200  # samples after treatment: a few seconds
 LEAST_REPEATS = 0.1  # of the process in two runs, below which nothing of it is carried over
+FINER = 8  # points for each sample of a reference, among which the nearest is looked for
+OCTAVES = 6  # of frequency, in each of which another share of what no process tells comes back
 BLOCKS = 4  # of a single reference, each predicted from the others
 MOST_KEPT = 400  # means of a reference that a model file keeps
-MOST_DIRECTIONS = 24  # that become columns
+MOST_DIRECTIONS = 24  # that become columns of all drives together
 
 
 class ReferenceRunError(PprsError, ValueError):
@@ -108,14 +114,18 @@ class States:
         return cls(q.mean(axis=0), np.maximum(q.std(axis=0), 1e-9),
                    np.maximum(SLOW * np.sqrt((v ** 2).mean(axis=0)), 1e-9))
 
+    def path(self, residuals: Residuals) -> Array:
+        """Return positions and velocities of a recording in standard deviations, (M, 2 D)."""
+        q, v = _motion(residuals)
+        return np.concatenate(((q - self.centre) / self.spread, v / self.speed * SLOW), axis=1)
+
     def at(self, residuals: Residuals, drive: int | None = None) -> Array:
         """Return the states of all drives in a recording, or of one, (M, k)."""
         q, v = _motion(residuals)
         position, direction = (q - self.centre) / self.spread, np.tanh(v / self.speed)
-        if drive is None:
-            return np.concatenate((position / self.lengths[0], direction / self.lengths[1]), axis=1)
-        return np.stack((position[:, drive] / OWN_LENGTHS[0],
-                         direction[:, drive] / OWN_LENGTHS[1]), axis=1)
+        one = slice(None) if drive is None else [drive]
+        return np.concatenate((position[:, one] / self.lengths[0],
+                               direction[:, one] / self.lengths[1]), axis=1)
 
 
 def _motion(residuals: Residuals) -> tuple[Array, Array]:
@@ -250,8 +260,7 @@ class Reference:
         PprsError
             As `measure_residuals`.
         """
-        found = [reconstruct(model, one) for one in recordings]
-        residuals = join_tables(model, [treated_table(model, one) for one in found])
+        found, residuals = _measured(model, recordings)
         numbers = (np.concatenate([_numbers(model, one) for one in found])
                    if model.is_described else None)
         return cls._fitted(model, residuals, numbers, kept, tuple(one.name for one in recordings),
@@ -286,17 +295,25 @@ class Reference:
                 f'must be at least {LEAST_LENGTH}: record a longer run')
         columns, base, told = _base(model, numbers, residuals, kept)
         plain, drives = States.of(residuals), range(len(residuals.drives))
-        own = [Process.of(residuals, plain, d) for d in drives]
-        best = min((_fitted(residuals, columns, own, replace(plain, lengths=lengths))
-                    for lengths in LENGTHS), key=lambda one: one.deviance)
+        measured = Regression(residuals).drives
+        own = [min(
+            (Process.of(residuals, replace(plain, lengths=lengths), d) for lengths in OWN_LENGTHS),
+            key=lambda one, d=d: 0.0 if d not in measured else _sized(  # type: ignore[misc]
+                residuals, columns, d, [one[1]])[1].deviance) for d in drives]
+        shared, fits = min(
+            ((one, {d: _sized(residuals, columns, d, (one[1], own[d][1])) for d in measured})
+             for one in (Process.of(residuals, replace(plain, lengths=lengths))
+                         for lengths in LENGTHS)),
+            key=lambda one: sum(fit.deviance for _, fit in one[1].values()))
+        size = np.stack([fits[d][0] if d in fits else np.full(2, LEAST_SIZE) for d in drives])
         regression = Regression(residuals, (*_base_columns(columns), *(
             column for d in drives
-            for column in _columns_of(d, (best.shared[1], own[d][1]), best.size[d]))))
-        fit = regression.at((), best.amplitudes)
+            for column in _columns_of(d, (shared[1], own[d][1]), size[d]))))
+        fit = regression.at((), np.stack([one.amplitudes[0] for _, one in fits.values()]))
         _require_same_robot(model, residuals, columns, fit, names)
         values, axes = np.linalg.eigh(fit.covariance)
         parts = _parts(residuals)
-        return cls(model, recordings, (best.shared[0], *(one for one, _ in own)), best.size,
+        return cls(model, recordings, (shared[0], *(one for one, _ in own)), size,
                    _repeats(regression, fit, told, parts), base, fit.coefficients,
                    axes * np.sqrt(np.maximum(values, 0.0)), regression, fit, named)
 
@@ -345,11 +362,20 @@ class Reference:
         return ''
 
     def carried_over(self, design: Design) -> CarriedOver:
-        """Return what it says of recordings."""
-        residuals, drives, told = design.residuals, range(len(self.size)), self.told
+        """Return what it says of the recordings of a design."""
+        return self._carried_over(design.residuals, design.reconstructions)
+
+    def shown_by(self, recordings: Sequence[Recording]) -> Array:
+        """Return the forces that recordings and it have beyond the model, (M, D) [N]."""
+        found, residuals = _measured(self.model, recordings)
+        return self._carried_over(residuals, found).mean
+
+    def _carried_over(self, residuals: Residuals, reconstructions: Sequence[Reconstruction],
+                      ) -> CarriedOver:
+        drives, told = range(len(self.size)), self.told
         samples = len(residuals)
         shared, *own = (one.features(residuals) for one in self.processes)
-        numbers = (np.concatenate([_numbers(self.model, one) for one in design.reconstructions])
+        numbers = (np.concatenate([_numbers(self.model, one) for one in reconstructions])
                    @ self.base if self.base.size else np.zeros((samples, len(drives), 0)))
         mean, together, apart, at = np.zeros((samples, len(drives))), [], [], told
         for d in drives:
@@ -367,13 +393,13 @@ class Reference:
                 numbers[:, d, told:]), axis=1))
             apart.append(np.concatenate((
                 np.sqrt(1 - repeats ** 2) * sizes * known, new), axis=1))
-        return CarriedOver(mean, self._directions(replace(
+        return CarriedOver(mean, *self._open(replace(
             residuals, measured=residuals.measured - mean), together, apart), float(np.mean(
                 (shared[0] ** 2).sum(axis=1) > self.decisions.reference_known)))
 
-    def _directions(self, residuals: Residuals, together: Sequence[Array],
-                    apart: Sequence[Array]) -> tuple[ReferenceDirection, ...]:
-        """Return the principal directions of rows that noise does not hide.
+    def _open(self, residuals: Residuals, together: Sequence[Array], apart: Sequence[Array],
+              ) -> tuple[tuple[ReferenceDirection, ...], dict[int, OpenForces]]:
+        """Return the largest directions of what all drives share, and what else is open in each.
 
         Noise is that of the reference, or of the recording where that is less.
 
@@ -383,36 +409,61 @@ class Reference:
         together, apart : sequence of (M, k) array
             Of every drive; columns of unit variance, the first ones shared by all drives.
         """
-        regression, least = Regression(residuals), self.decisions.reference_direction
+        regression, again = Regression(residuals), self._met_again(residuals)
         spectra = regression.fit(()).spectra
-        of_all, of_each = [], {}
+        white, alone = [], []
         for k, d in enumerate(regression.drives):
             series = regression.series[d]
+            alone.append(np.concatenate((apart[d], np.stack(
+                _in_bands(series, again[:, d]), axis=1)), axis=1))
             if d in self.regression.drives:
                 of_reference = np.interp(
                     regression.bands.frequency, self.regression.bands.frequency,
                     self.fit.spectra[self.regression.drives.index(d)])
                 spectra[k] = np.minimum(spectra[k], of_reference)
-            white = series.spread(np.sqrt(1 / spectra[k]))
-            of_all.append(series.transform(together[d][series.index].T) * white)
-            # What is of one drive alone has few directions.
-            values, axes = _principal(
-                series.transform(apart[d][series.index].T) * white, least)
-            of_each[d] = [(value, apart[d] @ axis) for value, axis in zip(
-                values, axes.T, strict=True)]
-        values, axes = _principal(np.concatenate(of_all, axis=1), least)
-        found = [(value, {d: one @ axis for d, one in enumerate(together)})
-                 for value, axis in zip(values, axes.T, strict=True)]
-        found += [(value, {d: row}) for d, each in of_each.items() for value, row in each]
-        found.sort(key=lambda one: -one[0])
-        return tuple(ReferenceDirection(rows, 1.0) for _, rows in found[:MOST_DIRECTIONS])
+            white.append(series.transform(together[d][series.index].T)
+                         / np.sqrt(series.spread(spectra[k])))
+        rows = np.concatenate(white, axis=1)
+        values, axes = np.linalg.eigh(rows @ rows.T)
+        axes = axes[:, ::-1][:, :int(np.sum(values > LEAST_OPEN))]
+        shared, rest = axes[:, :MOST_DIRECTIONS], axes[:, MOST_DIRECTIONS:]
+        return (tuple(ReferenceDirection({d: one @ axis for d, one in enumerate(together)}, 1.0)
+                      for axis in shared.T),
+                {d: OpenForces(np.concatenate((alone[k], together[d] @ rest), axis=1).T, spectra[k])
+                 for k, d in enumerate(regression.drives)})
+
+    def _met_again(self, residuals: Residuals) -> Array:
+        """Return what no process tells of the reference where a recording is on its path, (M, D).
+
+        Gears ripple and friction turns over within less than the lengths of a process. Where the
+        path is the same, so are they: what the fit leaves at the state of the reference that is
+        nearest is then in the recording as well, by a share that is not known. 0 elsewhere.
+        """
+        reference, states = self.regression.residuals, self.processes[0].states
+        left = np.zeros_like(reference.measured)
+        for d in self.regression.drives:
+            series = self.regression.series[d]
+            left[series.index, d] = series.inverse(self.regression.remaining(self.fit, d))
+        path = states.path(reference)
+        within = np.arange(0, len(path) - 1, 1 / FINER)
+        within = within[np.diff(reference.record)[within.astype(int)] == 0]
+        finer, forces = (np.stack([np.interp(within, np.arange(len(path)), row) for row in rows.T],
+                                  axis=1) for rows in (path, left))
+        away, nearest = cKDTree(finer).query(states.path(residuals))
+        met = away < self.decisions.reference_path * np.sqrt(path.shape[1])
+        return np.where(met[:, None], forces[nearest], 0.0)
 
 
-def _principal(rows: Array, least: float) -> tuple[Array, Array]:
-    """Return squares, of `least` at least, and axes of whitened rows (k, n), the largest first."""
-    values, axes = np.linalg.eigh(rows @ rows.T)
-    count = int(np.sum(values > least))
-    return values[::-1][:count], axes[:, ::-1][:, :count]
+def _in_bands(series: DriveSeries, values: Array) -> list[Array]:
+    """Return values (M,) by octaves of frequency, the slow ones together."""
+    found, coefficients = [], series.cosines(values)
+    edges = series.frequency[-1] * 0.5 ** np.arange(1, OCTAVES)
+    of = np.searchsorted(-edges, -series.frequency)
+    for octave in range(OCTAVES):
+        full = np.zeros(len(values))
+        full[series.index] = series.inverse(np.where(of == octave, coefficients, 0.0))
+        found.append(full)
+    return found
 
 
 def _sizes(size: Array, features: Sequence[Array]) -> Array:
@@ -481,6 +532,12 @@ def _base(model: ForceModel, numbers: Array | None, residuals: Residuals, kept: 
     return columns @ axes[:, :told], prior @ axes, told
 
 
+def _measured(model: ForceModel, recordings: Sequence[Recording],
+              ) -> tuple[list[Reconstruction], Residuals]:
+    found = [reconstruct(model, one) for one in recordings]
+    return found, join_tables(model, [treated_table(model, one) for one in found])
+
+
 def _numbers(model: ForceModel, found: Reconstruction) -> Array:
     """Return the columns of a base's numbers on a recording, (M, n, 14 n)."""
     assert isinstance(model, MechanismModel)
@@ -498,45 +555,41 @@ def _columns_of(d: int, features: Sequence[Array], size: Array) -> list[BaseColu
         np.concatenate(features, axis=1).T, _sizes(size, features), strict=True)]
 
 
-@dataclass(frozen=True)
-class _Fit:
-    """Processes of given lengths, their sizes by evidence."""
+def _sized(residuals: Residuals, columns: Array, d: int, features: Sequence[Array],
+           ) -> tuple[Array, JointFit]:
+    """Return the sizes of processes in a drive by the evidence, (k,) [N], and the fit with them.
 
-    shared: tuple[Process, Array]
-    size: Array
-    amplitudes: Array
-    deviance: float
+    Parameters
+    ----------
+    residuals : Residuals
+    columns : (M, D, P) array
+        Of the base.
+    d : int
+    features : sequence of (M, R) array
+        Of each process.
 
-
-def _fitted(residuals: Residuals, columns: Array, own: Sequence[tuple[Process, Array]],
-            states: States) -> _Fit:
-    shared, count = Process.of(residuals, states), columns.shape[2]
-    squares = np.nansum(residuals.error ** 2, axis=0) / np.maximum(
-        np.isfinite(residuals.error).sum(axis=0), 1)
-    size = np.repeat(FIRST_SIZE * np.sqrt(squares)[:, None], 2, axis=1)
-    amplitudes, deviance = [], 0.0
-    measured = Regression(residuals).drives
-    size[[d for d in range(len(size)) if d not in measured]] = LEAST_SIZE
-    for d in measured:
-        features = (shared[1], own[d][1])
-        edges = count + np.cumsum([0, *(one.shape[1] for one in features)])
-        regression = Regression(residuals, (*_base_columns(columns, [d]),
-                                            *_columns_of(d, features, size[d])), drives=[d])
-        start = None
-        for _ in range(ROUNDS):
-            fit = regression.fit((), start)
-            start = fit.amplitudes
-            # Expectation of the squares given the errors: evidence rises.
-            squares = fit.coefficients ** 2 + np.diag(fit.covariance)
-            size[d] = [max(np.sqrt(np.mean(squares[a:b])), LEAST_SIZE) if b > a else LEAST_SIZE
-                       for a, b in pairwise(edges)]
-            precision = _sizes(size[d], features) ** -2.0
-            regression.columns = (*regression.columns[:count], *(
-                replace(column, precision=float(one)) for column, one in zip(
-                    regression.columns[count:], precision, strict=True)))
-        amplitudes.append(fit.amplitudes[0])
-        deviance += fit.deviance
-    return _Fit(shared, size, np.stack(amplitudes), deviance)
+    References
+    ----------
+    D. J. C. MacKay, Bayesian interpolation, Neural Computation 4 (1992) 415-447.
+    """
+    count = columns.shape[2]
+    size = np.full(len(features), FIRST_SIZE * np.sqrt(np.nanmean(residuals.error[:, d] ** 2)))
+    edges = count + np.cumsum([0, *(one.shape[1] for one in features)])
+    regression = Regression(residuals, (*_base_columns(columns, [d]),
+                                        *_columns_of(d, features, size)), drives=[d])
+    start = None
+    for _ in range(ROUNDS):
+        fit = regression.fit((), start)
+        start = fit.amplitudes
+        # By how many of its coefficients are told: the evidence then stands still.
+        told = 1 - np.diag(fit.covariance) * [one.precision for one in regression.columns]
+        size = np.array([max(np.linalg.norm(fit.coefficients[a:b]) / np.sqrt(max(
+            told[a:b].sum(), LEAST_TOLD)), LEAST_SIZE) for a, b in pairwise(edges)])
+        precision = _sizes(size, features) ** -2.0
+        regression.columns = (*regression.columns[:count], *(
+            replace(column, precision=float(one)) for column, one in zip(
+                regression.columns[count:], precision, strict=True)))
+    return size, fit
 
 
 def _parts(residuals: Residuals) -> Integers:

@@ -6,16 +6,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.inference.fit.reference import Reference, ReferenceRunError
+from pprs_dynamics.inference.residuals.conventions import with_mistakes
 from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
 from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.ledger import values_before_changes
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.reference_keys import (
     DIRECTIONS,
@@ -32,8 +35,10 @@ OTHER = 'a reference must be another run than what is diagnosed'
 
 
 def read_reference(model: ForceModel, files: Sequence[RunFile] = (),
-                   diagnosed: Sequence[Recording] = ()) -> Reference:
+                   diagnosed: Sequence[Recording] = (), as_it_is: bool = False) -> Reference:
     """Return the fit of reference runs; without any, of those that the model's file names.
+
+    They are fitted to the model as it was then: without what was adopted as a change since.
 
     Parameters
     ----------
@@ -41,6 +46,8 @@ def read_reference(model: ForceModel, files: Sequence[RunFile] = (),
     files : sequence of path or Recording, optional
     diagnosed : sequence of Recording, optional
         Which none of them may be.
+    as_it_is : bool, optional
+        Whatever units and signs of files look like.
 
     Raises
     ------
@@ -48,16 +55,21 @@ def read_reference(model: ForceModel, files: Sequence[RunFile] = (),
         Where there is none, or it says nothing of this robot.
     UnreadableFileError
         Where one is not there, is not what the model was fitted to any more, or is diagnosed.
+    MisreadError
+        Where a file looks as if it were in other units, signs or another order than it says.
     PprsError
         As `read_recording` and `measure_residuals`.
     """
+    then = values_before_changes(model.values)
+    if then != dict(model.values):
+        model = replace(build_model(then), source=model.source)
     kept_run = str(model.values.get(RESIDUAL, ''))
     if not files and kept_run:
         return Reference.of_residual(model, kept_run)
     given = files or [one.path for one in _own(model)]
     runs = excerpts_within_memory(model, [
-        one if isinstance(one, Recording) else read_recording(one, model.recorded)
-        for one in given])
+        one if isinstance(one, Recording) else with_mistakes(
+            model, read_recording(one, model.recorded), refuse=not as_it_is) for one in given])
     repeat = find_repeat(runs, diagnosed)
     if repeat is not None:
         raise UnreadableFileError(runs[repeat[0]].name, f'{repeat[1]}, but {OTHER}')

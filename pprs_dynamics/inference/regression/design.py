@@ -47,6 +47,7 @@ from pprs_dynamics.inference.regression.sensitivities import (
     Sensitivities,
 )
 from pprs_dynamics.inference.regression.terms import FullRate, OperatingPoint, Term
+from pprs_dynamics.inference.residuals.bands import OpenForces
 from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
 from pprs_dynamics.inference.residuals.reconstruction import (
     Reconstruction,
@@ -94,13 +95,16 @@ class CarriedOver:
     mean : (M, D) array
         Forces that the model lacks there as well [N].
     directions : tuple of ReferenceDirection
-        In which they are uncertain.
+        In which they are uncertain most.
+    open_forces : mapping of drive to OpenForces
+        In which they are uncertain beyond.
     covered : float
         Share of the samples whose states the reference knows.
     """
 
     mean: Array
     directions: tuple[ReferenceDirection, ...]
+    open_forces: Mapping[int, OpenForces]
     covered: float
 
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from pprs_dynamics.inference.regression.normal_equations import (
     term_gains,
 )
 from pprs_dynamics.inference.regression.terms import Term
-from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
+from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands, OpenForces
 from pprs_dynamics.inference.residuals.noise import NoiseShapes, NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 
@@ -98,6 +99,8 @@ class Regression:
     error_scale : mapping of drive to float, optional
         Force that priors of effects allow [N], so that costs of two designs mean the same; by
         default the rms of the error.
+    open_forces : mapping of drive to OpenForces, optional
+        That drives have beside their noise.
 
     Raises
     ------
@@ -107,11 +110,12 @@ class Regression:
 
     def __init__(self, residuals: Residuals, base: Sequence[BaseColumn] = (),
                  drives: Sequence[int] | None = None,
-                 error_scale: Mapping[int, float] | None = None) -> None:
+                 error_scale: Mapping[int, float] | None = None,
+                 open_forces: Mapping[int, OpenForces] = MappingProxyType({})) -> None:
         self.residuals, self.columns = residuals, tuple(base)
         self.bands = FrequencyBands.for_residuals(residuals)
         self.noise_shapes = NoiseShapes.of(self.bands)
-        every = {d: DriveSeries(residuals, d, self.bands)
+        every = {d: DriveSeries(residuals, d, self.bands, open_forces.get(d))
                  for d in (range(len(residuals.drives)) if drives is None else drives)}
         self.series = {d: one for d, one in every.items() if len(one) >= LEAST_SAMPLES}
         self.drives = tuple(self.series)
@@ -298,9 +302,15 @@ class Regression:
 
     def whitened(self, fit: JointFit, d: int, rows: Array) -> Array:
         """Return rows (..., M or n) in time, of unit spectrum under the noise of a fit."""
+        return self._in_time(fit, d, self.series[d].transform(rows))
+
+    def innovations(self, fit: JointFit, d: int) -> Array:
+        """Return what a fit leaves on a drive in time, (n,), of unit spectrum under its noise."""
+        return self._in_time(fit, d, self.remaining(fit, d))
+
+    def _in_time(self, fit: JointFit, d: int, transformed: Array) -> Array:
         series = self.series[d]
-        factor = series.spread(np.sqrt(self.weights(fit, d)))
-        return series.inverse(series.transform(rows) * factor)
+        return series.inverse(transformed * series.spread(np.sqrt(self.weights(fit, d))))
 
     def local(self, fit: JointFit, d: int) -> tuple[Integers, list[Block]]:
         """Return places of a drive's coefficients in those of a fit, and the blocks it feels."""

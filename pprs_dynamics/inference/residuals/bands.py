@@ -32,6 +32,7 @@ MOST_STRETCHES = 256  # whose means are rotated at once: a record of more is tak
 # For so few pairs of rows, sums over their products are up to 15 times as fast as a product of
 # matrices for every band (measured with 40 bands of 4000 samples).
 FEW_PAIRS = 12
+LEAST_OPEN = 0.05  # variance of open forces over the noise's, below which a direction is known
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,22 @@ def _records(residuals: Residuals, drive: int) -> list[list[slice]]:
     return records
 
 
+@dataclass(frozen=True)
+class OpenForces:
+    """Forces on a drive that are not known, beside its noise: Gaussian, of few directions.
+
+    Parameters
+    ----------
+    rows : (K, M) array
+        Their sum, with independent factors of unit variance, is what the forces may be [N].
+    power : (B,) array
+        Spectrum of the noise at the bands [N^2].
+    """
+
+    rows: Array
+    power: Array
+
+
 class DriveSeries:
     """One drive's measured samples, stretch by stretch, and their transform.
 
@@ -107,11 +124,16 @@ class DriveSeries:
     Only what was measured counts. Within a stretch samples follow each other as if the few that
     are missing were not: the transform stays orthonormal, so that white noise is white.
 
+    Where forces are open, with covariance Z^T Z beside the noise S, coefficients are multiplied by
+    S^1/2 (1 + S^-1/2 Z^T Z S^-1/2)^-1/2 S^-1/2: noise and open forces together are then as the
+    noise alone is without. What lies along open forces counts the less, the larger they may be.
+
     Parameters
     ----------
     residuals : Residuals
     drive : int
     bands : FrequencyBands
+    open_forces : OpenForces, optional
 
     Attributes
     ----------
@@ -125,7 +147,8 @@ class DriveSeries:
         Coefficients in each band.
     """
 
-    def __init__(self, residuals: Residuals, drive: int, bands: FrequencyBands) -> None:
+    def __init__(self, residuals: Residuals, drive: int, bands: FrequencyBands,
+                 open_forces: OpenForces | None = None) -> None:
         self.residuals, self.drive, self.bands = residuals, drive, bands
         measured = np.isfinite(residuals.measured[:, drive])
         records = [[_fast(part.start + np.flatnonzero(measured[part])) for part in record]
@@ -159,6 +182,9 @@ class DriveSeries:
         self._cuts[-1] = len(frequency)
         self.counts = np.diff(self._cuts).astype(float)
         self._single = int(np.argmax(np.append(self.counts, 0) != 1))  # bands of one coefficient
+        self._open = None if open_forces is None or not len(self) else _Narrowing.of(
+            open_forces.rows, self.cosines(open_forces.rows),
+            np.sqrt(self.spread(open_forces.power)))
 
     def __len__(self) -> int:
         return len(self.index)
@@ -170,7 +196,20 @@ class DriveSeries:
         return error
 
     def transform(self, values: Array) -> Array:
-        """Return coefficients (..., n) by ascending frequency, of values (..., M or n)."""
+        """Return coefficients (..., n) by ascending frequency, of values (..., M or n).
+
+        Along open forces they are as much smaller as these make the noise larger.
+        """
+        found = self.cosines(values)
+        return found if self._open is None else self._open.narrowed(found)
+
+    def open_forces(self, values: Array) -> Array:
+        """Return what open forces most likely are, (M,), of what is left of an error (M,) [N]."""
+        return np.zeros_like(values) if self._open is None else self._open.expected(
+            self.cosines(values))
+
+    def cosines(self, values: Array) -> Array:
+        """Return the coefficients of the plain transform."""
         if values.shape[-1] != len(self.index):
             values = values[..., self._taken]
         parts = [fft.dct(values[..., part], norm='ortho', axis=-1) for part in self.stretches]
@@ -182,7 +221,7 @@ class DriveSeries:
         return coefficients[..., self._order]
 
     def inverse(self, coefficients: Array) -> Array:
-        """Return the values (..., n) of coefficients."""
+        """Return the values (..., n) of coefficients of the plain transform."""
         unsorted = np.empty_like(coefficients)
         unsorted[..., self._order] = coefficients
         for means, basis in self._rotations:
@@ -214,6 +253,51 @@ class DriveSeries:
     def spread(self, by_band: Array) -> Array:
         """Return a value per coefficient (n,) from one per band (B,)."""
         return np.repeat(by_band, self.counts.astype(int))
+
+
+@dataclass(frozen=True)
+class _Narrowing:
+    """Open forces along their principal directions beside the noise.
+
+    Parameters
+    ----------
+    rows : (K, M) array
+    axes : (K, R) array
+        Directions among the rows.
+    values : (R,) array
+        Whitened squares along them.
+    across, along : (R, n) array
+        Directions over and times the root of the noise's spectrum.
+    """
+
+    rows: Array
+    axes: Array
+    values: Array
+    across: Array
+    along: Array
+
+    @classmethod
+    def of(cls, rows: Array, cosines: Array, root: Array) -> _Narrowing:
+        """Return that of rows with their plain coefficients (K, n) and a root spectrum (n,)."""
+        white = cosines / root
+        values, axes = np.linalg.eigh(white @ white.T)
+        kept = values > LEAST_OPEN
+        values, axes = values[kept], axes[:, kept]
+        directions = axes.T @ white / np.sqrt(values)[:, None]
+        return cls(rows, axes, values, directions / root, directions * root)
+
+    def narrowed(self, coefficients: Array) -> Array:
+        """Return coefficients (..., n) with what lies along open forces made smaller."""
+        less = (1 - 1 / np.sqrt(1 + self.values)).astype(coefficients.dtype)
+        along = coefficients @ self.across.T.astype(coefficients.dtype)
+        narrowed: Array = coefficients - (along * less) @ self.along.astype(coefficients.dtype)
+        return narrowed
+
+    def expected(self, coefficients: Array) -> Array:
+        """Return the mean of open forces given plain coefficients (n,) of an error, (M,)."""
+        share = np.sqrt(self.values) / (1 + self.values)
+        expected: Array = (self.axes @ (share * (self.across @ coefficients))) @ self.rows
+        return expected
 
 
 def _fast(samples: np.typing.NDArray[np.int_]) -> np.typing.NDArray[np.int_]:

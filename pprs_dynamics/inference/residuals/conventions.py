@@ -11,12 +11,13 @@ several times better than what its names and units say, that is said. Nothing is
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.errors import MisreadError
 from pprs_dynamics.inference.residuals.changed_readings import (
     find_changed_efforts,
     find_changed_positions,
@@ -37,6 +38,7 @@ from pprs_dynamics.inference.residuals.mistakes import (
     Mistake,
     OtherReading,
     Scales,
+    columns_line,
 )
 from pprs_dynamics.inference.residuals.readings import (
     ALL_NEGATED,
@@ -436,6 +438,22 @@ def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Defect]:
             + (f', as if they were in {names[unit]}' if unit != 1.0 else ''),
             scales=() if unit == 1.0 else _position_scales(model, rescaled(
                 drives, group, unit, names[unit])))
+
+
+def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False) -> Recording:
+    """Return a recording with what its numbers rather mean among its findings.
+
+    Raises
+    ------
+    MisreadError
+        With `refuse`, where it looks as if it were in other units, signs or another order than it
+        says.
+    """
+    mistakes = find_mistakes(model, recording)
+    others = [one for one in mistakes if isinstance(one, OtherReading)]
+    if refuse and others:
+        raise MisreadError(recording.name, [one.what for one in others], [columns_line(others)])
+    return replace(recording, findings=(*mistakes, *recording.findings))
 
 
 def _of_velocities(recording: Recording, excerpt: Excerpt | None) -> Iterator[Defect]:

@@ -134,10 +134,10 @@ class Decisions:
     one_run_repeats: float = _number(
         0.99, '1', 'the most that it is where a single run is the reference',
         'a machine is not the same on two days: 14 % of what repeats is another')
-    reference_direction: float = _number(
-        4.0, '1', 'whitened square of what a reference leaves unknown in one direction, from '
-        'which that is a column of every fit', 'two standard deviations of the noise; what is '
-        'less the spectrum of the noise takes')
+    reference_path: float = _number(
+        0.05, '1', 'distance in positions and velocities, over their standard deviations, within '
+        'which a recording is on the path of a reference', 'controllers repeat a program to a '
+        'hundredth; other paths seldom come as near in all drives at once')
     reference_known: float = _number(
         0.5, '1', 'share of the variance of what repeats, from which a state counts as covered '
         'by a reference', 'it says more of the force there than is left open')

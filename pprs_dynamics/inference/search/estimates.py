@@ -80,8 +80,8 @@ class Estimates:
     at_bound : tuple of str
         Those at the edge of the shapes that were tried.
     moments : dict of str to Estimate
-        First moments of added bodies, by the name of their coefficient: what a slow motion tells
-        where it does not tell mass and centre apart.
+        First moments of added bodies about the frames of their links, by the name of their
+        coefficient: what a slow motion tells where it does not tell mass and centre apart.
     """
 
     parameters: dict[str, Estimate]
@@ -308,15 +308,21 @@ def _moved(fits: FittedSets, component: Component, coefficients: Array) -> Compo
 
 
 def _moments(component: Component, c: Array, covariance: Array) -> dict[str, Estimate]:
-    """Return the first moments of an added body by themselves; none of anything else."""
+    """Return the first moments of an added body about its link's frame; none of anything else."""
     if not issubclass(component.effect, AddedBody):
         return {}
+    about_links = component.effect.moments_about_links()
     total = dict(zip((one.name for one in component.effect.coefficients), component.total(c),
                      strict=True))
     units = {one.name: one.unit for one in component.effect.coefficients}
-    return {name: Estimate(float(total[name]), float(np.sqrt(covariance[k, k])), units[name])
-            for k, name in enumerate(component.names)
-            if name.rpartition('.')[2].startswith('moment_')}
+    found = {}
+    for name, weights in about_links.items():
+        if name in component.names:
+            slope = np.array([weights.get(one, 0.0) for one in component.names])
+            variance = slope @ covariance[:len(slope), :len(slope)] @ slope
+            value = sum(float(total[one]) * weight for one, weight in weights.items())
+            found[name] = Estimate(value, float(np.sqrt(max(variance, 0.0))), units[name])
+    return found
 
 
 def _units(design: Design, drive: int | str | None) -> Callable[[str], str]:

@@ -68,7 +68,9 @@ class FittedSets:
                  error_scale: Mapping[int, float] | None = None) -> None:
         self.design, self.decisions = design, decisions
         self.stepped: Callable[[], None] = lambda: None
-        self.regression = Regression(design.residuals, design.base, error_scale=error_scale)
+        self.regression = Regression(
+            design.residuals, design.base, error_scale=error_scale,
+            open_forces={} if design.carried is None else design.carried.open_forces)
         self.prices = Prices.of(self.regression, decisions, design.given)
         self.library = Library(design, self.regression, self.prices)
         self.settled: dict[Hashable, Any] = {}

@@ -344,8 +344,7 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     """
     report = progress or (lambda share: None)
     design = Design.of(model, recordings, lambda share: report(0.25 * share))
-    if carry_over is not None:
-        design = design.beside(carry_over(design))
+    design = design.beside(carry_over and carry_over(design))
     return _searched(FittedSets(design, decisions), frozenset(), report)
 
 

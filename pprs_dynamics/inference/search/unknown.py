@@ -263,7 +263,7 @@ class PatternLibrary:
     def line(self, fit: JointFit) -> UnknownCandidate | None:
         """Return the strongest spectral line of what a fit leaves."""
         longest = max(self.series.stretches, key=lambda part: part.stop - part.start)
-        white = self.regression.whitened(fit, self.d, self._remaining(fit))[longest]
+        white = self.regression.innovations(fit, self.d)[longest]
         at = self.series.index[longest] - self.series.index[longest.start]
         n, period = int(at[-1]) + 1, self.residuals.period
         lowest = self.prices.decisions.line_periods
@@ -288,9 +288,6 @@ class PatternLibrary:
         family = Family('frequency', rows, np.zeros((0, 0)), (pattern,), rivals=n // 2,
                         paired=True)
         return self.candidate(family, pattern, rows)
-
-    def _remaining(self, fit: JointFit) -> Array:
-        return self.series.inverse(self.regression.remaining(fit, self.d))
 
     def refined(self, candidate: UnknownCandidate, fit: JointFit) -> UnknownCandidate:
         """Return a range with its limits moved to where they gain most at the noise of a fit.

@@ -69,7 +69,7 @@ def body_coefficients(prefix: str, link: str, moved: float) -> tuple[Parameter, 
     """
     mass, *rest = body_parameters(prefix, link, (0.0, 0.0, 0.0), 0.0)
     moments = (Parameter(f'{prefix}moment_{axis}', f'm c_{axis}', 'kg m',
-                         f'mass times its place along {axis} of {link}, from the centre',
+                         f'mass times its place along {axis} of {link}',
                          -1e3, 1e3, 0.0, scale=0.05) for axis in AXES)
     return (replace(mass, expected=(moved, moved) if 0 < moved < inf else None), *moments,
             *rest[3:])
@@ -155,6 +155,16 @@ class AddedBody(BodyEffect):
                 moment = coefficients.get(f'{prefix}moment_{axis}', 0.0)
                 found[f'{prefix}{axis}'] = at + (moment / mass if mass else 0.0)
         return found
+
+    @classmethod
+    def moments_about_links(cls) -> dict[str, dict[str, float]]:
+        """Return what a body adds to the first moments of its link about the link's frame.
+
+        By name of a coefficient: weights of coefficients.
+        """
+        return {f'{prefix}moment_{axis}': {f'{prefix}moment_{axis}': 1.0, f'{prefix}mass': at}
+                for prefix, _, centre, *_ in cls._bodies()
+                for axis, at in zip(AXES, centre, strict=True)}
 
     @classmethod
     def _shared(cls, values: Mapping[str, float]) -> dict[str, float]:

@@ -50,6 +50,8 @@ class Step:
         Drives that were measured, and the error on each [N].
     validation, validation_sha256 : tuple of str
         Recordings that were not fitted.
+    reference : tuple of str
+        Runs since which it is a change; none where the model lacked it all along.
     objections, rivals, calibrated : tuple of str
         What was overridden; effects that explain the data as well; numbers that moved.
     previous : mapping
@@ -81,6 +83,7 @@ class Step:
     drive_errors_after: tuple[float, ...] = ()
     validation: tuple[str, ...] = ()
     validation_sha256: tuple[str, ...] = ()
+    reference: tuple[str, ...] = ()
     objections: tuple[str, ...] = ()
     rivals: tuple[str, ...] = ()
     calibrated: tuple[str, ...] = ()
@@ -169,6 +172,14 @@ def without_last_step(values: Mapping[str, Any]) -> tuple[dict[str, Any], Step]:
     kept = {key: value for key, value in values.items()
             if not key.startswith(prefix) and key not in last.added}
     return {**kept, **last.previous}, last
+
+
+def values_before_changes(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values as they were before the first step that is a change since a reference."""
+    before = dict(values)
+    while any(step.reference for step in read_steps(before)):
+        before, _ = without_last_step(before)
+    return before
 
 
 def original_values(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -156,8 +156,10 @@ class ControllerWatch:
             yield 'it has no command interface `effort`, and drops trajectories with efforts'
         left = float(np.median([each.left for each in self._sent]))
         if left < SHORT_END:
-            yield (f'trajectories end {1e3 * left:.0f} ms after they are sent on, and are dropped '
-                   'when they arrive later: more points, or stamps further ahead')
+            when = (f'end {1e3 * left:.0f} ms after' if left > 0
+                    else f'ended {-1e3 * left:.0f} ms before')
+            yield (f'trajectories {when} they are sent on, and are dropped when they arrive later: '
+                   'more points, or stamps further ahead')
         if self._sent[-1].moves_at_end:
             yield ('trajectories end in motion, which it takes only with '
                    'allow_nonzero_velocity_at_trajectory_end: true; or set stop_time here')
