@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.naming import fetch
+from benchmarks.naming import fetch, run
 from benchmarks.naming.entrants import CONTROL, ENTRANTS, PEERS, Entrant, ablations
 from benchmarks.naming.entrants.controls import perfect, random, silent
 from benchmarks.naming.entrants.cross_validation import block_cross_validation
@@ -24,10 +24,16 @@ from benchmarks.naming.entrants.sindy import unlike
 from benchmarks.naming.entrants.spike_and_slab import spike_and_slab
 from benchmarks.naming.entrants.stepwise import stepwise
 from benchmarks.naming.generate import draws
-from benchmarks.naming.page import best_of_settings, better_than_ours, fails_table
+from benchmarks.naming.page import (
+    best_of_settings,
+    better_than_ours,
+    fails_table,
+    is_right,
+    write_page,
+)
 from benchmarks.naming.problems import Answer, AnswerError, Column, Named, Problem, Truth
 from benchmarks.naming.robots import ROBOTS, hidden_names
-from benchmarks.naming.run import enter_all, score_all
+from benchmarks.naming.run import enter_all, make_all, score_all
 from benchmarks.naming.scoring import FIGURES, Rate, Scored, figures, judge
 from pprs_dynamics.inference.residuals.noise import NoiseShapes
 from pprs_dynamics.inference.search import fitted_sets, relinearisation, search
@@ -199,6 +205,30 @@ def test_only_what_changed_is_answered_again(tmp_path: Path) -> None:
     assert enter_all(folder, {'mine': method.set_to(2.0)}, 1) == 0
     assert (asked(folder, 'one'), asked(folder, 'other')) == ('1 1 2 ', '1 2 ')
     assert enter_all(folder, {'mine': method}, 1, minutes=0.0) == 2  # the time is up
+
+
+def test_a_slice_is_made_entered_and_scored(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    chosen = [draw for draw in draws(1, 24) if draw.robot == 'axis']
+    monkeypatch.setattr(run, 'draws', lambda seed, count: chosen)
+    assert make_all(tmp_path, 1, 24, 1) == 0
+    entered = {name: ENTRANTS[name] for name in ('silent', 'random', 'stepwise BIC, AR')}
+    assert enter_all(tmp_path, entered, 1) == 0
+    (tmp_path / 'answers' / 'perfect').mkdir()
+    for file in (tmp_path / 'truth').glob('*.json'):
+        answer = perfect(Truth.from_dict(json.loads(file.read_text())))
+        (tmp_path / 'answers' / 'perfect' / file.name).write_text(json.dumps(answer.to_dict()))
+    found = score_all(tmp_path)
+    nothing = sum(draw.kind == 'nothing' for draw in chosen)
+    right = {name: sum(is_right(judged) for *_, judged in found[name]) for name in found}
+    assert 0 < nothing < len(chosen)
+    assert (right['perfect'], right['silent']) == (len(chosen), nothing)
+    assert all(judged.false_alarm is not False for *_, judged in found['random'])
+    assert not any(answer.error for _, answer, _ in found['stepwise BIC, AR'])
+    write_page(found, {}, tmp_path / 'page.md')
+    assert f'right, of {len(chosen)}' in (tmp_path / 'page.md').read_text()
+    assert (tmp_path / 'images' / 'naming.png').stat().st_size > 0
 
 
 def test_who_ends_in_an_error_is_silent_and_is_told_so(tmp_path: Path) -> None:

@@ -39,6 +39,9 @@ from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import format_model
 from pprs_dynamics.simulation.arm_run import simulate_arm
+from pprs_dynamics.simulation.export.exported_robot import export_robot
+from pprs_dynamics.simulation.export.expressed import express
+from pprs_dynamics.simulation.export.writers import written
 from pprs_dynamics.simulation.hidden_effects import NOT_IN_CATALOGUE
 from pprs_dynamics.simulation.sensors import EffortNoise
 
@@ -142,6 +145,8 @@ def write_problem(draw: Draw, folder: Path, seconds: float = DURATION) -> Truth:
 def _write_model(robot: str, model: ForceModel, folder: Path) -> None:
     if robot == '3-PPRS':
         (folder / 'model.yaml').write_text(format_model(model.values))
+        robot = export_robot(express(model, 'mjcf'), 'mjcf')
+        (folder / 'model.xml').write_text(written(robot, 'mjcf'))
         return
     source = model_of(robot)
     shutil.copy(source, folder / 'model.yaml')

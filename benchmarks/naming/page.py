@@ -28,6 +28,7 @@ LIBRARIES = ('pprs_dynamics', 'numpy', 'scipy', 'scikit-learn', 'skglm', 'pysind
 BEGIN, END = '<!-- figures: made by make naming -->', '<!-- end of figures -->'
 MAIN = ('right', 'first', 'named', 'exact', 'wrong alone', 'false alarms', 'unknown',
         'right drives', 'intervals hold')
+ASKED_OF_SOME = ('right drives', 'intervals hold')  # of those that an entrant tells
 TOLD = 4  # entrants whose answers on real machines are printed
 LESS_IS_BETTER = ('wrong alone', 'false alarms')
 MARKERS = 'os^vDPX'
@@ -35,6 +36,7 @@ STRENGTHS = ((0.5, 1.0), (2.0,), (5.0, 20.0))  # of the three pictures
 SHORT = {'pprs diagnose': 'pprs', 'adaptive group LASSO': 'group LASSO', 'Bayesian averaging, AR':
          'averaging', 'block cross-validation': 'block c.v.', 'held-out F-test (LISDD)': 'LISDD',
          'least squares (FIGAROH)': 'FIGAROH', 'stepwise BIC, AR': 'BIC, AR',
+         'stepwise BIC, AR again': 'BIC, AR again',
          'stepwise BIC, white': 'BIC, white', 'spike and slab, AR': 'spike and slab'}
 
 
@@ -52,8 +54,13 @@ def write_page(scored: Mapping[str, Scored], real: Mapping[str, Scored], page: P
 def tables(scored: Mapping[str, Scored]) -> str:
     """Return all tables in Markdown: the main one, and what it is made of, folded."""
     best = {name: scored[name] for name in best_of_settings(scored)}
-    parts = {name: scored[name] for name in ordered(scored) if sort_of(name) in (OURS, PART)}
-    lines = [*main_table(best), '', better_than_ours(best), '',
+    parts = alike({name: scored[name] for name in ordered(scored) if sort_of(name) in (OURS, PART)})
+    most = max(len(answers) for answers in best.values())
+    whole = {name: answers for name, answers in best.items() if len(answers) == most}
+    lines = [*main_table(whole), '',
+             *([] if len(whole) == len(best) else [
+                 'On the problems that every entrant has answered:', '', *main_table(alike(best)),
+                 '']), better_than_ours(best), '',
              '![Right against false, weak, middle and strong effects](images/naming.png)', '',
              *(['This package without each of its parts:', '', *main_table(parts), '']
                if any(sort_of(name) == PART for name in parts) else []),
@@ -68,11 +75,19 @@ def tables(scored: Mapping[str, Scored]) -> str:
     return '\n'.join(lines) + '\n'
 
 
+def alike(scored: Mapping[str, Scored]) -> dict[str, Scored]:
+    """Return the answers to the problems that all have answered."""
+    count = Counter(problem for answers in scored.values()
+                    for problem in {truth.problem for truth, *_ in answers})
+    return {name: [one for one in answers if count[one[0].problem] == len(scored)]
+            for name, answers in scored.items()}
+
+
 def of_real_machines(scored: Mapping[str, Scored]) -> str:
     """Return their table in Markdown, and what the first few entrants said of each recording."""
     if not scored:
         return ''
-    best = {name: scored[name] for name in best_of_settings(scored)}
+    best = alike({name: scored[name] for name in best_of_settings(scored)})
     shown = [name for name in best if sort_of(name) != CONTROL][:TOLD]
     lines = ['| machine | lacks | ' + ' | '.join(shown) + ' |', '|---' * (len(shown) + 2) + '|']
     for answers in zip(*(best[name] for name in shown), strict=True):
@@ -100,7 +115,7 @@ def main_table(scored: Mapping[str, Scored]) -> list[str]:
     every = {name: all_figures(answers) for name, answers in scored.items()}
     counts = {figure: {found[figure].count for found in every.values()} for figure in MAIN}
     shown = [figure for figure in MAIN if counts[figure] != {0}]
-    heads = [figure if len(counts[figure]) > 1 else f'{figure}, of {max(counts[figure])}'
+    heads = [f'{figure}, of {max(counts[figure])}' if figure not in ASKED_OF_SOME else figure
              for figure in shown]
     lines = ['| entrant | ' + ' | '.join((*heads, 's')) + ' |', '|---' * (len(shown) + 2) + '|']
     for name, found in every.items():
@@ -128,11 +143,14 @@ def better_than_ours(scored: Mapping[str, Scored]) -> str:
     if ours is None:
         return ''
     mine, said = all_figures(scored[ours]), []
-    for figure in MAIN:
+    pairs = {name: alike({ours: scored[ours], name: answers}) for name, answers in scored.items()
+             if sort_of(name) == PEER}
+    rates = {name: tuple(all_figures(pair[one]) for one in (name, ours))
+             for name, pair in pairs.items()}
+    for figure in mine:
         sign = -1 if figure in LESS_IS_BETTER else 1
-        ahead = [f'{name} ({_cell(rate)})' for name, answers in scored.items()
-                 if sort_of(name) == PEER and (rate := all_figures(answers)[figure]).count
-                 and sign * (rate.share - mine[figure].share) > 0]
+        ahead = [f'{name} ({_cell(its[figure])})' for name, (its, own) in rates.items()
+                 if its[figure].count and sign * (its[figure].share - own[figure].share) > 0]
         if ahead:
             said.append(f'*{figure}* ({_cell(mine[figure])} here): {", ".join(ahead)}')
     faster = [name for name in scored if sort_of(name) == PEER
@@ -249,11 +267,15 @@ def draw(scored: Mapping[str, Scored], picture: Path) -> None:
     mpl.use('Agg')
     import matplotlib.pyplot as plt
 
-    figure, panels = plt.subplots(1, len(STRENGTHS), figsize=(12, 4.8), layout='constrained',
-                                  sharex=True, sharey=True)
-    names = [name for name in best_of_settings(scored) if sort_of(name) != CONTROL]
+    scored = alike({name: scored[name] for name in best_of_settings(scored)})
+    names = [name for name in scored if sort_of(name) != CONTROL]
+    there = {truth.snr for answers in scored.values() for truth, *_ in answers
+             if truth.kind == 'single'}
+    shown = [one for one in STRENGTHS if there & set(one)] or STRENGTHS
+    figure, panels = plt.subplots(1, len(shown), figsize=(12, 4.8), layout='constrained',
+                                  sharex=True, sharey=True, squeeze=False)
     colours = plt.get_cmap('tab10')
-    for axes, strengths in zip(panels, STRENGTHS, strict=True):
+    for axes, strengths in zip(panels[0], shown, strict=True):
         for k, name in enumerate(names):
             answers = scored[name]
             here = [(t, j) for t, _, j in answers if t.kind == 'single' and t.snr in strengths]
@@ -272,8 +294,8 @@ def draw(scored: Mapping[str, Scored], picture: Path) -> None:
         axes.set(title='SNR ' + ', '.join(f'{one:g}' for one in strengths), xlim=(-3, 103),
                  ylim=(-3, 103), xlabel='claims that are wrong [%]')
         axes.grid(alpha=0.25)
-    panels[0].set_ylabel('one hidden effect, told exactly [%]')
-    panels[-1].legend(fontsize=8, loc='center left', bbox_to_anchor=(1.0, 0.5), frameon=False)
+    panels[0, 0].set_ylabel('one hidden effect, told exactly [%]')
+    panels[0, -1].legend(fontsize=8, loc='center left', bbox_to_anchor=(1.0, 0.5), frameon=False)
     figure.savefig(picture, dpi=100)
     plt.close(figure)
 

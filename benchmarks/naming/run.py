@@ -35,6 +35,7 @@ from benchmarks.naming.problems import Answer, Problem, Truth
 from benchmarks.naming.scoring import Judged, figures, judge, seconds
 
 PROBLEMS, TRUTH, ANSWERS = 'problems', 'truth', 'answers'
+FILES = ('recording.csv', 'model.yaml', 'columns.npz', 'columns.json')  # an answer depends on them
 
 
 def make_all(folder: Path, seed: int, count: int, workers: int) -> int:
@@ -117,8 +118,11 @@ def _enter(folder: Path, entrants: Mapping[str, Entrant], problem: str, missing:
 
 
 def _key_of_problem(folder: Path, problem: str) -> str:
-    data = (folder / PROBLEMS / problem / 'recording.csv').read_bytes()
-    return hashlib.sha256(data).hexdigest()[:16]
+    found = hashlib.sha256()
+    for name in FILES:
+        file = folder / PROBLEMS / problem / name
+        found.update(file.read_bytes() if file.exists() else b'')
+    return found.hexdigest()[:16]
 
 
 def _key_of_answer(file: Path) -> str:
@@ -129,25 +133,23 @@ def _answer_file(folder: Path, name: str, problem: str) -> Path:
     return folder / ANSWERS / name / f'{problem}.json'
 
 
-def score_all(folder: Path, by_all: bool = False) -> dict[str, list[tuple[Truth, Answer, Judged]]]:
+def score_all(folder: Path, answered: bool = False,
+              ) -> dict[str, list[tuple[Truth, Answer, Judged]]]:
     """Return every entrant's answers with what is right about them; none counts as silence.
 
-    `by_all`: of a run that was stopped, the problems that every entrant has answered.
+    `answered`: of a run that was stopped, of each entrant what it has answered.
     """
-    entrants = sorted(path.name for path in (folder / ANSWERS).glob('*'))
     truths = [Truth.from_dict(json.loads(file.read_text()))
-              for file in sorted((folder / TRUTH).glob('*.json'))
-              if not by_all or all(_answer_file(folder, entrant, file.stem).exists()
-                                   for entrant in entrants)]
-    found = {}
-    for entrant in entrants:
-        scored = []
+              for file in sorted((folder / TRUTH).glob('*.json'))]
+    found: dict[str, list[tuple[Truth, Answer, Judged]]] = {}
+    for entrant in sorted(path.name for path in (folder / ANSWERS).glob('*')):
+        found[entrant] = []
         for truth in truths:
             file = _answer_file(folder, entrant, truth.problem)
-            answer = (Answer.from_dict(json.loads(file.read_text())) if file.exists()
-                      else Answer('none'))
-            scored.append((truth, answer, judge(truth, answer)))
-        found[entrant] = scored
+            if file.exists() or not answered:
+                answer = (Answer.from_dict(json.loads(file.read_text())) if file.exists()
+                          else Answer('none'))
+                found[entrant].append((truth, answer, judge(truth, answer)))
     return found
 
 
@@ -192,8 +194,8 @@ def main() -> int:
     parser.add_argument('--page', type=Path, help='write the table and its picture')
     parser.add_argument('--part', type=_part, default=(1, 1), metavar='K/N',
                         help='of N parts of the problems the K-th, for machines that share them')
-    parser.add_argument('--by-all', action='store_true',
-                        help='score what every entrant has answered, of a run that was stopped')
+    parser.add_argument('--answered', action='store_true',
+                        help='score each entrant by what it answered, of a run that was stopped')
     parser.add_argument('--real', type=Path, metavar='FOLDER', help='of real machines, see real.py')
     options = parser.parse_args()
     if options.step == 'make':
@@ -205,10 +207,10 @@ def main() -> int:
                              options.part), 1)
     if options.step == 'reveal':
         return reveal(options.folder, options.problem or '')
-    scored = score_all(options.folder, options.by_all)
+    scored = score_all(options.folder, options.answered)
     if options.page:
         there = options.real is not None and options.real.exists()
-        real = score_all(options.real, options.by_all) if there else {}
+        real = score_all(options.real, options.answered) if there else {}
         write_page(scored, real, options.page)
     for entrant, answers in scored.items():
         print(entrant, *(f'{name} {rate}' for name, rate in figures(answers).items()),

@@ -92,6 +92,8 @@ PEERS: dict[str, Entrant] = {
     'stepwise BIC, white': Entrant(stepwise, {'whiten': False}, ('weight', (1, 3, 10, 30, 100)),
                                    10),
     'stepwise BIC, AR': Entrant(stepwise, {'whiten': True}, ('weight', (1, 2, 4, 8, 16))),
+    'stepwise BIC, AR again': Entrant(stepwise, {'whiten': True, 'rounds': 4},
+                                      ('weight', (1, 2, 4, 8, 16))),
     'block cross-validation': Entrant(block_cross_validation, {}, ('errors', (0, 1, 2, 4))),
     'LASSO': Entrant(lasso, {}, ('errors', (0, 1)), library='scikit-learn'),
     'adaptive group LASSO': Entrant(adaptive_group_lasso, {}, ('power', (0.5, 1, 2)),

@@ -40,6 +40,8 @@ class Equations:
     problem : Problem
     whiten : bool
         Whether noise of each drive is taken as autoregressive, its order by BIC; else as white.
+    found : sequence of Group
+        What is there beside the noise that is so told, by an earlier choice.
 
     Attributes
     ----------
@@ -51,7 +53,7 @@ class Equations:
         Ten stretches of time, for cross-validation.
     """
 
-    def __init__(self, problem: Problem, whiten: bool = False) -> None:
+    def __init__(self, problem: Problem, whiten: bool = False, found: Sequence[Group] = ()) -> None:
         self.problem = problem
         groups: dict[tuple[str, str | None, tuple[tuple[str, float], ...]], list[int]] = {}
         for k, column in enumerate(problem.columns):
@@ -63,7 +65,8 @@ class Equations:
             own, of_base = problem.error[:, d], problem.base[:, :, d]
             known = np.isfinite(own)
             stacked = np.vstack((own[known], of_base[:, known], problem.rows[:, known, d]))
-            rest = _residual(stacked[0], stacked[1:1 + len(of_base)])
+            there = [1 + len(of_base) + k for group in found for k in group.columns]
+            rest = _residual(stacked[0], stacked[[*range(1, 1 + len(of_base)), *there]])
             filtered = lfilter(_predictor(rest) if whiten else [1.0 / max(rest.std(), 1e-12)], 1.0,
                                stacked)
             skip = HIGHEST_ORDER if whiten else 0
@@ -185,9 +188,10 @@ class Equations:
 def _residual(y: Array, base: Array) -> Array:
     if not len(base):
         return y
-    gram = base @ base.T
-    return y - base.T @ np.linalg.solve(gram + 1e-9 * np.trace(gram) * np.eye(len(base)) + 1e-12
-                                        * np.eye(len(base)), base @ y)
+    # Of one size: numbers of which little is known are a million times as large as others.
+    even = base / np.maximum(np.sqrt(np.mean(np.square(base), axis=1)), 1e-12)[:, None]
+    gram = even @ even.T
+    return y - even.T @ np.linalg.solve(gram + RIDGE * len(y) * np.eye(len(even)), even @ y)
 
 
 def _predictor(noise: Array) -> Array:

@@ -4,7 +4,8 @@
 """Stepwise selection by the Bayesian information criterion, with white or whitened noise.
 
 What most people would write first: add the group that lowers BIC most, drop what raises it, until
-nothing pays. G. Schwarz, Ann. Stat. 6 (1978) 461.
+nothing pays. G. Schwarz, Ann. Stat. 6 (1978) 461. The noise may be told anew beside what was
+chosen, and all chosen again, as D. Cochrane and G. Orcutt do (J. Am. Stat. Assoc. 44 (1949) 32).
 """
 
 from __future__ import annotations
@@ -15,9 +16,18 @@ from benchmarks.naming.entrants.equations import Equations, Group
 from benchmarks.naming.problems import Answer, Problem
 
 
-def stepwise(problem: Problem, whiten: bool, weight: float = 1.0) -> Answer:
+def stepwise(problem: Problem, whiten: bool, weight: float = 1.0, rounds: int = 1) -> Answer:
     """Return what stepwise selection finds; `weight` multiplies the penalty."""
-    equations = Equations(problem, whiten)
+    chosen: list[Group] = []
+    for _ in range(rounds):
+        equations = Equations(problem, whiten, chosen)
+        before, chosen = chosen, _selected(equations, weight)
+        if chosen == before:
+            break
+    return equations.answered(chosen)
+
+
+def _selected(equations: Equations, weight: float) -> list[Group]:
     n = len(equations.y)
     chosen: list[Group] = []
 
@@ -44,4 +54,4 @@ def stepwise(problem: Problem, whiten: bool, weight: float = 1.0) -> Answer:
             without = [other for other in chosen if other is not one]
             if cost(without) < current:
                 chosen, current = without, cost(without)
-    return equations.answered(chosen)
+    return chosen
