@@ -15,7 +15,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 from launch import LaunchContext, LaunchDescription
-from pprs_dynamics.system.input_files import require_file
+from pprs_dynamics.system.input_files import require_files
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -36,9 +36,7 @@ def generate_launch_description() -> LaunchDescription:
 
     def nodes(context: LaunchContext) -> list[Node]:
         # Launch would leave a missing file out, and say so in a line among many.
-        files = [text for name in ('model', 'parameters') if (text := given[name].perform(context))]
-        for file in files:
-            require_file(file)
+        files = require_files(*(given[name].perform(context) for name in ('model', 'parameters')))
         common = {'package': 'pprs_dynamics', 'namespace': given['namespace'], 'output': 'screen'}
         parameters = [*files, {'use_sim_time': given['use_sim_time']}]
         return [

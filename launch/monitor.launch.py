@@ -12,7 +12,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchContext, LaunchDescription
-from pprs_dynamics.system.input_files import require_file
+from pprs_dynamics.system.input_files import require_files
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -33,9 +33,7 @@ def generate_launch_description() -> LaunchDescription:
 
     def nodes(context: LaunchContext) -> list[Node]:
         # Launch would leave a missing file out, and say so in a line among many.
-        files = [text for name in ('model', 'parameters') if (text := given[name].perform(context))]
-        for file in files:
-            require_file(file)
+        files = require_files(*(given[name].perform(context) for name in ('model', 'parameters')))
         own = {'use_sim_time': given['use_sim_time']}
         if given['prefix'].perform(context):
             own['joint_prefix'] = ParameterValue(given['prefix'], value_type=str)
