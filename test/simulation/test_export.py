@@ -317,6 +317,17 @@ def test_a_closure_that_mujoco_lacks_is_refused() -> None:
         closures(other)
 
 
+def place_joints(robot: Any, data: Any, names: tuple[str, ...], position: np.ndarray) -> None:
+    """Put Pinocchio's robot where joints are, by name; free bodies stay at home."""
+    q = pinocchio.neutral(robot)
+    for name, value in zip(names, position, strict=True):
+        joint = robot.joints[robot.getJointId(name)]
+        # Joints without limits are a cosine and a sine there.
+        q[joint.idx_q:joint.idx_q + joint.nq] = (
+            [value] if joint.nq == 1 else [np.cos(value), np.sin(value)])
+    pinocchio.framesForwardKinematics(robot, data, q)
+
+
 def test_joints_of_the_urdf_put_the_platform_where_it_is(motion: Any) -> None:
     model = DriveModel.load()
     tree = TreePositions(model)
@@ -324,13 +335,7 @@ def test_joints_of_the_urdf_put_the_platform_where_it_is(motion: Any) -> None:
     data = robot.createData()
     position = model.drive_forces(motion).mechanism.position
     for k in range(0, len(motion), 20):
-        q = pinocchio.neutral(robot)
-        for name, value in zip(tree.names, tree.at(position[k]).joints, strict=True):
-            joint = robot.joints[robot.getJointId(name)]
-            # Joints without limits are a cosine and a sine there.
-            q[joint.idx_q:joint.idx_q + joint.nq] = (
-                [value] if joint.nq == 1 else [np.cos(value), np.sin(value)])
-        pinocchio.framesForwardKinematics(robot, data, q)
+        place_joints(robot, data, tree.names, tree.at(position[k]).joints)
         platform = data.oMf[robot.getFrameId('platform')]
         assert platform.translation == pytest.approx(motion.position[k], abs=1e-9)
         turn = pinocchio.Quaternion(platform.rotation).coeffs()
@@ -348,12 +353,7 @@ def test_joints_and_free_bodies_of_the_urdf_meet_at_every_closure(name: str) -> 
     home = structure.home[structure.tables.drives]
     for shift in np.random.default_rng(3).uniform(-0.03, 0.03, (5, len(home))):
         pose = tree.at(home + shift)
-        q = pinocchio.neutral(robot)
-        for joint_name, value in zip(tree.names, pose.joints, strict=True):
-            joint = robot.joints[robot.getJointId(joint_name)]
-            q[joint.idx_q:joint.idx_q + joint.nq] = (
-                [value] if joint.nq == 1 else [np.cos(value), np.sin(value)])
-        pinocchio.framesForwardKinematics(robot, data, q)
+        place_joints(robot, data, tree.names, pose.joints)
         place = {frame.name: data.oMf[k] for k, frame in enumerate(robot.frames)}
         # What robot_state_publisher leaves out is put where tf says that it is.
         for link, told in zip(tree.bodies, pose.bodies, strict=True):

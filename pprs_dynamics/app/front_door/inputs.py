@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from pprs_dynamics.errors import MisreadError, PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.conventions import with_mistakes
 from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
-from pprs_dynamics.inference.residuals.mistakes import (
-    no_measurements,
-)
+from pprs_dynamics.inference.residuals.mistakes import no_measurements
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -66,9 +64,9 @@ class Inputs:
     as_it_is : bool
         Whether recordings are taken as their names and units say, whatever they look like.
     reference : Reference, optional
+        Run since which it is asked what has changed.
     reference_paths : tuple of str, optional
         Its files; none of them: those that the model file names.
-        Run since which it is asked what has changed.
     """
 
     model: ForceModel
@@ -196,10 +194,13 @@ class Inputs:
         """
         from pprs_dynamics.inference.fit.reference_runs import read_reference
 
-        return self if reference is None else replace(self, reference=read_reference(
-            model or self.model, listed_recordings(reference), [*self.fitted, *self.held_out],
-            self.as_it_is), reference_paths=tuple(
-                str(one) for one in listed_recordings(reference) if not isinstance(one, Recording)))
+        if reference is None:
+            return self
+        runs = listed_recordings(reference)
+        return replace(
+            self, reference=read_reference(model or self.model, runs,
+                                           [*self.fitted, *self.held_out], self.as_it_is),
+            reference_paths=tuple(str(one) for one in runs if not isinstance(one, Recording)))
 
     def require_recordings(self) -> Inputs:
         """Return this, or raise InputError where there is no recording to fit to."""
