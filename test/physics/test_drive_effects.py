@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
+from scipy.signal import butter, lfilter, lfilter_zi
 
 from pprs_dynamics import DriveModel, Excitation
 from pprs_dynamics.physics.effects.catalogue import catalogue
@@ -411,6 +412,22 @@ def test_a_filter_leaves_what_stands_and_takes_what_is_fast():
     for f in (1.0, 20.0, 100.0):
         y = effect.sensed(np.sin(2 * np.pi * f * t)[:, None], t, ('axis',))[1000:, 0]
         assert np.ptp(y) / 2 == pytest.approx(1 / (1 + (np.pi * f * 0.02) ** 2), rel=0.1)
+
+
+@pytest.mark.parametrize('order', [1, 2])
+def test_what_a_filters_order_leaves_open_holds_other_orders(order):
+    """An RC's and a Butterworth's of the same mean delay, of a force of 1 to 4 Hz."""
+    t, T = np.arange(0.0, 4.0, 0.001), 0.02
+    F = np.sin(2 * np.pi * t) + 0.5 * np.sin(8 * np.pi * t + 1)
+    cutoff = {1: 1.0, 2: 2 ** 0.5}[order] / (2 * np.pi * T)
+    b, a = butter(order, cutoff, fs=1000.0)
+    real = lfilter(b, a, F, zi=lfilter_zi(b, a) * F[0])[0]
+    form = EffortFilter({'axis': {'time_constant': T}}).sensed(F[:, None], t, ('axis',))[:, 0]
+    open_, = EffortFilter.sensor_deviations(F, t, time_constant=T)
+    steady = slice(500, None)
+    share = (open_ @ (real - form)) / (open_ @ open_)
+    assert share == pytest.approx({1: 1.0, 2: -1.0}[order], abs=0.2)  # of unit prior
+    assert np.std((real - form - share * open_)[steady]) < 0.4 * np.std((real - form)[steady])
 
 
 @pytest.mark.parametrize('chunk', [1, 7])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -69,6 +70,7 @@ from pprs_dynamics.inference.search.fitted_model import (
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import hold_out
+from pprs_dynamics.inference.search.model_discrepancy import LackOfFit
 from pprs_dynamics.inference.search.noise_floors import noise_floors
 from pprs_dynamics.inference.search.possible_totals import left_at_nothing
 from pprs_dynamics.inference.search.ranking import Ranking, select, without_search
@@ -539,7 +541,9 @@ class _Answer:
         # A constant that slow noise would show as well is none of it.
         kept = {self.drives[d]: float(np.nanstd(self.remaining[:, d])) / max(
             floors[self.drives[d]], 1e-300) for d in self.fits.regression.drives}
-        return {name: ratio for name, ratio in kept.items() if ratio > self.decisions.left_ratio
+        return {name: ratio for name, ratio in kept.items()
+                if self._lack_of_fit.excess(self.drives.index(name), ratio * floors[name],
+                                            floors[name], self.decisions) > 1
                 and self._is_worth_a_word(self.drives.index(name))}
 
     def _is_worth_a_word(self, d: int) -> bool:
@@ -570,16 +574,12 @@ class _Answer:
                     libraries[d], candidate, self.dated.fit.of(block), evidence))
         drifting = levels(self.fits.regression.residuals, dict(noise), self.decisions)
         statements += [one for name, one in drifting.items()
-                       if one.amplitude > self._lack_of_fit(self.drives.index(name))]
+                       if one.amplitude > self._lack_of_fit.rms(self.drives.index(name))]
         return tuple(sorted(statements, key=lambda one: -one.evidence))
 
-    def _lack_of_fit(self, d: int) -> float:
-        """Return what the forms of the adopted effects may leave on a drive, rms [N]."""
-        forces = [self.dated_fits.library.force(
-            self.dated, one, self.design.residuals.measured.shape)
-            for one in self.dated.effects if one.effect.idealised]
-        return self.decisions.form_share * float(np.sqrt(sum(
-            np.mean(np.square(force[:, d])) for force in forces)))
+    @cached_property
+    def _lack_of_fit(self) -> LackOfFit:
+        return self.dated_fits.lack_of_fit(self.dated)
 
     def _candidates(self) -> tuple[RankedEffect, ...]:
         """Return the effects that were fitted as the only one, the best first."""

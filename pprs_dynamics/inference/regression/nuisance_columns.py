@@ -71,6 +71,15 @@ def _deviation_rows(design: Design, term: Term, coefficients: Array) -> Array:
     if term.drive is None or not issubclass(effect, DriveEffect):
         return np.zeros((0, len(design.residuals)))
     d = term.drive
+    if issubclass(effect, MeasurementEffect):
+        def read(recording: FullRate) -> Array:
+            parts = [np.stack(effect.sensor_deviations(design.sensed(
+                recording.effort[None, part, d], recording, part, d, effect)[0],
+                recording.time[part], **term.shape)) for part in recording.segments]
+            return np.concatenate(parts, axis=1)
+
+        has_any = effect.sensor_deviations(np.zeros(2), np.arange(2.0), **term.shape)
+        return design.treated(read) if has_any else np.zeros((0, len(design.residuals)))
 
     def rows(recording: FullRate) -> Array:
         found = effect.deviations(recording.samples(slice(None), d), **term.shape)

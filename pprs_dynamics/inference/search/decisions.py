@@ -49,7 +49,7 @@ class Decisions:
         0.02, '1', 'share of an idealised effect that its lack of fit may put into an exact one',
         'masses, gravity and sensors are exact: little else looks like them')
     left_ratio: float = _number(
-        1.5, '1', 'error that a drive may keep over its noise as lack of fit of what was found',
+        1.5, '1', 'error that a drive may keep over its noise, beside what forms of effects leave',
         'what stands out of the noise to the eye has to be told')
     rival_margin: float = _number(
         10.0, 'deviance', 'how near a set must come to the best to be told as its rival',

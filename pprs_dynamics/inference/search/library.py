@@ -286,9 +286,9 @@ class Library:
             rows = {}
             if d is None:
                 rows = joint_reversal_rows(self.design, term, component.names)
-            elif component.names:
+            else:
                 rows = {d: np.stack([nuisance_rows(self.design, term, component.every(unit))
-                                     for unit in np.eye(len(component.names))])}
+                                     for unit in np.eye(max(len(component.names), 1))])}
             if component.course is not None:
                 rows = {d: values * self._weight(component.course) for d, values in rows.items()}
             self._nuisance[component] = {

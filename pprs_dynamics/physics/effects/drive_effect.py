@@ -249,6 +249,20 @@ class MeasurementEffect(DriveEffect):
         return tuple(columns)
 
     @classmethod
+    def sensor_deviations(cls, effort: Array, time: Array | None, /, **shape: float,
+                          ) -> tuple[Array, ...]:
+        """Return how what real sensors add departs from the form, (N,) each; see `deviations`.
+
+        Parameters
+        ----------
+        effort : (N,) array
+            Of one drive, as the sensor would see it without the effect [N].
+        time : (N,) array or None
+            [s]
+        """
+        return ()
+
+    @classmethod
     def shifts_positions(cls) -> bool:
         """Return whether measured positions are not the true ones: all drives feel that."""
         unit = cls({ALONE: {p.name: p.scale for p in cls.parameters}})
