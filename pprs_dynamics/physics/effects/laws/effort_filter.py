@@ -64,8 +64,8 @@ class EffortFilter(MeasurementEffect):
             return (np.zeros_like(effort),)
         step, T = float(np.median(np.diff(time))), shape['time_constant']
         half = lag(effort, step, T / 2, effort[0], effort[0])
-        return (lag(effort, step, T, effort[0], effort[0]) - lag(half, step, T / 2, half[0],
-                                                                  half[0]),)
+        two = lag(half, step, T / 2, half[0], half[0])
+        return (lag(effort, step, T, effort[0], effort[0]) - two,)
 
     @classmethod
     def drive_memory(cls) -> Any:
