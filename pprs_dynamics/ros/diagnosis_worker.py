@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 # A tenth of a node's share of a busy processor: at 19 a machine under load never answered.
 LOW_PRIORITY = 10
+ADOPTED = 'adopted'  # of an answer: values of the model with what is claimed
 LEAST_WINDOW = 0.5  # share of the span that a window must have to be diagnosed
 
 
@@ -126,7 +127,7 @@ class DiagnosisWorker:
         self.busy = True
 
     def poll(self) -> dict[str, Any] | None:
-        """Return the answer of `LiveDiagnosis.to_dict`; None: not yet.
+        """Return the answer of `LiveDiagnosis.to_dict`, and `ADOPTED`; None: not yet.
 
         With a sentence as `error` where the window was not diagnosed; with that alone where
         nothing is known any more.
@@ -194,7 +195,7 @@ def _work(pipe: Any) -> None:
                 known = values, source, reference
             live = live.with_window(samples.recording('the last window', live.model.drives),
                                     int(samples.stamp[0]) / 1e9)
-            answer = live.to_dict()
+            answer = {**live.to_dict(), ADOPTED: live.adopted()}
         except PprsError as error:
             # What is known of this model stands, though this window says nothing.
             kept = {**live.to_dict(), 'withdrawn': []} if known == (
