@@ -48,6 +48,7 @@ setup(
         (f'share/{package_name}', ['package.xml']),
         (f'share/{package_name}/config', glob('config/*.yaml') + glob('config/*.urdf')),
         (f'share/{package_name}/config/ros2_control', glob('config/ros2_control/*.yaml')),
+        (f'share/{package_name}/config/sros2', glob('config/sros2/*.xml')),
         (f'share/{package_name}/config/schemas', glob('config/schemas/*.json')),
         (f'share/{package_name}/config/plotjuggler', glob('config/plotjuggler/*.xml')),
         (f'share/{package_name}/config/foxglove', glob('config/foxglove/*.json')),
