@@ -181,6 +181,9 @@ def _work(pipe: Any) -> None:
     from pprs_dynamics.inference.fit.reference_runs import read_reference
     from pprs_dynamics.physics.model.model_file import build_model
 
+    def said(live: LiveDiagnosis) -> dict[str, Any]:
+        return {**live.to_dict(), ADOPTED: live.adopted()}
+
     known: tuple[dict[str, Any], str, tuple[str, ...]] | None = None
     while True:
         try:
@@ -195,10 +198,10 @@ def _work(pipe: Any) -> None:
                 known = values, source, reference
             live = live.with_window(samples.recording('the last window', live.model.drives),
                                     int(samples.stamp[0]) / 1e9)
-            answer = {**live.to_dict(), ADOPTED: live.adopted()}
+            answer = said(live)
         except PprsError as error:
             # What is known of this model stands, though this window says nothing.
-            kept = {**live.to_dict(), 'withdrawn': []} if known == (
+            kept = {**said(live), 'withdrawn': []} if known == (
                 values, source, reference) else {}
             answer = {**kept, 'error': str(error)}
         pipe.send(answer)
