@@ -13,6 +13,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, FittedSets
 from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
@@ -71,7 +73,8 @@ def beyond_discrepancy(fits: FittedSets, map_set: CandidateSet,
         # Of two that look like each other, either is small beyond the other.
         less = {candidate: fits.evaluate(rest.without(candidate)) for candidate in absorbable}
         less = {candidate: smaller for candidate, smaller in less.items()
-                if _is_of_loads(fits, rest, candidate) or _is_left(fits, map_set, smaller)}
+                if _is_of_loads(fits, rest, candidate)
+                or _over_noise(fits, map_set, smaller) <= fits.decisions.left_ratio}
         if not less:
             break
         gone = min(less, key=lambda candidate: less[candidate].total)
@@ -91,12 +94,11 @@ def _is_of_loads(fits: FittedSets, found: CandidateSet, candidate: Candidate) ->
                     if other is not candidate for one in other.components))
 
 
-def _is_left(fits: FittedSets, map_set: CandidateSet, smaller: CandidateSet) -> bool:
-    """Return whether noise and lack of fit may leave what a set does, on every drive."""
-    regression, lacking = fits.regression, fits.lack_of_fit(smaller)
-    return all(lacking.excess(d, float(left), regression.noise_floor(map_set.fit, d),
-                              fits.decisions) <= 1
-               for d, left in zip(regression.drives, regression.left(smaller.fit), strict=True))
+def _over_noise(fits: FittedSets, map_set: CandidateSet, smaller: CandidateSet) -> float:
+    """Return the largest rms that a set leaves on a drive, over the noise beside the MAP set."""
+    regression = fits.regression
+    noise = [regression.noise_floor(map_set.fit, d) for d in regression.drives]
+    return float(np.max(regression.left(smaller.fit) / np.maximum(noise, 1e-300)))
 
 
 def _absorbable(fits: FittedSets, found: CandidateSet) -> dict[Candidate, tuple[str, ...]]:
