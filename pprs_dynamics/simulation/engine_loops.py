@@ -205,7 +205,7 @@ class EngineLoops:
         if self.is_open:
             data.qpos[self._places] = position
             data.qvel[state.drives], data.qacc[state.drives] = velocity, acceleration
-            return self._given.T
+            return self._given[:self._count].T
         self.close(position)
         there = data.qpos.copy()
         inverse = self._solved()

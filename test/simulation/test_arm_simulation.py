@@ -46,6 +46,14 @@ def test_the_engine_moves_the_bodies_of_the_model(model: MechanismModel) -> None
         - np.array(model.values['arm.armature']) * motion.acceleration, abs=1e-8)
 
 
+def test_the_engine_moves_an_arm_whose_last_joint_stands(tmp_path: Path) -> None:
+    arm.write_arm(tmp_path, joints=arm.JOINTS[:2])
+    standing = MechanismModel.load(tmp_path / 'arm.yaml')
+    motion = draw_motion(standing, 10.0, 0)
+    assert ArmEngine(standing).torques(motion) == pytest.approx(
+        standing.drive_forces(motion).parts['rigid_body'], abs=1e-8)
+
+
 def test_a_hidden_payload_is_a_point_at_the_tool(model: MechanismModel) -> None:
     motion = draw_motion(model, 10.0, 1)
     engine = ArmEngine(model)
