@@ -234,13 +234,14 @@ class Ranking:
     def nearly(self, margin: float) -> list[tuple[float, CandidateSet]]:
         """Return other sets of the last search within a margin, and what they cost more.
 
-        What exact forces cost more than linear ones is that of the first set of the same claims.
+        What exact forces cost more than linear ones is that of the first set of the same claims,
+        and as much as of the reported set where it is not known.
         """
         departs = {one.claims: cost - one.total for one, cost in self._exact_costs.items()}
+        mine = departs.get(self.reported.claims, 0.0)
 
         def more(one: CandidateSet) -> float:
-            return (one.cost + departs.get(one.claims, 0.0) - self.reported.cost
-                    - departs.get(self.reported.claims, 0.0))
+            return one.cost - self.reported.cost + departs.get(one.claims, mine) - mine
 
         costs = [(more(one), one) for one in self.of_last if one is not self.reported]
         least = more(self.map_set) + margin
