@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -70,7 +69,6 @@ from pprs_dynamics.inference.search.fitted_model import (
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import hold_out
-from pprs_dynamics.inference.search.model_discrepancy import LackOfFit
 from pprs_dynamics.inference.search.noise_floors import noise_floors
 from pprs_dynamics.inference.search.possible_totals import left_at_nothing
 from pprs_dynamics.inference.search.ranking import Ranking, select, without_search
@@ -536,13 +534,13 @@ class _Answer:
         return paired_gain(before, after, noise).certainty
 
     def _above_noise(self, floors: Mapping[str, float]) -> dict[str, float]:
-        """Return the drives that keep an error above their noise, as multiples of it."""
+        """Return the drives that keep more than noise and forms leave, as multiples of noise."""
         # A constant that slow noise would show as well is none of it.
         kept = {self.drives[d]: float(np.nanstd(self.remaining[:, d])) / max(
             floors[self.drives[d]], 1e-300) for d in self.fits.regression.drives}
-        return {name: ratio for name, ratio in kept.items()
-                if self._lack_of_fit.excess(self.drives.index(name), ratio * floors[name],
-                                            floors[name], self.decisions) > 1
+        allowed = {name: np.hypot(self.decisions.left_ratio, self._lack_of_fit(
+            self.drives.index(name)) / max(floors[name], 1e-300)) for name in kept}
+        return {name: ratio for name, ratio in kept.items() if ratio > allowed[name]
                 and self._is_worth_a_word(self.drives.index(name))}
 
     def _is_worth_a_word(self, d: int) -> bool:
@@ -573,12 +571,19 @@ class _Answer:
                     libraries[d], candidate, self.dated.fit.of(block), evidence))
         drifting = levels(self.fits.regression.residuals, dict(noise), self.decisions)
         statements += [one for name, one in drifting.items()
-                       if one.amplitude > self._lack_of_fit.rms(self.drives.index(name))]
+                       if one.amplitude > self._lack_of_fit(self.drives.index(name))]
         return tuple(sorted(statements, key=lambda one: -one.evidence))
 
-    @cached_property
-    def _lack_of_fit(self) -> LackOfFit:
-        return self.dated_fits.lack_of_fit(self.dated)
+    def _lack_of_fit(self, d: int) -> float:
+        """Return what the forms of the adopted effects may leave on a drive, rms [N].
+
+        A share of their sum: what others nearly cancel is no force of a machine.
+        """
+        force = np.zeros(len(self.remaining))
+        for one in self.dated.effects:
+            if one.effect.idealised:
+                force += self.dated_fits.library.force(self.dated, one, self.remaining.shape)[:, d]
+        return self.decisions.form_share * root_mean_square(force)
 
     def _candidates(self) -> tuple[RankedEffect, ...]:
         """Return the effects that were fitted as the only one, the best first."""

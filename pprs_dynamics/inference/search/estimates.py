@@ -21,7 +21,7 @@ from pprs_dynamics.inference.regression.base_columns import (
     within,
 )
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.regression.joint_fit import Columns, JointFit
+from pprs_dynamics.inference.regression.joint_fit import JointFit
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
@@ -107,7 +107,7 @@ def estimate(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
     """
     slopes = dict(fits.slopes(found))
     elsewhere = [] if are_drives_known else _told_elsewhere(fits, found, candidate)
-    fit = _stated(fits, found, [*slopes.values(), *elsewhere])
+    fit = fits.regression.stated(found.fit, [*slopes.values(), *elsewhere])
     parameters: dict[str, Estimate] = {}
     bound: list[str] = []
     moments: dict[str, Estimate] = {}
@@ -122,33 +122,6 @@ def estimate(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
     for key, one in _left_out(fits, found, candidate).items():
         parameters[key] = replace(parameters[key], std=one.std)
     return Estimates(parameters, tuple(bound), moments)
-
-
-def _stated(fits: FittedSets, found: CandidateSet, blocks: Sequence[Block] = ()) -> JointFit:
-    """Return the fit of a set, with further blocks at its noise, its covariance as it is told.
-
-    With what coefficients take of the lack of fit of forms, which is no noise: of the waves W of a
-    drive they take C X' S^-1 W, C their covariance without it. How much of it there is, t of 0 to
-    1, is what these recordings show, with one standard error more: of what is left, r,
-    |W' S^-1 r|^2 is on average tr G + t tr G^2, with G = W' (S^-1 - S^-1 X C X' S^-1) W.
-    """
-    regression, fit = fits.regression, fits.regression.stated(found.fit, blocks)
-    if found.key not in fits.lacking:
-        lacking = fits.lack_of_fit(found)
-        fits.lacking[found.key] = [Columns(regression, {
-            d: series.transform(lacking.waves(d))}) for d, series in regression.series.items()]
-    covariance = fit.covariance.copy()
-    for waves in fits.lacking[found.key]:
-        (d, rows), = waves.rows.items()
-        taken, side = waves.projected(fit)
-        moved = taken @ fit.covariance
-        weighted = rows * regression.series[d].spread(regression.weights(fit, d))
-        G = weighted @ rows.T - moved @ taken.T
-        square = float(np.sum(G ** 2))
-        if square > 0:
-            t = (side @ side - np.trace(G) + np.sqrt(2 * square)) / square
-            covariance += float(np.clip(t, 0.0, 1.0)) * moved.T @ moved
-    return replace(fit, covariance=covariance)
 
 
 def averaged(own: Estimates, others: Sequence[tuple[float, Estimates]]) -> Estimates:
@@ -208,7 +181,7 @@ def _left_out(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
         if not component.names or not rest:
             continue
         block = fits.library.block(replace(component, names=rest))
-        fit = _stated(fits, found, [block])
+        fit = fits.regression.stated(found.fit, [block])
         others = replace(component, names=rest, given=())
         index = _places(fits, fit, replace(component, names=rest))
         some, _ = _of_component(fits, others, np.zeros(len(rest)), _covariance(
@@ -368,7 +341,7 @@ def estimate_present(fits: FittedSets, found: CandidateSet, effect: CatalogueEff
     and how well after the fit.
     """
     kind, parameters = type(effect), dict[str, Estimate]()
-    fit = _stated(fits, found)
+    fit = fits.regression.stated(found.fit)
     for name in effect.drives if isinstance(effect, DriveEffect) else (None,):
         drive = None if name is None else fits.design.drives.index(name)
         values = present_values(effect, name)

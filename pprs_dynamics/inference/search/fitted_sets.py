@@ -16,7 +16,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import units_of
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.regression.joint_fit import Columns, Integers, JointFit, Regression
+from pprs_dynamics.inference.regression.joint_fit import Integers, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.body_centres import centre_of
 from pprs_dynamics.inference.search.candidates import (
@@ -31,7 +31,7 @@ from pprs_dynamics.inference.search.candidates import (
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.library import Library
-from pprs_dynamics.inference.search.model_discrepancy import LackOfFit, discrepancy_ratio
+from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
 from pprs_dynamics.inference.search.possible_bodies import with_possible_bodies
 from pprs_dynamics.inference.search.possible_totals import with_possible_totals
 from pprs_dynamics.physics.effects.added_body import AddedBody
@@ -62,8 +62,6 @@ class FittedSets:
         Called for each set that is fitted and each drive that is scanned: work is done.
     settled : dict
         By key of a set, what `relinearisation.settled` has found for it.
-    lacking : dict
-        By key of a set, what the forms of its effects may lack, see `estimates`.
     """
 
     def __init__(self, design: Design, decisions: Decisions,
@@ -76,7 +74,6 @@ class FittedSets:
         self.prices = Prices.of(self.regression, decisions, design.given)
         self.library = Library(design, self.regression, self.prices)
         self.settled: dict[Hashable, Any] = {}
-        self.lacking: dict[Hashable, list[Columns]] = {}
         self._evaluated: dict[Hashable, CandidateSet] = {}
         self._nuisance: dict[Hashable, tuple[Block, ...]] = {}
 
@@ -235,13 +232,6 @@ class FittedSets:
         c, covariance = found.fit.coefficients[place], found.fit.covariance[place, place]
         return float(c @ np.linalg.solve(covariance, c) + np.linalg.slogdet(covariance)[1]
                      + np.linalg.slogdet(block.precision)[1])
-
-    def lack_of_fit(self, found: CandidateSet) -> LackOfFit:
-        """Return what the forms of a set's effects, and of the given model's, may leave."""
-        shape = self.design.residuals.measured.shape
-        return LackOfFit.of(self.design, self.decisions, [
-            self.library.force(found, one, shape) for one in found.effects
-            if one.effect.idealised])
 
     def held(self, found: CandidateSet, index: Integers, values: Array) -> CandidateSet:
         """Return a set with some coefficients (k,) as given, all else fitted beside them.
