@@ -23,10 +23,10 @@ OF_PLATFORM = ('homing_error', 'effort_filter', 'joint_friction', 'joint_spring'
 OF_ARM = ('gear_efficiency', 'homing_error', 'effort_filter', 'payload_mass', 'link_mass',
           'base_tilt', 'external_wrench')
 # What columns are offered of: all that may be hidden, and what else a regression may take it for.
-# A list of its own for the same reason: another column is another problem.
+# A list of its own for the same reason: with another column a problem is another one.
 OFFERED = frozenset({
     *ON_DRIVES, *OF_PLATFORM, *OF_ARM, 'counterbalance', 'coupled_drives', 'current_gain',
-    'eccentric_encoder', 'friction_temperature', 'lost_motion'})
+    'friction_temperature', 'lost_motion'})
 
 
 def model_of(robot: str) -> Path:
