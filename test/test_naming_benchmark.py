@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.naming import fetch, run
+from benchmarks.naming import columns, fetch, real, run
 from benchmarks.naming.entrants import CONTROL, ENTRANTS, PEERS, Entrant, ablations
 from benchmarks.naming.entrants.controls import perfect, random, silent
 from benchmarks.naming.entrants.cross_validation import block_cross_validation
@@ -23,7 +23,7 @@ from benchmarks.naming.entrants.pprs import answer_of
 from benchmarks.naming.entrants.sindy import unlike
 from benchmarks.naming.entrants.spike_and_slab import spike_and_slab
 from benchmarks.naming.entrants.stepwise import stepwise
-from benchmarks.naming.generate import draws
+from benchmarks.naming.generate import draws, make
 from benchmarks.naming.page import (
     best_of_settings,
     better_than_ours,
@@ -32,12 +32,13 @@ from benchmarks.naming.page import (
     write_page,
 )
 from benchmarks.naming.problems import Answer, AnswerError, Column, Named, Problem, Truth
-from benchmarks.naming.robots import ROBOTS, hidden_names
+from benchmarks.naming.robots import OFFERED, ROBOTS, hidden_names
 from benchmarks.naming.run import enter_all, make_all, score_all
 from benchmarks.naming.scoring import FIGURES, Rate, Scored, figures, judge
 from pprs_dynamics.inference.residuals.noise import NoiseShapes
 from pprs_dynamics.inference.search import fitted_sets, relinearisation, search
 from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.simulation.arm_forms import NAMES
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
 
@@ -352,6 +353,30 @@ def test_a_diagnosis_is_an_answer_with_its_rivals() -> None:
 def test_what_may_be_hidden_can_be_simulated() -> None:
     for robot in ROBOTS:
         assert set(hidden_names(robot)) <= set(IN_CATALOGUE if robot == '3-PPRS' else NAMES)
+
+
+def test_columns_are_of_the_library_whatever_the_catalogue_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert {name for robot in ROBOTS for name in hidden_names(robot)} <= OFFERED <= set(CATALOGUE)
+    draw = next(one for one in draws(1, 24) if one.robot == 'axis')
+    monkeypatch.setattr(columns, 'OFFERED', OFFERED - {'viscous_friction'})
+    make(draw, tmp_path)
+    effects = {one.effect for one in Problem.read(tmp_path / draw.name).columns}
+    assert 'coulomb_friction' in effects
+    assert 'viscous_friction' not in effects
+
+
+def test_recordings_are_shipped_with_licence_and_source() -> None:
+    text = (real.RECORDINGS / 'README.md').read_text()
+    folders = sorted(one for one in real.RECORDINGS.iterdir() if one.is_dir())
+    assert [one.name for one in folders] == ['iiwa', 'kr300', 'pendulum', 'schunk']
+    for folder in folders:
+        assert (folder / 'LICENSE').stat().st_size > 0
+        assert f'| `{folder.name}` | [' in text
+        needed = {file for part in real.PARTS if part.folder == folder.name
+                  for file in (part.recording, part.model, *part.fitted)}
+        assert needed <= {one.name for one in folder.iterdir()}
 
 
 def test_seeds_give_the_same_problems_and_names_that_tell_nothing() -> None:
