@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import gzip
 import json
+import runpy
+import sys
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -166,6 +168,17 @@ def test_files_of_an_entrant_of_ones_own_are_scored(tmp_path: Path) -> None:
     found = figures(score_all(tmp_path)['mine'])
     assert (found['first'].hits, found['first'].count) == (1, 2)  # what is not answered is silence
     assert found['intervals hold'] == Rate(1, 1)
+
+
+def test_the_entrant_of_the_protocols_page_runs_and_is_scored(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    page = (Path(run.__file__).parent / 'README.md').read_text()
+    (tmp_path / 'mine.py').write_text(page.partition('```python\n')[2].partition('```')[0])
+    folder_of(tmp_path, 'one', 'other')
+    monkeypatch.setattr(sys, 'argv', ['mine.py', str(tmp_path)])
+    runpy.run_path(str(tmp_path / 'mine.py'))
+    assert figures(score_all(tmp_path)['mine'])['exact, one'] == Rate(2, 2)
 
 
 def folder_of(tmp_path: Path, *problems: str) -> Path:
