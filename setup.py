@@ -48,6 +48,7 @@ setup(
         (f'share/{package_name}', ['package.xml']),
         (f'share/{package_name}/config', glob('config/*.yaml') + glob('config/*.urdf')),
         (f'share/{package_name}/config/ros2_control', glob('config/ros2_control/*.yaml')),
+        (f'share/{package_name}/config/sros2', glob('config/sros2/*.xml')),
         (f'share/{package_name}/config/schemas', glob('config/schemas/*.json')),
         (f'share/{package_name}/config/plotjuggler', glob('config/plotjuggler/*.xml')),
         (f'share/{package_name}/config/foxglove', glob('config/foxglove/*.json')),
@@ -59,7 +60,7 @@ setup(
         # ROS 2 as wheels, for machines where no ROS 2 is installed and sourced.
         'ros': ['ros-rclpy[fastrtps]==9.1.2', 'ros-std-msgs==5.5.1',
                 'ros-sensor-msgs==5.5.1', 'ros-trajectory-msgs==5.5.1',
-                'ros-diagnostic-msgs==5.5.1'],
+                'ros-diagnostic-msgs==5.5.1', 'ros-std-srvs==5.5.1'],
         # The terminal, its completion, pictures, pages.
         'report': ['rich>=13', 'argcomplete>=3', 'matplotlib>=3.8', 'plotly>=5.20'],
         'sim': ['mujoco>=4.0'],

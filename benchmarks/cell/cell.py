@@ -92,6 +92,7 @@ class Cell:
         stack.callback(self.node.destroy_node)
         self.log: list[tuple[float, str, str]] = []  # when, who and what, from warnings on
         self._listeners: list[Any] = []
+        self._managers: list[subprocess.Popen[bytes]] = []
         self.listen(Log, '/rosout', self._on_log, QoSProfile(depth=1000))
 
     # --- time -----------------------------------------------------------------------------------
@@ -107,10 +108,12 @@ class Cell:
 
         Raises
         ------
-        TimeoutError
+        TimeoutError, RuntimeError
         """
         end = time.monotonic() + patience
         while not condition():
+            if any(each.poll() is not None for each in self._managers):
+                raise RuntimeError(f'a controller manager has ended; {self._last_lines()}')
             if time.monotonic() > end:
                 raise TimeoutError(f'{what}: not within {patience:g} s; {self.log[-3:]}; '
                                    + self._last_lines())
@@ -177,8 +180,9 @@ class Cell:
         described_on = self.node.create_publisher(String, f'{where}/robot_description', LATCHED)
         described_on.publish(String(data=described(joints, commands, hardware)))
         prefix = get_package_prefix('controller_manager')
-        self.run([f'{prefix}/lib/controller_manager/ros2_control_node'], '-r', f'__ns:={where}/',
-                 '--params-file', str(file))
+        self._managers.append(self.run(
+            [f'{prefix}/lib/controller_manager/ros2_control_node'], '-r', f'__ns:={where or "/"}',
+            '--params-file', str(file)))
 
     def activate(self, *names: str, namespace: str = '') -> None:
         """Load, configure and activate controllers, as a spawner does."""
@@ -241,7 +245,9 @@ class States:
     def _on_state(self, state: Any) -> None:
         places = [state.joint_names.index(name) for name in self._joints]
         nothing = np.full(len(state.joint_names), np.nan)
-        self.rows.append((time.monotonic(), *(
+        # By the controller's clock: messages wait for this probe on a busy machine.
+        late = time.time() - state.header.stamp.sec - 1e-9 * state.header.stamp.nanosec
+        self.rows.append((time.monotonic() - late, *(
             (np.array(values) if len(values) else nothing)[places] for values in (
                 state.reference.positions, state.reference.velocities, state.output.effort))))
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 # A tenth of a node's share of a busy processor: at 19 a machine under load never answered.
 LOW_PRIORITY = 10
+ADOPTED = 'adopted'  # of an answer: values of the model with what is claimed
 LEAST_WINDOW = 0.5  # share of the span that a window must have to be diagnosed
 
 
@@ -126,7 +127,7 @@ class DiagnosisWorker:
         self.busy = True
 
     def poll(self) -> dict[str, Any] | None:
-        """Return the answer of `LiveDiagnosis.to_dict`; None: not yet.
+        """Return the answer of `LiveDiagnosis.to_dict`, and `ADOPTED`; None: not yet.
 
         With a sentence as `error` where the window was not diagnosed; with that alone where
         nothing is known any more.
@@ -180,6 +181,9 @@ def _work(pipe: Any) -> None:
     from pprs_dynamics.inference.fit.reference_runs import read_reference
     from pprs_dynamics.physics.model.model_file import build_model
 
+    def said(live: LiveDiagnosis) -> dict[str, Any]:
+        return {**live.to_dict(), ADOPTED: live.adopted()}
+
     known: tuple[dict[str, Any], str, tuple[str, ...]] | None = None
     while True:
         try:
@@ -194,10 +198,10 @@ def _work(pipe: Any) -> None:
                 known = values, source, reference
             live = live.with_window(samples.recording('the last window', live.model.drives),
                                     int(samples.stamp[0]) / 1e9)
-            answer = live.to_dict()
+            answer = said(live)
         except PprsError as error:
             # What is known of this model stands, though this window says nothing.
-            kept = {**live.to_dict(), 'withdrawn': []} if known == (
+            kept = {**said(live), 'withdrawn': []} if known == (
                 values, source, reference) else {}
             answer = {**kept, 'error': str(error)}
         pipe.send(answer)

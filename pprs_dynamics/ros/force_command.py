@@ -270,7 +270,8 @@ class Feedforward:
         """Return what goes to a trajectory controller: it comes to rest if nothing follows.
 
         A last point in motion, where the drives would be for good without another message, is
-        followed by one at rest with its gravity, a constant deceleration later.
+        followed by one at rest with its gravity, a constant deceleration later. So is one that is
+        accelerated: a controller would hold the effort of its inertia for good.
 
         Parameters
         ----------
@@ -281,7 +282,7 @@ class Feedforward:
         """
         found = DriveTrajectory(answer.request.offsets, answer.forces.drive_motion, answer.effort)
         position, velocity, acceleration = found.drive_motion
-        if not duration or not velocity[-1].any():
+        if not duration or not (velocity[-1].any() or acceleration[-1].any()):
             return found
         rest = np.zeros_like(velocity[-1:])
         stop = np.clip(position[-1:] + velocity[-1:] * duration / 2, *self._limits.strokes)

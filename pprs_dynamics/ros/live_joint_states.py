@@ -13,7 +13,7 @@ import json
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -40,15 +40,7 @@ from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.measured_states import MeasuredStates
 from pprs_dynamics.ros.messages.status_codes import Rejection
-from pprs_dynamics.ros.model_transaction import (
-    ACTIVE,
-    PATIENCE,
-    RAMP,
-    RAMP_TIME,
-    restored,
-    running,
-    set_on_all,
-)
+from pprs_dynamics.ros.model_transaction import ACTIVE, PATIENCE, ModelSteps, running
 from pprs_dynamics.ros.node.qos import LATCHED, MEASURED, OFFERED
 from pprs_dynamics.system.numbers import finite
 
@@ -62,13 +54,6 @@ COMMANDS = {'std_msgs/msg/Float64MultiArray', 'sensor_msgs/msg/JointState',
 
 class UnconfirmedError(PprsError):
     """A person has confirmed another machine than the one that would be set, or none."""
-
-
-class NothingToRestoreError(PprsError):
-    """No model was set that could be taken back."""
-
-    def __init__(self) -> None:
-        super().__init__('nothing to restore: no model was set on the running nodes from here')
 
 
 class LiveJointStates(Node):
@@ -279,9 +264,8 @@ class LiveNodes:
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
         self._node = LiveJointStates(model, topic, monitor, feedforward, namespace=namespace,
                                      context=self._context)
-        self._base: Mapping[str, Any] = model.values
-        self._set_before: set[str] = set()
-        self._steps: list[tuple[ForceModel, dict[str, dict[str, Any]]]] = []
+        self._steps = ModelSteps(self._node.clients_of, model.values)
+        self._models: list[ForceModel] = []  # before each step
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name='live', daemon=True)
@@ -330,36 +314,23 @@ class LiveNodes:
         dict
             `is_set`, and `nodes`: what each said; '' where it took everything.
         """
-        # What was set once is set again: a number that is as it was given is so on the nodes, too.
-        keys = self._set_before | {
-            key for key, value in model.values.items()
-            if key != ACTIVE and not key.startswith('history.') and self._base.get(key) != value}
-        changes = {key: value for key, value in model.values.items() if key in keys}
-        changes |= {ACTIVE: list(model.values.get(ACTIVE, ())), RAMP_TIME: RAMP}
-        names = self._confirmed(confirmed)
-        answer = set_on_all(self._node.clients_of, names, dict.fromkeys(names, changes))
+        answer = self._steps.set_model(model.values, self._confirmed(confirmed))
         if answer.is_done:
-            self._set_before = keys
-            self._steps.append((self._node.model, answer.before))
+            self._models.append(self._node.model)
             self._node.use_model(model)
         return {'is_set': answer.is_done, 'nodes': answer.said}
 
     def restore(self, confirmed: str) -> dict[str, Any]:
         """Set the nodes back to what they had before the last model; see `set_model`."""
-        if not self._steps:
-            raise NothingToRestoreError
-        model, before = self._steps[-1]
-        names = [name for name in self._confirmed(confirmed) if name in before]
-        answer = set_on_all(self._node.clients_of, names, restored(before))
+        answer = self._steps.restore(self._confirmed(confirmed))
         if answer.is_done:
-            self._steps.pop()
-            self._node.use_model(model)
+            self._node.use_model(self._models.pop())
         return {'is_set': answer.is_done, 'nodes': answer.said}
 
     @property
     def can_restore(self) -> bool:
         """Whether a model was set that can be taken back."""
-        return bool(self._steps)
+        return self._steps.can_restore
 
     def _confirmed(self, confirmed: str) -> list[str]:
         """Return the names of the running nodes, where a person has confirmed just these."""

@@ -13,6 +13,8 @@ from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 
+from pprs_dynamics.errors import PprsError
+
 PATIENCE = 5.0  # [s] for a running node's answer
 ACTIVE = 'effects.active'
 RAMP_TIME = 'ramp_time'
@@ -22,6 +24,13 @@ RAMP = 2.0
 ABSENT, SILENT = 'does not run', f'has not answered within {PATIENCE:g} s'
 
 Values = Mapping[str, Any]
+
+
+class NothingToRestoreError(PprsError):
+    """No model was set that could be taken back."""
+
+    def __init__(self) -> None:
+        super().__init__('nothing to restore: no model was set on the running nodes from here')
 
 
 class NodeAnswer(NamedTuple):
@@ -91,9 +100,56 @@ def set_on_all(
     return NodeAnswer(True, said, before)
 
 
-def restored(before: Mapping[str, Values]) -> dict[str, dict[str, Any]]:
-    """Return the changes that set nodes back; see `NodeAnswer.before`."""
-    return {name: {**_restored(values), RAMP_TIME: RAMP} for name, values in before.items()}
+class ModelSteps:
+    """Models set on running nodes one after the other, and the way back.
+
+    Parameters
+    ----------
+    clients : mapping
+        By node; those that drive a machine last, see `set_on_all`.
+    given : mapping
+        Values of the model with which the nodes began.
+    """
+
+    def __init__(self, clients: Mapping[str, AsyncParameterClient], given: Values) -> None:
+        self.clients = clients
+        self._given, self._set_before = given, set[str]()
+        self._steps: list[Mapping[str, Values]] = []
+
+    def set_model(self, values: Values, names: Sequence[str]) -> NodeAnswer:
+        """Set a model's values on nodes, all or none."""
+        # What was set once is set again: a number that is as it was given is so on the nodes, too.
+        keys = self._set_before | {
+            key for key, value in values.items()
+            if key != ACTIVE and not key.startswith('history.') and self._given.get(key) != value}
+        changes = {key: value for key, value in values.items() if key in keys}
+        changes |= {ACTIVE: list(values.get(ACTIVE, ())), RAMP_TIME: RAMP}
+        answer = set_on_all(self.clients, names, dict.fromkeys(names, changes))
+        if answer.is_done:
+            self._set_before = keys
+            self._steps.append(answer.before)
+        return answer
+
+    def restore(self, names: Sequence[str]) -> NodeAnswer:
+        """Set nodes back to what they had before the last model.
+
+        Raises
+        ------
+        NothingToRestoreError
+        """
+        if not self._steps:
+            raise NothingToRestoreError
+        before = {name: values for name, values in self._steps[-1].items() if name in names}
+        answer = set_on_all(self.clients, list(before), {
+            name: {**_restored(values), RAMP_TIME: RAMP} for name, values in before.items()})
+        if answer.is_done:
+            self._steps.pop()
+        return answer
+
+    @property
+    def can_restore(self) -> bool:
+        """Whether a model was set that can be taken back."""
+        return bool(self._steps)
 
 
 def _restored(values: Values) -> dict[str, Any]:

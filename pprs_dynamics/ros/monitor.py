@@ -27,7 +27,7 @@ from pprs_dynamics.inference.residuals.live import (
     LiveComparison,
 )
 from pprs_dynamics.physics.model.keys import is_mechanism
-from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindows
+from pprs_dynamics.ros.diagnosis_worker import ADOPTED, DiagnosisWorker, StreamWindows
 from pprs_dynamics.ros.force_command import FRAME
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
@@ -37,6 +37,7 @@ from pprs_dynamics.ros.node.all_joints import AllJoints
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.managed_node import AUTOSTART, ManagedNode
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
+from pprs_dynamics.ros.node.model_services import ModelServices, NotAdoptedError
 from pprs_dynamics.ros.node.parameters import NodeParameter, overrides, own_parameter
 from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import hardware_of
@@ -70,6 +71,8 @@ PARAMETERS = (
                   upper=3600.0, stays=True),
     own_parameter('diagnose_since', (), 'recordings of days on which the machine was right: '
                   'windows are diagnosed for what has changed since then', stays=True),
+    own_parameter('feedforward', 'feedforward', 'node that gets what ~/adopt_confirmed sets, '
+                  'absolute or in the namespace of this one', stays=True),
 )
 
 # Of the samples of a second: from fewer compared ones on the stream is called broken.
@@ -102,7 +105,13 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
                           **dict.fromkeys(REJECTIONS, 0)}
         self._share, self._counted = 1.0, (0, 0)
         self._joints = AllJoints()
+        self._adoptable: dict[str, Any] = {}  # values of the model with what is claimed
+        self._diagnosed = self._settings.model  # the latest window against it
         self._begin_stream()
+        self._model_services = ModelServices(
+            self, own['feedforward'],
+            lambda: (self._settings.model.fingerprint, self._settings.model.values),
+            self._to_adopt, self._forget)
         self._status = StatusReporter(
             self, {}, self._counters, hardware_of(self._settings.model), self._refresh)
         self.begin(own[AUTOSTART.name])
@@ -259,6 +268,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         if self.state != 'active':
             return
         if (answer := self._worker.poll()) is not None:
+            self._adoptable = answer.pop(ADOPTED, {})
             if error := answer.pop('error', ''):
                 self.get_logger().warning(f'a window was not diagnosed: {error}')
                 answer = {'effects': [], 'confirmed': False, 'since': None, **answer,
@@ -269,9 +279,25 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
             self._changed = changed
             self._diagnosis.publish(String(data=json.dumps(for_json(answer))))
         if not self._worker.busy and (samples := self._windows.take()) is not None:
-            model = self._settings.model
+            self._diagnosed = model = self._settings.model
             self._worker.submit(model.values, model.source, samples,
                                 tuple(self._settings.own['diagnose_since']))
+
+    def _to_adopt(self) -> dict[str, Any]:
+        """Return what a person may adopt now, or raise PprsError."""
+        if self._diagnosed.values != self._settings.model.values:
+            raise NotAdoptedError('the latest window was diagnosed against another model than is '
+                                  'in force')
+        if not self._changed:
+            raise NotAdoptedError('no effect is confirmed')
+        if not self._adoptable:
+            raise NotAdoptedError('the latest window names other effects than are confirmed, and '
+                                  'its numbers were fitted together; the next one decides')
+        return self._adoptable
+
+    def _forget(self) -> None:
+        """Claim nothing of a model that is in force no more."""
+        self._changed, self._adoptable = '', {}
 
     def destroy_node(self) -> None:
         """Take the process that diagnoses along."""

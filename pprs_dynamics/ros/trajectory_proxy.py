@@ -31,7 +31,7 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.preparation import prepare
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.ros.force_command import Feedforward, parameters_for
+from pprs_dynamics.ros.force_command import DriveTrajectory, Feedforward, parameters_for
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.serialisation import CommandObjects
@@ -58,6 +58,9 @@ TIMEOUT = own_parameter('controller_timeout', 5.0, 'silence of the controller af
                         'is aborted [s]; 0: only where it has gone', lower=0, upper=3600)
 Goal = FollowJointTrajectory.Goal
 Result = FollowJointTrajectory.Result
+# [s] after the last point of a goal at rest in which its inertia's effort goes over to none: the
+# controller holds the effort of the very last point until it is told another.
+SETTLING = 0.02
 STILL = 1.1920929e-07  # [m/s, rad/s] joint_trajectory_controller's own bound for standing
 ERROR_CODES = {'NAMES': Result.INVALID_JOINTS}  # of rejections; INVALID_GOAL for all others
 
@@ -171,8 +174,11 @@ class TrajectoryProxyNode(ExplainsRefusals):
         model, own = self._settings.model, self._settings.own
         feedforward = Feedforward(model, own)
         answer = feedforward.answer(self._request(model, goal))
+        drives = DriveTrajectory(answer.request.offsets, answer.forces.drive_motion, answer.effort)
+        if np.abs(drives.drive_motion[1][-1]).max() <= STILL:  # else it is refused
+            drives = feedforward.ending_at_rest(answer, SETTLING)
         trajectory = CommandObjects(RobotNames.of(model)).joint_trajectory(
-            0, answer.request.offsets, answer.forces, answer.effort)
+            0, drives.offsets, drives, drives.effort)
         given = goal.trajectory if goal.trajectory.points else goal.multi_dof_trajectory
         trajectory.header = given.header  # a stamp of 0 means: at once, when it arrives
         return Goal(

@@ -57,6 +57,7 @@ def test_a_change_is_claimed_on_the_second_window_that_shows_it_and_withdrawn_af
     assert live.effects == ()
     live = live.with_window(window(model, heavier, 1, SOONER), LENGTH)
     assert live.claimed == ()  # named by one window only
+    assert live.adopted() == {}
     live = live.with_window(window(model, heavier, 2), 2 * LENGTH)
     live = live.with_window(window(model, heavier, 3), 3 * LENGTH)
     assert [effect.found.name for effect in live.claimed] == ['payload_mass']
@@ -65,6 +66,12 @@ def test_a_change_is_claimed_on_the_second_window_that_shows_it_and_withdrawn_af
     assert abs(found.value - ADDED) < 4 * found.std + 0.01 * ADDED
     assert live.to_dict()['confirmed'] is True
     assert live.to_dict()['text'].startswith('payload mass: mass')
+    motion = Excitation(1.0, seed=9).motion(np.arange(0, 1.0, 0.1))
+    off = [DriveModel.from_parameters(values).drive_forces(motion).total
+           - heavier.drive_forces(motion).total for values in (model.values, live.adopted())]
+    assert np.abs(off[1]).max() < 0.05 * np.abs(off[0]).max()
+    beside = replace(live, effects=(*live.effects, replace(live.claimed[0], confirmed=False)))
+    assert beside.adopted() == {}  # the numbers were fitted together
     live = live.with_window(window(model, model, 4), 4 * LENGTH)
     assert live.claimed == ()
     assert [effect.found.name for effect in live.withdrawn] == ['payload_mass']

@@ -23,7 +23,12 @@ from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.inference.diagnosis import live_diagnosis
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.ros import diagnosis_worker
-from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindow, StreamWindows
+from pprs_dynamics.ros.diagnosis_worker import (
+    ADOPTED,
+    DiagnosisWorker,
+    StreamWindow,
+    StreamWindows,
+)
 
 SECOND = 1_000_000_000
 EPOCH = 1_700_000_000 * SECOND
@@ -150,6 +155,9 @@ class Claiming:
     def to_dict(self) -> dict[str, Any]:
         return {'text': self.text, 'confirmed': bool(self.text), 'withdrawn': ['gone before']}
 
+    def adopted(self) -> dict[str, Any]:
+        return {'masses.payload': 1.0} if self.text else {}
+
 
 def test_what_is_claimed_stands_where_a_window_cannot_be_diagnosed(
     monkeypatch: pytest.MonkeyPatch,
@@ -164,6 +172,7 @@ def test_what_is_claimed_stands_where_a_window_cannot_be_diagnosed(
     diagnosis_worker._work(pipe)
     claimed, failed, unknown = pipe.answers
     assert claimed['text'] == failed['text'] == 'payload mass'
+    assert claimed[ADOPTED] == failed[ADOPTED] == {'masses.payload': 1.0}
     assert 'slide_1' in failed['error']
     assert failed['withdrawn'] == []
     assert set(unknown) == {'error'}

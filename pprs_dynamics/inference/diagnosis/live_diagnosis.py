@@ -175,6 +175,21 @@ class LiveDiagnosis:
         """The confirmed effects."""
         return tuple(effect for effect in self.effects if effect.confirmed)
 
+    def adopted(self) -> dict[str, Any]:
+        """Return the values of the model with what is claimed; none where that cannot be adopted.
+
+        Numbers of a window were fitted together: with one effect that is not confirmed among them
+        those of the others are not what they are without it. They are not known either where what
+        is claimed is not named by the latest window.
+        """
+        if self.last is None or not self.effects or not all(
+                effect.confirmed for effect in self.effects):
+            return {}
+        named = {effect['name'] for effect in self.last.diagnosis['effects']}
+        if {effect.found.name for effect in self.effects} != named:
+            return {}
+        return dict(self.last.adopted.values)
+
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON of `pprs diagnose` on the latest window, with since and confirmed."""
         content = dict(self.last.diagnosis) if self.last is not None else {}

@@ -123,11 +123,15 @@ class GoalRelay:
         if self.server_is_there():
             return True
         found: Future[bool] = Future()
-        deadline = time.monotonic() + DISCOVERY
+        deadline, was_there = time.monotonic() + DISCOVERY, False
 
         def look() -> None:
-            if not found.done() and (self.server_is_there() or time.monotonic() > deadline):
+            nonlocal was_there
+            # Discovery is one-sided: a server may see us a moment after we see it, and its answer
+            # to a goal in between is lost.
+            if not found.done() and (was_there or time.monotonic() > deadline):
                 found.set_result(self.server_is_there())
+            was_there = self.server_is_there()
 
         timer = steady_timer(self._node, LOOK_PERIOD, look)
         try:
