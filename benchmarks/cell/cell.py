@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import tempfile
 import time
@@ -183,6 +184,10 @@ class Cell:
         self._managers.append(self.run(
             [f'{prefix}/lib/controller_manager/ros2_control_node'], '-r', f'__ns:={where or "/"}',
             '--params-file', str(file)))
+
+    def end_manager(self, how: signal.Signals) -> None:
+        """Send a signal to the controller manager that was started last, and miss it no more."""
+        self._managers.pop().send_signal(how)
 
     def activate(self, *names: str, namespace: str = '') -> None:
         """Load, configure and activate controllers, as a spawner does."""

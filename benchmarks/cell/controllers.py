@@ -42,6 +42,7 @@ PASSED_ON = ('position', 'effort')  # command interfaces: a drive's own loop, an
 STOP_TIME = 0.1  # [s] by default of feedforward.launch.py
 DROPPED = {'late': 'ends in the past', 'moves at the end': 'Velocity of last trajectory point',
            'efforts': 'Trajectories with effort fields', 'joints': "don't match the controller"}
+ENDED_BY = {'killed': signal.SIGKILL, 'stopped': signal.SIGSTOP}
 SAME = 1e-9  # [N] commands that are that near are one
 NEAR = 0.05  # [N] of the gravity: that near it is held
 HALF_WAY = 2.0  # [s] into the path, where streams and goals are broken off
@@ -202,6 +203,9 @@ def goal(ending: str) -> dict[str, Any]:
         elif ending == 'deactivated':
             running.spin(HALF_WAY)
             running.switch(deactivate=[JTC])
+        elif ending in ENDED_BY:
+            running.spin(HALF_WAY)
+            running.end_manager(ENDED_BY[ending])
         asked = time.monotonic()
         running.wait(result.done, 'a result', DEADLINE)
         ended = time.monotonic()
@@ -209,7 +213,7 @@ def goal(ending: str) -> dict[str, Any]:
         found = {'code': answer.result.error_code, 'says': answer.result.error_string,
                  'answer after [s]': round(ended - asked, 3)}
         running.spin(1.0)
-        if ending != 'deactivated':
+        if ending != 'deactivated' and ending not in ENDED_BY:
             when, position, _, effort = states.since(ended - 0.2)
             gravity = gravity_of(position[-1])
             found |= {'without gravity [s]': without(when, effort, gravity),
@@ -414,6 +418,8 @@ CASES: dict[str, Callable[[], dict[str, Any]]] = {
     'goal canceled': lambda: goal('canceled'),
     'goal aborted': lambda: goal('aborted'),
     'goal deactivated': lambda: goal('deactivated'),
+    'goal, controller killed': lambda: goal('killed'),
+    'goal, controller stopped': lambda: goal('stopped'),
     'two robots': two_robots,
     'monitor': monitored,
     'loop of the drives 100 Hz': lambda: loop(100.0),

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import replace
 from typing import Any
 
@@ -40,7 +41,7 @@ from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParam
 from pprs_dynamics.ros.node.model_services import ModelServices, NotAdoptedError
 from pprs_dynamics.ros.node.parameters import NodeParameter, overrides, own_parameter
 from pprs_dynamics.ros.node.preparation import prepare_beside
-from pprs_dynamics.ros.node.provenance import hardware_of
+from pprs_dynamics.ros.node.provenance import files_given, hardware_of
 from pprs_dynamics.ros.node.qos import (
     EVERY_MESSAGE,
     LATCHED,
@@ -104,6 +105,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._counters = {'received': 0, 'samples': 0, 'compared': 0, 'gaps': 0, 'bridged': 0,
                           **dict.fromkeys(REJECTIONS, 0)}
         self._share, self._counted = 1.0, (0, 0)
+        self._files = files_given(options.get('cli_args') or sys.argv)
         self._joints = AllJoints()
         self._adoptable: dict[str, Any] = {}  # values of the model with what is claimed
         self._diagnosed = self._settings.model  # the latest window against it
@@ -114,6 +116,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
             self._to_adopt, self._forget)
         self._status = StatusReporter(
             self, {}, self._counters, hardware_of(self._settings.model), self._refresh)
+        self._refresh()
         self.begin(own[AUTOSTART.name])
 
     # --- life -----------------------------------------------------------------------------------
@@ -261,7 +264,9 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         # The first window, and what is still on its way, is none that is missing.
         if came >= ENOUGH and compared > came:
             self._share = min(1.0, were / came)
-        self._status.facts['compared_share'] = round(self._share, 3)
+        self._status.facts.update(
+            compared_share=round(self._share, 3),
+            model={'files': self._files, 'sha256': self._settings.model.fingerprint})
 
     def _diagnose(self) -> None:
         """Pass on what the worker has found, and give it the next window."""

@@ -71,6 +71,11 @@ def test_what_is_claimed_is_set_on_both_nodes_and_restored_on_both(running: Runn
     assert 'feedforward: set' in answer.message
     assert running.forces() == [OFFSET, OFFSET]
     assert not running.monitor._changed  # of the model that was in force
+    hashes = [each._settings.model.fingerprint for each in (running.monitor, running.feedforward)]
+    assert hashes[0] == hashes[1]
+    running.bench.follow_status('/monitor/status')
+    assert running.bench.spin_until(
+        lambda: running.bench.status and running.bench.status[-1]['model']['sha256'] == hashes[0])
     answer = running.call('restore')
     assert answer.success, answer.message
     assert running.forces() == [0.0, 0.0]
