@@ -16,7 +16,7 @@ COUNT = len(DRIVES)
 
 # Units of a drive that pushes, and of the same quantity of one that turns.
 TURNED = {'m': 'rad', 'm/s': 'rad/s', 'm/s^2': 'rad/s^2', 'N': 'N m', 'kg': 'kg m^2',
-          'N s/m': 'N m s/rad', 'N s^2/m^2': 'N m s^2/rad^2', 'N/m': 'N m/rad',
+          'N s/m': 'N m s/rad', 'N s^2/m^2': 'N m s^2/rad^2', 'N/m': 'N m/rad', 'm/N': 'rad/(N m)',
           'N/K': 'N m/K', 'N s/m/K': 'N m s/rad/K'}
 
 
@@ -57,8 +57,9 @@ def common_unit(units: Sequence[DriveUnits], unit: str) -> str:
     return ' or '.join(sorted({one.of(unit) for one in units})) or unit
 
 
-# What may be measured of drives beside their motion and effort, and its unit.
-CHANNELS = {'temperature': 'degC', 'pressure': 'Pa'}
+# What may be measured of drives beside their motion and effort, and its unit in one that pushes:
+# also the position of the link, behind the gear, where a second encoder tells it.
+CHANNELS = {'temperature': 'degC', 'pressure': 'Pa', 'link_position': 'm'}
 
 # A column of a table by its name, or by its number from 1. `name[k]` is element k, from 0, of a
 # column that holds lists; a dot is between a structure and its field.

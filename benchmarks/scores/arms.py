@@ -42,7 +42,8 @@ from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.simulation.arm_forms import NAMES
 
 
-def run_case(case: tuple[str, int], model: Path, duration: float, thermometers: bool) -> Outcome:
+def run_case(case: tuple[str, int], model: Path, duration: float, beside: Sequence[str] = (),
+             ) -> Outcome:
     """Simulate and diagnose the recording of effects, joined by +, and a seed."""
     effect, seed = case
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
@@ -51,7 +52,7 @@ def run_case(case: tuple[str, int], model: Path, duration: float, thermometers: 
         hidden = [word for name in effect.split('+') if name for word in ('--effect', name)]
         status = pprs(['simulate', '--model', str(model), '--output', run, '--seed', str(seed),
                        '--path-seed', str(seed), '--duration', str(duration), '--json', truth,
-                       *(['--thermometers'] if thermometers else []), *hidden])
+                       *beside, *hidden])
         begin = time.process_time()
         status = status or pprs(['diagnose', run, '--model', str(model), '--json', said])
         seconds = time.process_time() - begin
@@ -174,10 +175,10 @@ def todo(model: Path, seeds: int, nothing: int, sets: int, only: Sequence[str] =
 
 
 def run(model: Path, seeds: int, nothing: int, sets: int, duration: float, file: Path,
-        each: Each, only: Sequence[str] = (), thermometers: bool = False) -> None:
+        each: Each, only: Sequence[str] = (), beside: Sequence[str] = ()) -> None:
     """Run the cases that are not in a file of outcomes yet; append and print theirs."""
     run_missing(each, partial(run_case, model=model.resolve(), duration=duration,
-                              thermometers=thermometers),
+                              beside=beside),
                 {case: case for case in todo(model, seeds, nothing, sets, only)}, file,
                 lambda outcome: (outcome['effect'], outcome['seed']), described)
 
@@ -193,14 +194,15 @@ def main() -> int:
     parser.add_argument('--only', metavar='NAME', nargs='+', default=(), choices=NAMES,
                         help='effects that are hidden (default: all): a new one beside what it '
                         'might be taken for')
-    parser.add_argument('--thermometers', action='store_true',
-                        help='record temperatures whatever is hidden')
+    for name, what in (('--thermometers', 'temperatures'), ('--link-encoders', 'links')):
+        parser.add_argument(name, action='append_const', dest='beside', const=name, default=[],
+                            help=f'record {what} whatever is hidden')
     parser.add_argument('--duration', type=float, default=40.0, help='[s] (default 40)')
     parser.add_argument('--table', type=Path, help='write the table of all outcomes in FILE')
     options = parser.parse_args()
     with engine(options) as each:
         run(options.model, options.seeds, options.nothing, options.sets,
-            options.duration, options.file, each, options.only, options.thermometers)
+            options.duration, options.file, each, options.only, options.beside)
     text = table(read_outcomes(options.file))
     if options.table:
         options.table.write_text(text)

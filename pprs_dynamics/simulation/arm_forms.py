@@ -109,6 +109,13 @@ def _slipping(position: Array, force: float, stroke: float) -> Array:
 SIZE = _share(0.03, 0.1)  # of the largest effort
 
 
+def _stop(m: JointMoment, side: float, reach: float, force: float) -> dict[str, float]:
+    """Return a stop at a share of the stroke from its end, and the stiffness for a force there."""
+    end, stroke = float((side * m.position).max()), float(np.ptp(m.position))
+    return {'stiffness': force / (reach * stroke) ** 1.5, 'side': side,
+            'position': side * (end - reach * stroke)}
+
+
 def _accumulator(p: Mapping[str, float], m: JointMoment) -> Array:
     """Return the torque of a cylinder whose oil a bladder of nitrogen drives, by its two ends."""
     angle = m.position - p['position']
@@ -182,6 +189,14 @@ FORMS: dict[str, JointForm] = {
                             np.ptp(m.position)) / 12},
         lambda p, m: p['force'] * (np.sin(2 * np.pi * m.position / p['pitch'] + p['phase'])
                                    + 0.25 * np.sin(4 * np.pi * m.position / p['pitch']))),
+    'stop_contact': JointForm(
+        'k x^(3/2) (1 + v / (2 v_0)) beyond q_s on one side, x the way beyond it, v the speed into '
+        'it',
+        lambda rng, m: _stop(m, float(rng.choice((-1.0, 1.0))), float(rng.uniform(0.05, 0.2)),
+                             3 * SIZE(rng) * m.effort),
+        lambda p, m: p['side'] * p['stiffness'] * np.maximum(
+            p['side'] * (m.position - p['position']), 0.0) ** 1.5
+        * (1 + p['side'] * m.velocity / (2 * m.speed))),
     'counterbalance': JointForm(
         'p A dl/dq, p = p_0 (V_0 / V)^1.3, V falls by a third as the cylinder is drawn out',
         lambda rng, m: {'force': 5 * SIZE(rng) * m.effort, 'arm': float(rng.uniform(0.35, 0.75)),
@@ -195,7 +210,7 @@ FORMS: dict[str, JointForm] = {
 # Of the arm as a whole: the payload's size as a share of the arm's mass, and so on.
 OF_ARM = ('payload_mass', 'link_mass', 'base_tilt', 'external_wrench', 'effort_gain', 'time_delay',
           'effort_filter', 'homing_error', 'lost_motion', 'eccentric_encoder', 'joint_friction',
-          'coupled_drives', 'current_gain')
+          'coupled_drives', 'current_gain', 'elastic_joint')
 NAMES = (*FORMS, *OF_ARM)
 
 

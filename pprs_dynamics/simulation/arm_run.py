@@ -52,7 +52,8 @@ from pprs_dynamics.simulation.sensors import ButterworthFilter, EffortFilter
 from pprs_dynamics.simulation.temperatures import REFERENCE, Climate, read_thermometers
 
 RATE = 100.0  # [Hz]
-CLIMATE = 45  # second seed of temperatures
+CLIMATE, SECOND = 45, 46  # second seeds: of temperatures, of second encoders
+MOUNTED = 0.01  # [rad, m], by which second encoders have other zeros
 HARMONICS = 8
 FASTEST, WIDEST = 0.35, 1.5  # of the top speed; from the middle of the range [rad, m]
 QUICKEST = 3.0  # [rad/s^2, m/s^2]
@@ -80,7 +81,7 @@ class ArmRun:
     effects : tuple of dict
         What was hidden.
     channels : mapping of str to (N, n) array
-        What thermometers say, where temperature matters.
+        What thermometers say, where temperature matters, and second encoders.
     """
 
     motion: JointMotion
@@ -366,7 +367,7 @@ def draw_motion(model: MechanismModel, duration: float, seed: int, rate: float =
 def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: float = 1.0,
                  noise: float | None = None, duration: float = 40.0, path_seed: int = 0,
                  progress: Callable[[float], None] | None = None, thermometers: bool = False,
-                 ) -> ArmRun:
+                 link_encoders: bool = False) -> ArmRun:
     """Return a recording of an arm with hidden effects.
 
     Parameters
@@ -386,7 +387,7 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
     path_seed : int
         Of the motion.
     progress : callable, optional
-    thermometers : bool
+    thermometers, link_encoders : bool
         Whether they take part where no effect needs them.
 
     Raises
@@ -432,6 +433,10 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
         hidden.append(truth('external_wrench', None, {'force_z': float(engine.wrench[2])},
                             'at the tool'))
     bodies = engine.torques(motion, passive) if hidden else plain
+    windup = np.zeros_like(bodies)
+    if 'elastic_joint' in chosen:
+        windup, drawn = _wind_up(model, motion, bodies, random, scale)
+        hidden.append(drawn)
     lead = np.zeros_like(motion.position)
     if 'lost_motion' in chosen:
         by_load, lead, drawn = _lost_motion(model, motion, bodies, random, scale)
@@ -441,9 +446,12 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
             lead = np.zeros_like(lead)
     if progress is not None:
         progress(0.8)
-    efforts = bodies + _own_friction(model, engine, motion)
-    largest = np.abs(efforts).max(axis=0)
     assert motion.time is not None
+    wound = np.gradient(windup, motion.time, axis=0)
+    efforts = bodies + _own_friction(model, engine, replace(
+        motion, velocity=motion.velocity + wound,
+        acceleration=motion.acceleration + np.gradient(wound, motion.time, axis=0)))
+    largest = np.abs(efforts).max(axis=0)
     # Random numbers of its own, so that what else is drawn does not depend on the weather.
     temperature = Climate.draw(np.random.default_rng((seed, CLIMATE)), len(largest)).along(
         motion.time, motion.velocity)
@@ -482,12 +490,50 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
         hidden.append(truth('homing_error', [model.drives[joint]], {
             model.drives[joint]: {'zero': float(shift[joint])}}, 'positions shifted'))
     sigma = np.full(len(largest), noise) if noise is not None else 0.005 * largest
-    position = read.position + lead + shift + ENCODER * random.uniform(
-        -0.5, 0.5, motion.position.shape)
-    return ArmRun(motion, position, efforts + _noise(random, efforts.shape) * sigma,
-                  tuple(hidden), {
-                      'temperature': read_thermometers(motion.time, temperature)}
-                  if thermometers or {*chosen} & {'friction_temperature', 'current_gain'} else {})
+    beside = lead + shift
+    measured = efforts + _noise(random, efforts.shape) * sigma
+    channels = {}
+    if thermometers or {*chosen} & {'friction_temperature', 'current_gain'}:
+        channels['temperature'] = read_thermometers(motion.time, temperature)
+    if link_encoders or 'elastic_joint' in chosen:
+        second = np.random.default_rng((seed, SECOND))  # not mounted at quite the same angle
+        channels['link_position'] = (
+            motion.position + beside + second.normal(0, MOUNTED, len(largest))
+            + ENCODER * second.uniform(-0.5, 0.5, beside.shape))
+    position = read.position + beside + windup + ENCODER * random.uniform(
+        -0.5, 0.5, beside.shape)
+    return ArmRun(motion, position, measured, tuple(hidden), channels)
+
+
+def _wind_up(model: MechanismModel, motion: JointMotion, loads: Array, random: np.random.Generator,
+             scale: float) -> tuple[Array, dict[str, Any]]:
+    """Return by how much a motor leads its link because of its load, (N, D), and how.
+
+    A harmonic drive that stiffens, w + (w / w_1)^2 w = tau / k, and creeps: a share of it comes
+    late, by a relaxation (a standard linear solid). It is in a joint that turns, where there is
+    one behind the first: a slide that carries no weight would not feel it.
+    """
+    later = range(1, len(model.drives))
+    joint = int(random.choice([j for j in later if model.units[j].turns] or later))
+    slides_in_loop = model.robot.structure.loops and not model.units[joint].turns
+    largest = float(np.abs(loads[:, joint]).max())
+    span = scale * float(random.uniform(0.02, 0.05)) * (SHIFT_OF_SLIDE if slides_in_loop else 1.0)
+    late, time = float(random.uniform(0.05, 0.2)), float(random.uniform(0.02, 0.1))
+    assert motion.time is not None
+    step = float(np.median(np.diff(motion.time)))
+    load = loads[:, joint] / largest
+    kept, crept = np.exp(-step / time), load.copy()
+    for k in range(1, len(load)):
+        crept[k] = kept * crept[k - 1] + (1 - kept) * load[k]
+    felt = (1 - late) * load + late * crept
+    # The real root of x + x^3 / 4 = felt, x = w / span.
+    x = 4 / np.sqrt(3) * np.sinh(np.arcsinh(0.75 * np.sqrt(3) * felt) / 3)
+    windup = np.zeros_like(loads)
+    windup[:, joint] = span * x
+    return windup, truth(
+        'elastic_joint', [model.drives[joint]], {model.drives[joint]: {
+            'compliance': span / largest, 'loss': late * time}},
+        'tau / tau_0 = x + x^3 / 4, x = w / w_0, a share of it late by a relaxation')
 
 
 def _behind_encoder(model: MechanismModel, read: JointMotion, random: np.random.Generator,

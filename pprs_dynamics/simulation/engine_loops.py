@@ -22,14 +22,13 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.tree_equations import AXES, KIND, LOOP, TRANSLATION
-from pprs_dynamics.simulation.engine_state import EngineState, couplings
+from pprs_dynamics.simulation.engine_state import LEAST_SINGULAR, EngineState, couplings
 
 CLOSED = 1e-11  # [m, rad], of Newton's last step
 MOST_STEPS = 40
 STRIDE = 0.05  # [m, rad] of a drive, from where loops were closed last
 FEW_STEPS = 12  # after which derivatives are computed anew
 MOVE = 1e-4  # [m, rad], by which a joint moves for derivatives of derivatives
-LEAST_SINGULAR = 1e-8  # of the largest singular value; closures may say a thing twice
 
 
 class ClosedMotion(NamedTuple):
@@ -206,7 +205,7 @@ class EngineLoops:
         if self.is_open:
             data.qpos[self._places] = position
             data.qvel[state.drives], data.qacc[state.drives] = velocity, acceleration
-            return self._given.T
+            return self._given[:self._count].T
         self.close(position)
         there = data.qpos.copy()
         inverse = self._solved()

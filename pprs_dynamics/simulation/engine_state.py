@@ -14,7 +14,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.structure import Structure
 
-LEAST_SINGULAR = 1e-10  # of the largest singular value; closures may say a thing twice
+LEAST_SINGULAR = 1e-8  # of the largest singular value; closures may say a thing twice
 
 
 def couplings(structure: Structure) -> list[tuple[str, str, float, float]]:

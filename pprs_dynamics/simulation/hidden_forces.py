@@ -207,6 +207,18 @@ def drive_spring(m: DriveMoment, stiffness: Array, rest: Array, hardening: Array
     return stiffness * x * (1 + (x / hardening) ** 2)
 
 
+@DriveForce.by_law('s k x^(3/2) (1 + c s v), x = s (q - q_m) - reach where that is above 0',
+                   stiffness=Range('N/m^1.5', 180.0, 530.0, 'log', scales=True),
+                   side=Range('1', -1, 1, 'sign', neutral=1.0),
+                   middle=Range('m', -0.005, 0.005, lifts=(0.2, 0.21)),
+                   reach=Range('m', 0.022, 0.035), damping=Range('s/m', 0.0, 3.0))
+def stop_contact(m: DriveMoment, stiffness: Array, side: Array, middle: Array, reach: Array,
+                 damping: Array) -> Array:
+    """A rubber bumper (Hertz) with damping by its compression (Hunt and Crossley)."""
+    x = np.maximum(side * (m.position - middle) - reach, 0.0)
+    return side * stiffness * x ** 1.5 * (1 + damping * side * m.velocity)
+
+
 @DriveForce.by_law('A (sin(2 pi q / p + phi) + a_2 sin(4 pi q / p + phi_2))',
                    force=Range('N', 0.25, 0.8, 'log', scales=True),
                    pitch=Range('m', 0.003, 0.012, 'log', neutral=1.0), phase=PHASE,

@@ -23,6 +23,7 @@ from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.candidates import Prices
 from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.fitted_model import linear_error
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.library import Library
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths
@@ -295,8 +296,11 @@ def test_what_shows_beside_others_alone_is_confirmed() -> None:
     found, _ = case('pairs', *names, seed=703, snr=0.0)
     assert sorted(one.name for one in found.effects) == sorted(names)
     assert not found.unconfirmed
-    tilt = next(one for one in found.effects if one.name == 'base_tilt')
-    assert tilt.error_after > tilt.error_before
+    assert found.selection is not None
+    fits, one = found.selection.last, {each.name: each for each in found.selection.order}
+    without_tilt = fits.evaluate((one['friction_drift'],))
+    with_tilt = fits.evaluate((one['friction_drift'], one['base_tilt']))
+    assert linear_error(fits, with_tilt) > linear_error(fits, without_tilt)
 
 
 def test_a_search_goes_on_from_a_set_that_holds_around_itself() -> None:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Encoders that are not where the link is: clearances that loads or reversals cross, windup."""
+"""Encoders that are not where the link is: clearances that loads or reversals cross."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ import pytest
 from planar_arm import planar_arm
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import UnknownNameError
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
@@ -30,7 +31,7 @@ NOISE = 0.05  # [N m]
 
 def on_swing(**parameters: float) -> dict[str, object]:
     """Return the block of a model file."""
-    every = {'backlash': 0.0, 'play': 0.0, 'windup': 0.0, **parameters}
+    every = {'backlash': 0.0, 'play': 0.0, **parameters}
     return {'effects.active': ['lost_motion'],
             **{f'effects.lost_motion.swing.{name}': value for name, value in every.items()}}
 
@@ -84,11 +85,18 @@ def test_motion_within_a_play_and_without_a_reversal_is_as_read() -> None:
     np.testing.assert_array_equal(behind_play(shaken, 0.02), shaken)
 
 
-def test_loads_choose_the_flank_and_wind_up() -> None:
-    effect = LostMotion({'lift_1': {'backlash': 0.004, 'play': 0.01, 'windup': 2e-5}})
+def test_loads_choose_the_flank() -> None:
+    effect = LostMotion({'lift_1': {'backlash': 0.004, 'play': 0.01}})
     load = np.array([[5.0, -30.0], [5.0, 10.0]])
     error = effect.loaded_position_error(('slide_1', 'lift_1'), load)
-    np.testing.assert_allclose(error, [[0.0, -0.002 - 6e-4], [0.0, 0.002 + 2e-4]], rtol=1e-12)
+    np.testing.assert_allclose(error, [[0.0, -0.002], [0.0, 0.002]], rtol=1e-12)
+
+
+def test_a_windup_of_nothing_in_an_older_file_is_none() -> None:
+    values = {'swing': {'backlash': 0.01, 'play': 0.0, 'windup': 0.0}}
+    assert LostMotion.from_file(values).drives == {'swing': {'backlash': 0.01, 'play': 0.0}}
+    with pytest.raises(UnknownNameError, match='windup'):
+        LostMotion.from_file({'swing': {**values['swing'], 'windup': 1e-5}})
 
 
 @pytest.mark.parametrize('size', [0.008, 0.03])

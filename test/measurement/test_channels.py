@@ -75,11 +75,21 @@ def test_a_column_that_is_not_there_is_told(tmp_path):
 
 @pytest.mark.parametrize('name', ['run.csv', 'run.mcap', 'bag'])
 def test_what_is_written_is_read_again(tmp_path, name):
-    channels = {'temperature': np.column_stack([np.full(200, np.nan), SELDOM])}
+    channels = {'temperature': np.column_stack([np.full(200, np.nan), SELDOM]),
+                'link_position': np.column_stack([POSITION[:, 0] + 0.01, np.full(200, np.nan)])}
     written = Recording.from_arrays('x', TIME, POSITION, None, EFFORT, JOINTS, channels)
     write_recording(tmp_path / name, written)
-    found = read(tmp_path / name).channels['temperature']
-    np.testing.assert_allclose(found, channels['temperature'])
+    found = read(tmp_path / name).channels
+    for channel, values in channels.items():
+        np.testing.assert_allclose(found[channel], values)
+
+
+def test_positions_of_links_are_in_the_unit_of_positions(tmp_path):
+    turned = np.degrees(POSITION[:, 0])
+    file = table(tmp_path / 'a.csv', motor=turned, link=turned - 1.0)
+    found = read(file, j1__position='motor', j1__link_position='link',
+                 j1__position_scale=np.pi / 180).channels['link_position']
+    np.testing.assert_allclose(found[:, 0], POSITION[:, 0] - np.radians(1.0))
 
 
 def test_dropped_samples_take_their_temperature_with_them():

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,7 @@ from pprs_dynamics.physics.effects.laws.gear_efficiency import GearEfficiency
 from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
 from pprs_dynamics.physics.effects.laws.load_friction import LoadFriction
 from pprs_dynamics.physics.effects.laws.quadratic_friction import QuadraticFriction
+from pprs_dynamics.physics.effects.laws.stop_contact import StopContact
 from pprs_dynamics.physics.effects.laws.stribeck_friction import StribeckFriction
 from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 
@@ -127,6 +128,10 @@ def random_values(effect, rng):
                            'thinning': 25.0},
      {'v': -0.2, 'load': 40.0}, 0.3 + 1.0 * (1 - math.exp(-0.6))),
     (DriveSpring, {'stiffness': 20.0, 'position': 0.05}, {'q': 0.2}, 3.0),
+    *((StopContact, {'upper': 300.0, 'lower': 200.0, 'position': 0.05}, {'q': q, 'v': v}, force)
+      for q, v, force in ((0.07, 0.1, 6.0), (0.07, -0.1, 6.0), (0.02, 0.1, -6.0))),
+    (StopContact, {'upper': 300.0, 'position': 0.05}, {'q': 0.02}, 0.0),
+    (StopContact, {'lower': 200.0, 'position': 0.05}, {'q': 0.07}, 0.0),
     (ForceRipple, {'force': 0.5, 'phase': math.pi / 6, 'pitch': 0.004}, {'q': 0.001},
      0.4330127),  # 0.5 cos(30 deg)
     (ForceRipple, {'force': 0.5, 'phase': math.pi / 6, 'pitch': 0.004, 'second': 0.2},
@@ -281,6 +286,19 @@ def test_some_pitch_tried_shows_most_of_any_ripple():
         shown = max(np.sum((basis.T @ ripple) ** 2) for basis in bases) / np.sum(ripple ** 2)
         # Half a step off: (sin(pi/4) / (pi/4))^2 = 0.81 over many periods.
         assert shown > 0.75, pitch
+
+
+@pytest.mark.parametrize('middle', [0.0, 0.4])
+def test_some_position_tried_shows_most_of_any_stop(middle):
+    covered = replace(COVERED, middle=middle)
+    q = middle + np.linspace(-1, 1, 2001) * COVERED.stroke / 2
+    shown = np.maximum(q - np.array([trial['position'] for trial in StopContact.trials(covered)])[
+        :, None], 0.0)
+    shown /= np.maximum(np.linalg.norm(shown, axis=1, keepdims=True), 1e-300)
+    for reach in np.geomspace(0.025, 0.25, 20):
+        stop = np.maximum(q - q[-1] + reach * COVERED.stroke, 0.0)
+        assert (shown @ stop).max() > 0.9 * np.linalg.norm(stop), reach
+    assert {trial['position'] > middle for trial in StopContact.trials(covered)} == {False, True}
 
 
 @every_effect

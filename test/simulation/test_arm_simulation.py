@@ -46,6 +46,14 @@ def test_the_engine_moves_the_bodies_of_the_model(model: MechanismModel) -> None
         - np.array(model.values['arm.armature']) * motion.acceleration, abs=1e-8)
 
 
+def test_the_engine_moves_an_arm_whose_last_joint_stands(tmp_path: Path) -> None:
+    arm.write_arm(tmp_path, joints=arm.JOINTS[:2])
+    standing = MechanismModel.load(tmp_path / 'arm.yaml')
+    motion = draw_motion(standing, 10.0, 0)
+    assert ArmEngine(standing).torques(motion) == pytest.approx(
+        standing.drive_forces(motion).parts['rigid_body'], abs=1e-8)
+
+
 def test_a_hidden_payload_is_a_point_at_the_tool(model: MechanismModel) -> None:
     motion = draw_motion(model, 10.0, 1)
     engine = ArmEngine(model)
@@ -110,14 +118,16 @@ def test_every_hidden_effect_shows(wrist: MechanismModel, name: str) -> None:
                      for names in ((), (name,)))
     moved, pushed = (np.abs(getattr(hidden, one) - getattr(plain, one)).max()
                      for one in ('position', 'effort'))
-    if name in ('homing_error', 'lost_motion'):  # the control follows an eccentric encoder
+    # The control follows an eccentric encoder.
+    if name in ('homing_error', 'lost_motion', 'elastic_joint'):
         assert moved > 0.005 or (pushed > 0.05 and name == 'lost_motion')
     else:
         assert pushed > 0.05
     assert hidden.effects[0]['name'] == name
     assert (hidden.effects[0]['drives'] is None) == (
         name not in {*FORMS, 'eccentric_encoder', 'effort_gain', 'effort_filter', 'time_delay',
-                     'homing_error', 'lost_motion', 'current_gain'})
+                     'homing_error', 'lost_motion', 'current_gain',
+                     'elastic_joint'})
 
 
 def test_motors_without_a_map_rub_nowhere(model: MechanismModel) -> None:

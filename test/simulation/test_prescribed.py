@@ -40,8 +40,8 @@ SENSORS = ('effort_filter', 'effort_gain', 'homing_error', 'lost_motion', 'time_
 GROUPS = {
     'friction': ('viscous_friction', 'coulomb_friction', 'asymmetric_friction',
                  'stribeck_friction', 'quadratic_friction', 'load_friction'),
-    'forces': ('effort_offset', 'drive_spring', 'force_ripple', 'local_bump', 'vibration',
-               'drive_coupling'),
+    'forces': ('effort_offset', 'drive_spring', 'stop_contact', 'force_ripple', 'local_bump',
+               'vibration', 'drive_coupling'),
     'joints and platform': ('joint_friction', 'joint_spring', 'external_wrench', 'tool_drag'),
     'bodies': ('drive_inertia', 'payload_mass', 'payload_offset', 'platform_inertia',
                'base_tilt', 'link_mass'),

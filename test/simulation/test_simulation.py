@@ -292,8 +292,8 @@ def test_every_effect_of_the_interface_is_there() -> None:
         'viscous_friction coulomb_friction asymmetric_friction stribeck_friction '
         'quadratic_friction load_friction hysteresis friction_drift friction_temperature '
         'effort_offset effort_gain '
-        'homing_error lost_motion drive_spring force_ripple drive_inertia time_delay effort_filter '
-        'joint_friction joint_spring payload_mass payload_offset '
+        'homing_error lost_motion drive_spring stop_contact force_ripple drive_inertia '
+        'time_delay effort_filter joint_friction joint_spring payload_mass payload_offset '
         'platform_inertia external_wrench base_tilt tool_drag link_mass')
     assert not set(IN_CATALOGUE) & set(NOT_IN_CATALOGUE)
 
@@ -307,8 +307,8 @@ def test_a_hidden_effect_changes_the_efforts_of_its_drives_alone(name: str) -> N
     has = np.isin(DRIVES, effect.drives) if effect.drives else np.ones(6, dtype=bool)
     assert error[has].max() > 0.02
     if effect.drives:
-        # A drive need not come by the place of a bump.
-        assert error[has].min() > (0.0 if name == 'local_bump' else 1e-3)
+        # A drive need not come by the place of a bump, or to a stop.
+        assert error[has].min() > (0.0 if name in ('local_bump', 'stop_contact') else 1e-3)
     assert np.all(error[~has] < AGREEMENT)
 
 
@@ -331,6 +331,10 @@ CLOSED_FORMS = {
     'drive_spring': ({'stiffness': 20.0, 'rest': 0.01, 'hardening': 0.2},
                      lambda t: 20.0 * (t.position - 0.01)
                      + 20.0 / 0.04 * (t.position - 0.01) ** 3),
+    'stop_contact': ({'stiffness': 50.0, 'side': 1.0, 'middle': -0.02, 'reach': 0.01,
+                      'damping': 2.0},
+                     lambda t: 50.0 * np.clip(t.position + 0.01, 0, None) ** 1.5
+                     * (1 + 2.0 * t.velocity)),
     'force_ripple': ({'force': 0.5, 'pitch': 0.005, 'phase': 0.3, 'second': 0.4,
                       'second_phase': -1.0},
                      lambda t: 0.5 * np.sin(2 * np.pi * t.position / 0.005 + 0.3)

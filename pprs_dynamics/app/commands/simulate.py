@@ -65,6 +65,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--thermometers', action='store_true',
                         help='of an arm: record the temperatures of the drives, even where no '
                         'effect follows them')
+    parser.add_argument('--link-encoders', action='store_true',
+                        help='of an arm: record the positions of its links behind the gears as '
+                        'well, even where no gear winds up')
     add_report(parser, 'the robot moving, as a page')
 
 
@@ -78,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
             model, options.effect, seed=options.seed, scale=options.scale, motion=motion,
             duration=options.duration, path_seed=options.path_seed, noise=options.noise,
             feedforward=options.feedforward, thermometers=options.thermometers,
-            progress=progress)
+            link_encoders=options.link_encoders, progress=progress)
     result.save(options.output)
     tell(result, options, screen, recording=options.output)
     screen.print(f'recording: {shown(options.output)}')

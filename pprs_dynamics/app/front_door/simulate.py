@@ -114,7 +114,8 @@ class SimulationResult(Result):
 def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
              scale: float = 1.0, motion: PlatformMotion | None = None, duration: float = 40.0,
              path_seed: int = 0, noise: float | None = None, feedforward: str = 'friction',
-             thermometers: bool = False, progress: Progress | None = None) -> SimulationResult:
+             thermometers: bool = False, link_encoders: bool = False,
+             progress: Progress | None = None) -> SimulationResult:
     """Record a robot of a physics engine that has effects which its model does not know of.
 
     Parameters
@@ -137,8 +138,8 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
         [N m, N].
     feedforward : {'friction', 'rigid_body', 'none'}
         What the 3-PPRS is driven with.
-    thermometers : bool
-        Whether those of an arm are recorded, even where no effect follows the temperature.
+    thermometers, link_encoders : bool
+        Whether those of an arm are recorded, even where no effect needs them.
     progress : callable, optional
         Called with what is being done and the share of it that is done.
 
@@ -161,7 +162,7 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
         from pprs_dynamics.simulation.arm_run import simulate_arm
 
         arm = simulate_arm(found, names, seed, scale, noise, duration, path_seed, share_done,
-                           thermometers)
+                           thermometers, link_encoders)
         assert arm.motion.time is not None
         recording = Recording.from_arrays('simulated', arm.motion.time, arm.position, None,
                                           arm.effort, found.drives, arm.channels)

@@ -45,7 +45,7 @@ def _recording_table(summary: Summary, units: DriveUnits, drives: Sequence[str])
                 if any(name in summary.drives[drive].channels for drive in drives)]
     return text_table(
         ('drive', f'position [{position}]', f'velocity [{position}/s]', f'effort [{units.effort}]',
-         'measured', *(f'{name} [{CHANNELS[name]}]' for name in channels)),
+         'measured', *(f'{name} [{units.of(CHANNELS[name])}]' for name in channels)),
         [(escape(drive), *map(_span, (found.position, found.velocity, found.effort)),
           f'{found.measured:.1%}', *(_span(found.channels.get(name)) for name in channels))
          for drive in drives for found in [summary.drives[drive]]],

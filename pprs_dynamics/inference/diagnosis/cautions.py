@@ -12,6 +12,7 @@ import numpy as np
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.search.candidates import SINCE, CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint, told_by_windup
 
 
 def find_cautions(
@@ -19,7 +20,7 @@ def find_cautions(
 ) -> tuple[str, ...]:
     """Return sentences, the graver first."""
     return (*fits.design.given.faults, *_courses(effects), *_length(fits, best), *_motion(fits),
-            *_filtered(fits),
+            *_filtered(fits), *_wound_up(fits, effects),
             *_unexcited(fits, best), *_bounds(effects))
 
 
@@ -58,6 +59,25 @@ def _motion(fits: FittedSets) -> Iterator[str]:
     if one_way:
         yield (f'{", ".join(one_way)} move in one direction only: friction there looks like a '
                'constant force; record motion both ways')
+
+
+def _wound_up(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]:
+    """Look for second encoders that tell of a wind-up which efforts do not."""
+    design = fits.design
+    told = {name for one in effects if one.name == ElasticJoint.name for name in one.drives or ()}
+    read = [(one.transmitted, found.windup) for one, found in zip(
+        design.recordings, design.reconstructions, strict=False) if found.windup is not None]
+    for d, name in enumerate(design.drives if read else ()):
+        load = np.concatenate([one[:, d] for one, _ in read])
+        windup = np.concatenate([one[:, :, d] for _, one in read], axis=1)
+        if name in told or not np.ptp(load) or not np.any(windup):
+            continue
+        stiffness, damping, said = told_by_windup(load, windup)
+        if stiffness > 0 and np.var(said) > fits.decisions.explained * np.var(load):
+            units = design.given.units[d]
+            yield (f'the link of {name} is not where its motor is: by its second encoder it winds '
+                   f'up by {1 / stiffness:.3g} {units.of("m/N")}, {1e3 * damping / stiffness:.2g} '
+                   'ms behind its load, which changes the efforts by less than can be told')
 
 
 def _filtered(fits: FittedSets) -> Iterator[str]:

@@ -517,9 +517,8 @@ class _Answer:
 
     def _nearly(self, candidate: EffectCandidate) -> list[tuple[float, Estimates]]:
         """Return what sets that are nearly as good say of an effect, and what they cost more."""
-        near = self.ranking.near(self.decisions.rival_margin)[:MOST_AVERAGED]
-        return [(one.cost - self.reported.cost, estimate(self.fits, one, same))
-                for one in near if one is not self.reported
+        near = self.ranking.nearly(self.decisions.rival_margin)[:MOST_AVERAGED]
+        return [(more, estimate(self.fits, one, same)) for more, one in near
                 for same in one.effects if same.effect is candidate.effect]
 
     def _certainty(self, candidate: EffectCandidate) -> float:

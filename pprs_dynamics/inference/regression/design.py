@@ -352,7 +352,7 @@ class Design:
                           self.given.gear_ratios[drive], _delay(longest, drive),
                           self.given.units[drive].turns,
                           any(np.any(one.friction_load[:, drive]) for one in self.recordings),
-                          self._channels(drive))
+                          self._channels(drive), float(position.min() + position.max()) / 2)
 
     def _channels(self, drive: int) -> dict[str, tuple[float, float]]:
         """Return the ranges of what was measured of a drive beside motion and effort."""
@@ -480,8 +480,8 @@ class Design:
         """Return what positions of a drive that are measured wrong do to all, (k, M) by drive.
 
         What a play does is not in proportion to it. Around a model that has the effect it is told
-        by steps of `SHARE` of what it has; else by the one of `SIZES` that alone would explain most
-        of the drive's error.
+        by steps of `SHARE` of what it has; else, of what the effect is `not_linear_in`, by the one
+        of `SIZES` that alone would explain most of the drive's error.
         """
         name = self.drives[drive]
         there = next((one for one in self.model.effects
@@ -489,26 +489,39 @@ class Design:
         before = {c.name: 0.0 for c in effect.coefficients} if there is None else (
             effect.to_coefficients(there.drives[name]))
 
-        def changed(c: Parameter, step: float) -> dict[int, Array]:
-            values = [effect({name: {**effect.from_coefficients(one), **shape}})
-                      for one in (before, {**before, c.name: before[c.name] + step})]
-            parts = []
-            for recording, read in zip(self.recordings, self.reconstructions or [None],
-                                       strict=True):
-                old, new = (self._misread(one, recording, read, drive) for one in values)
-                parts.append(recording.treat(self._felt(recording, drive, new - old).T).T)
-            q, q_ddot, own = np.concatenate(parts, axis=1)
+        def read(coefficients: Mapping[str, float]) -> list[Array]:
+            one = effect({name: {**effect.from_coefficients(coefficients), **shape}})
+            return [self._misread(one, recording, reconstruction, drive)
+                    for recording, reconstruction in zip(
+                        self.recordings, self.reconstructions or [None], strict=True)]
+
+        old = read(before)
+
+        def changed(c: Parameter, step: float) -> dict[int, Array] | None:
+            moved = read({**before, c.name: before[c.name] + step})
+            if all(map(np.array_equal, old, moved)):
+                return None
+            q, q_ddot, own = np.concatenate([
+                recording.treat(self._felt(recording, drive, new - as_read).T).T
+                for recording, as_read, new in zip(self.recordings, old, moved, strict=True)],
+                axis=1)
             return {d: self.homing[drive][d] * q + self.inertia[drive][d] * q_ddot
                     + own * (d == drive) for d in range(len(self.drives))}
 
         error = np.nan_to_num(self.residuals.error[:, drive])
+        none = dict.fromkeys(range(len(self.drives)), np.zeros_like(error))
         rows = []
         for c in effect.coefficients:
             usual = c.scale if c.expected is None else c.expected[self.given.units[drive].turns]
             steps = ([SHARE * max(abs(before[c.name]), usual)] if there is not None
-                     or c.expected is None else [size * usual for size in SIZES])
-            found = [(step, changed(c, step)) for step in steps]
-            step, best = max(found, key=lambda one: float(
+                     else [size * usual for size in SIZES] if c.name in effect.not_linear_in
+                     else [usual])
+            found = []
+            for step in steps:
+                if (rows_there := changed(c, step)) is None:
+                    break  # no reversal comes back by as much
+                found.append((step, rows_there))
+            step, best = max(found, default=(1.0, none), key=lambda one: float(
                 (2 * error - one[1][drive]) @ one[1][drive]))
             rows.append({d: row / step for d, row in best.items()})
         return {d: np.stack([one[d] for one in rows]) for d in range(len(self.drives))}
@@ -541,7 +554,10 @@ class Design:
             if np.any(effect.position_error(name, read.recorded.position[:, [drive]])):
                 found = np.concatenate(
                     misread([effect], name, read.recorded, read.read, drive), axis=1).T
-        found[0] += effect.loaded_position_error(name, recording.transmitted[:, [drive]])[:, 0]
+        load = recording.transmitted[:, [drive]]
+        found[0] += effect.loaded_position_error(name, load)[:, 0]
+        if read is not None and read.windup is not None:
+            found += effect.windup_error(name, load, read.windup[:, :, [drive]])[:, :, 0]
         return found
 
     def find_term(self, effect: type[CatalogueEffect], drive: int | None,

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import DriveSamples
@@ -54,6 +56,19 @@ class Term:
     def names(self) -> tuple[str, ...]:
         """Coefficients of the rows; none where the only row has the coefficient 1."""
         return tuple(c.name for c in self.effect.coefficients)
+
+    def variants(self) -> list[tuple[str, ...]]:
+        """Return the effect's choices of coefficients that do something.
+
+        Without those that do what a smaller one does: a coefficient per load is none on a drive
+        that carries nothing.
+        """
+        felt = {name for rows in self.rows.values() for name, row in zip(
+            self.names, rows, strict=False) if np.any(row)}
+        chosen = {names: tuple(name for name in names if name in felt)
+                  for names in self.effect.variants}
+        return [names for names, does in chosen.items()
+                if does == names or (does and does not in chosen)]
 
 
 @dataclass(frozen=True)

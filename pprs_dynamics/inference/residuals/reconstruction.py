@@ -30,6 +30,7 @@ from pprs_dynamics.measurement.motion.drive_motion import (
 from pprs_dynamics.measurement.motion.rests import find_rests
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.physics.effects.laws.elastic_joint import LINK_POSITION
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -121,6 +122,9 @@ class Reconstruction(DriveMotion):
         What it is of.
     read : DriveMotion
         The motion of the drives as their encoders say.
+    windup : (3, N, D) array or None
+        By how much these lead the links, as second encoders say, with its rates; 0 in drives
+        without one, None where no drive has one.
     """
 
     time: Array
@@ -135,6 +139,7 @@ class Reconstruction(DriveMotion):
     channels: Mapping[str, Array]
     recorded: Recording
     read: DriveMotion
+    windup: Array | None
 
     def __len__(self) -> int:
         return len(self.time)
@@ -273,7 +278,8 @@ def reconstruct(
         drives = smooth_drives(recording, window)
     read, time, total = drives, recording.time[drives.index], len(drives.index)
     effort = _efforts(model, recording)[drives.index]
-    drives, followed = _followed_rightly(model, recording, read, time, progress)
+    windup = _windup(recording, read)
+    drives, followed = _followed_rightly(model, recording, read, time, windup, progress)
     dropped = sum(part.stop - part.start for part in recording.segments) - total
     notes = [*drives.notes, f'{dropped} samples are dropped: half a window at the ends of '
              f'{len(drives.segments)} segments, what fills no block, and segments too short',
@@ -290,7 +296,7 @@ def reconstruct(
         treat=Treatment(drives.block_starts, total), near_branch=followed.near_branch,
         jumps=followed.jumps, gain=_applied_gain(recording), dropped=dropped,
         start=float(recording.time[0]), channels=_channels(recording, drives.index),
-        recorded=recording, read=read)
+        recorded=recording, read=read, windup=windup)
 
 
 def read_by(found: Reconstruction, model: ForceModel) -> Reconstruction:
@@ -303,7 +309,8 @@ def read_by(found: Reconstruction, model: ForceModel) -> Reconstruction:
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    drives, followed = _followed_rightly(model, found.recorded, found.read, found.time)
+    drives, followed = _followed_rightly(model, found.recorded, found.read, found.time,
+                                         found.windup)
     return replace(found, position=drives.position, velocity=drives.velocity,
                    acceleration=drives.acceleration, motion=followed.motion,
                    near_branch=followed.near_branch, jumps=followed.jumps)
@@ -340,7 +347,7 @@ def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recordin
 
 def _followed_rightly(
     model: ForceModel | Geometry, recording: Recording, read: DriveMotion, time: Array,
-    progress: Progress | None = None,
+    windup: Array | None, progress: Progress | None = None,
 ) -> tuple[DriveMotion, FollowedMotion]:
     """Return the true motion of the drives, and of what they move, behind that which was read."""
     if not isinstance(model, ForceModel) or not model.misreadings:
@@ -355,12 +362,24 @@ def _followed_rightly(
     if not np.any(model.loaded_position_error(np.ones((1, len(model.drives))))):
         return drives, followed
     # Loads hardly change by what they do to positions: one step is enough.
-    error = np.concatenate([
-        model.loaded_position_error(model.mechanism(
-            followed.motion[start:start + CHUNK]).transmitted)
+    load = np.concatenate([
+        model.mechanism(followed.motion[start:start + CHUNK]).transmitted
         for start in range(0, len(time), CHUNK)])
-    drives = replace(drives, position=drives.position - error)
+    drives = replace(drives, position=drives.position - model.loaded_position_error(load))
+    if windup is not None:
+        q, q_dot, q_ddot = model.windup_error(load, windup)
+        drives = replace(drives, position=drives.position - q, velocity=drives.velocity - q_dot,
+                         acceleration=drives.acceleration - q_ddot)
     return drives, follow(model, time, drives, progress)
+
+
+def _windup(recording: Recording, read: DriveMotion) -> Array | None:
+    """Return by how much encoders lead links, with its rates, (3, N, D), None without a second."""
+    if LINK_POSITION not in recording.channels:
+        return None
+    link = _channels(recording, np.arange(len(recording.time), dtype=float))[LINK_POSITION]
+    ahead = np.nan_to_num(recording.position - link)
+    return np.stack(smoothed_as(read, replace(recording, position=ahead), lambda values: values))
 
 
 def _applied_gain(recording: Recording) -> Array:

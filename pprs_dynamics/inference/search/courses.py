@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pprs_dynamics.inference.search.absorbed import beyond_discrepancy
 from pprs_dynamics.inference.search.candidates import (
     COURSE_TIMES,
     DRIFT,
@@ -70,23 +71,39 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
     dated = FittedSets(fits.design, fits.decisions, fits.regression.error_scale)
     best = dated.evaluate(kept.candidates)
     names = {one.name for one in kept.effects}
-    more = [(one, one.effects[0]) for one in others
+    more = [(one, one.effects[0]) for one in (*others, *_alone_on_drives(fits, kept))
             if one.effects[0].name not in names and _is_new(one.effects[0])]
+    likely: list[EffectCandidate] = []
     for _ in range(MOST_COURSES):
         held = [(best, one) for one in best.effects if not one.course and _is_new(one)]
         # Patterns of no catalogue imitate what changes: offers are beside effects alone.
         plain = dated.at_noise_of(best, best.effects) if best.unknowns else best
         offers = sorted(_offers(dated, plain, [*held, *more]), key=lambda one: -one.gain)
-        found = best
-        for offer in _best_of_each(offers):
+        found, offered = best, _best_of_each(offers)
+        likely += [one.candidate for one in offered]
+        for offer in offered:
             for rest in _rests(best, offer.candidate):
                 tried = dated.pruned(dated.evaluate((*rest, offer.candidate)))
                 found = min(found, tried, key=lambda one: one.cost)
         if not found.cost < best.cost - fits.decisions.rival_margin:
             break
         best = _refined(dated, found)
-    best = _simplest(dated, best, [*(one for _, one in own), *(one for _, one in more)])
+    best = _simplest(dated, best, {one.effect: one for one in (
+        *(one for _, one in own), *likely)}.values())
+    best, _ = beyond_discrepancy(dated, best)
     return (dated, best) if any(one.course for one in best.effects) else (fits, kept)
+
+
+def _alone_on_drives(fits: FittedSets, kept: CandidateSet) -> Iterator[CandidateSet]:
+    """Yield all effects, each alone, on the drives on which a pattern of no catalogue is left.
+
+    What is there for a stretch is hardly seen by a fit of all the time, which need not have been
+    the search's to propose.
+    """
+    base = fits.evaluate(()).fit
+    for d in sorted({d for one in kept.unknowns for d in one.drives}):
+        for component, _ in fits.library.local[d].offers(base).values():
+            yield fits.evaluate((EffectCandidate.of([component]),))
 
 
 def _is_new(candidate: EffectCandidate) -> bool:

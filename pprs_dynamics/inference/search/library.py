@@ -102,12 +102,10 @@ class DriveLibrary:
             return [Entry(placed(self.design, effect, self.d, term.shape, ()), (first,),
                           CERTAIN * np.eye(1), np.ones(1))]
         found = []
-        for names in effect.variants:
-            if not (names and set(names) <= set(effect.scanned)):
+        for names in term.variants():
+            if not set(names) <= set(effect.scanned):
                 continue
             at = [term.names.index(name) for name in names]
-            if not np.any(term.rows[self.d][at]):  # of a temperature that was not measured, say
-                continue
             chosen = self.series.transform(term.rows[self.d][at]) if known else None
             precision = None if chosen is None else block_diag(
                 self.regression.g_prior({self.d: chosen @ chosen.T}), np.array([[CERTAIN]]))
@@ -152,9 +150,7 @@ class Library:
                          for d in regression.drives if design.acts_on(effect, d)
                          for shape in shapes_of(design, effect, d) for names in effect.variants]
         self.structure = [self._placed(term, names) for term in design.structure
-                          for names in term.effect.variants
-                          if any(np.any(rows[[term.names.index(name) for name in names]])
-                                 for rows in term.rows.values())]
+                          for names in term.variants()]
 
     def _placed(self, term: Term, names: tuple[str, ...]) -> Component:
         """Return an effect in the structure, a body where it is most likely to be."""
@@ -166,6 +162,10 @@ class Library:
             self._centres[key] = find_centre(term, names[0], self.design.residuals.error,
                                              self.regression.error_scale, self.design.given)
         return replace(found, centre=self._centres[key])
+
+    def variants(self, component: Component) -> list[Component]:
+        """Return a component with each choice of coefficients of its effect that do something."""
+        return [self.variant(component, names) for names in self.term(component).variants()]
 
     def variant(self, component: Component, names: tuple[str, ...]) -> Component:
         """Return a component with other coefficients; a body where it is most likely to be."""

@@ -90,8 +90,7 @@ def _otherwise(fits: FittedSets, best: CandidateSet) -> Iterator[Candidates]:
                 yield exchanged(best, candidate, EffectCandidate.of(
                     fits.library.variant(one, names) for one in candidate.components))
         for component in candidate.components:
-            for names in effect.variants:
+            for other in fits.library.variants(component):
                 # The others take part in every scan.
-                if names != component.names and not set(names) <= set(effect.scanned):
-                    yield exchanged(best, candidate, with_instead(
-                        candidate, component, fits.library.variant(component, names)))
+                if other.names != component.names and not set(other.names) <= set(effect.scanned):
+                    yield exchanged(best, candidate, with_instead(candidate, component, other))

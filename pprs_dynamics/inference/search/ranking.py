@@ -231,6 +231,23 @@ class Ranking:
         """Return the sets of the last search within a margin of the best."""
         return tuple(one for one in self.of_last if one.cost < self.map_set.cost + margin)
 
+    def nearly(self, margin: float) -> list[tuple[float, CandidateSet]]:
+        """Return other sets of the last search within a margin, and what they cost more.
+
+        What exact forces cost more than linear ones is that of the first set of the same claims,
+        and as much as of the reported set where it is not known.
+        """
+        departs = {one.claims: cost - one.total for one, cost in self._exact_costs.items()}
+        mine = departs.get(self.reported.claims, 0.0)
+
+        def more(one: CandidateSet) -> float:
+            return one.cost - self.reported.cost + departs.get(one.claims, mine) - mine
+
+        costs = [(more(one), one) for one in self.of_last if one is not self.reported]
+        least = more(self.map_set) + margin
+        return sorted(((cost, one) for cost, one in costs if cost < least),
+                      key=lambda pair: pair[0])
+
     def rivals(self, margin: float) -> list[Rival]:
         """Return sets with other effects than the reported ones so near the best, the best first.
 

@@ -214,10 +214,9 @@ class Search:
     def _variants(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
         """Yield the candidate with other coefficients of one component."""
         for component in candidate.components:
-            for names in candidate.effect.variants:
-                if names != component.names:
-                    yield with_instead(candidate, component,
-                                       self.fits.library.variant(component, names))
+            for other in self.fits.library.variants(component):
+                if other.names != component.names:
+                    yield with_instead(candidate, component, other)
 
     def replaced(self, found: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
                  ) -> CandidateSet:
@@ -254,8 +253,8 @@ class Search:
         There it, or some of its coefficients, may stand for the other one.
         """
         for component in candidate.components if len(candidate.components) > 1 else ():
-            fewer = [(self.fits.library.variant(component, names),)
-                     for names in candidate.effect.variants if set(names) < set(component.names)]
+            fewer = [(other,) for other in self.fits.library.variants(component)
+                     if set(other.names) < set(component.names)]
             for kept in ((), *fewer):
                 rest = exchanged(best, candidate, with_instead(candidate, component, *kept))
                 yield from self._instead(best, rest, REPLACEMENTS, component.drive)

@@ -108,8 +108,20 @@ def _told(topic: str, kind: str, message: Any, joints: tuple[str, ...],
 
 
 def write_channels(writer: Any, samples: Samples, stamps: Indices) -> None:
-    """Write what was measured as sensor_msgs, on `/<drive>/<channel>`."""
+    """Write what was measured on `/<drive>/<channel>`, positions of links on `/<channel>`."""
     store: Any = None
+    for channel in samples.channels.keys() - {channel for channel, _ in SENSORS.values()}:
+        store = message_types() if store is None else store
+        connection = writer.add_connection(f'/{channel}', JOINT_STATE, typestore=store)
+        known = np.isfinite(samples.channels[channel])
+        for at in np.flatnonzero(known.any(axis=1)):
+            time = store.types['builtin_interfaces/msg/Time'](*divmod(int(stamps[at]), 10**9))
+            header = store.types['std_msgs/msg/Header'](stamp=time, frame_id='')
+            none = np.zeros(0)
+            message = store.types[JOINT_STATE](
+                header=header, name=list(np.array(samples.drives)[known[at]]),
+                position=samples.channels[channel][at, known[at]], velocity=none, effort=none)
+            writer.write(connection, int(stamps[at]), store.serialize_cdr(message, JOINT_STATE))
     for kind, (channel, name) in SENSORS.items():
         if channel not in samples.channels:
             continue

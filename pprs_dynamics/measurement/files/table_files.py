@@ -75,9 +75,11 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
     samples = (_of_several(path, drives, columns, progress) if columns.files else
                _of_one(path, drives, columns, topic, progress))
     of_drives = [columns.drives.get(drive, DriveColumns({})) for drive in drives.names]
-    velocity = samples.velocity
+    velocity, of_positions = samples.velocity, [one.position_scale for one in of_drives]
     return replace(
-        samples, position=samples.position * [one.position_scale for one in of_drives],
+        samples, position=samples.position * of_positions,
+        channels={name: values * of_positions if CHANNELS[name] == 'm' else values
+                  for name, values in samples.channels.items()},
         velocity=None if velocity is None else velocity * [
             one.velocity_scale for one in of_drives],
         effort=samples.effort * [one.effort_scale for one in of_drives])

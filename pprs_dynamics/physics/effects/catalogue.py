@@ -30,6 +30,7 @@ from pprs_dynamics.physics.effects.laws.eccentric_encoder import EccentricEncode
 from pprs_dynamics.physics.effects.laws.effort_filter import EffortFilter
 from pprs_dynamics.physics.effects.laws.effort_gain import EffortGain
 from pprs_dynamics.physics.effects.laws.effort_offset import EffortOffset
+from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint
 from pprs_dynamics.physics.effects.laws.external_wrench import ExternalWrench
 from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
 from pprs_dynamics.physics.effects.laws.friction_drift import FrictionDrift
@@ -47,6 +48,7 @@ from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.effects.laws.payload_offset import PayloadOffset
 from pprs_dynamics.physics.effects.laws.platform_inertia import PlatformInertia
 from pprs_dynamics.physics.effects.laws.quadratic_friction import QuadraticFriction
+from pprs_dynamics.physics.effects.laws.stop_contact import StopContact
 from pprs_dynamics.physics.effects.laws.stribeck_friction import StribeckFriction
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
 from pprs_dynamics.physics.effects.laws.tool_drag import ToolDrag
@@ -76,6 +78,7 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         EffortFilter,
         EffortGain,
         EffortOffset,
+        ElasticJoint,
         ExternalWrench,
         ForceRipple,
         FrictionDrift,
@@ -92,6 +95,7 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
         PayloadOffset,
         PlatformInertia,
         QuadraticFriction,
+        StopContact,
         StribeckFriction,
         TimeDelay,
         ToolDrag,

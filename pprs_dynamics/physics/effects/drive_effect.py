@@ -70,6 +70,8 @@ class DriveRange:
         Whether its guide or gear carries anything that is known.
     channels : mapping of str to (lowest, highest)
         What was measured beside, as `temperature` [degC].
+    middle : float
+        Of the stroke [m, rad].
     """
 
     duration: float
@@ -81,6 +83,7 @@ class DriveRange:
     turns: bool = False
     is_loaded: bool = True
     channels: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    middle: float = 0.0
 
 
 class DriveEffect(CatalogueEffect):
@@ -216,9 +219,16 @@ class DriveEffect(CatalogueEffect):
 
 
 class MeasurementEffect(DriveEffect):
-    """Systematic error of a drive's sensors. It never enters a command."""
+    """Systematic error of a drive's sensors. It never enters a command.
+
+    Class attributes
+    ----------------
+    not_linear_in : tuple of str
+        Coefficients to which errors of positions are not in proportion.
+    """
 
     is_measurement = True
+    not_linear_in: ClassVar[tuple[str, ...]] = ()
     # Whether its errors of positions are smooth functions of the position alone.
     is_of_position: ClassVar[bool] = False
 
@@ -278,6 +288,21 @@ class MeasurementEffect(DriveEffect):
             What gears or screws pass on to the mechanism [N, N m].
         """
         return np.zeros_like(transmitted)
+
+    def windup_error(self, drives: Sequence[str], transmitted: Array, windup: Array) -> Array:
+        """Return what second encoders say beside `loaded_position_error`, (3, N, D).
+
+        Errors of position, velocity and acceleration; by default none.
+
+        Parameters
+        ----------
+        drives : sequence of str
+        transmitted : (N, D) array
+            What gears or screws pass on to the mechanism [N, N m].
+        windup : (3, N, D) array
+            Position less that of the link, and its rates; 0 in drives without a second encoder.
+        """
+        return np.zeros_like(windup)
 
     def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
                memory: Any = None) -> Array:

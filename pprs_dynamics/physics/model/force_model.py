@@ -508,3 +508,9 @@ class ForceModel(ABC):
         """Return the errors of measured positions by what gears pass on, (N, D)."""
         errors = [one.loaded_position_error(self.drives, transmitted) for one in self.misreadings]
         return np.sum(errors, axis=0) if errors else np.zeros_like(transmitted)
+
+    def windup_error(self, transmitted: Array, windup: Array) -> Array:
+        """Return what second encoders say beside that, of position and its rates, (3, N, D)."""
+        errors: Array = np.sum([one.windup_error(self.drives, transmitted, windup)
+                                for one in self.misreadings], axis=0)
+        return errors

@@ -7,7 +7,7 @@ The encoder reads q + e. With backlash, e is half of it towards the side to whic
 the gear, b / 2 sgn(tau): the link falls from one flank to the other while the motor, and with it
 the encoder, goes on as before. With play, the link stays behind at reversals: the encoder first
 travels all of the play without it, and what the link does meanwhile no encoder says; it is taken
-to pass smoothly from its motion before to that after. With windup, e grows with the load, c tau.
+to pass smoothly from its motion before to that after. What winds up is `elastic_joint`.
 
 References
 ----------
@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -31,40 +31,43 @@ from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
 MARGIN = 0.5
 # Clearances of screws and gears [m, rad].
 USUAL = (5e-4, math.radians(1.0))
-# Compliances of screws and belts, of gears and shafts [m/N, rad/(N m)].
-SOFT = (2e-6, 3e-4)
 
 
 class LostMotion(MeasurementEffect):
-    """Backlash, play or windup of what is between an encoder and the link that it is to measure."""
+    """Backlash or play of what is between an encoder and the link that it is to measure."""
 
     name: ClassVar[str] = 'lost_motion'
     acts_in = frozenset({PLATFORM, ARM})
     idealised: ClassVar[bool] = False
     nonlinear: ClassVar[bool] = True
+    not_linear_in: ClassVar[tuple[str, ...]] = ('play',)
     linear = (
         Parameter('backlash', 'b', 'm', 'distance between the flanks, of which the load chooses '
                   'one', -0.1, 0.1, 0.0, 5e-4, expected=USUAL, turning=(-0.5, 0.5)),
         Parameter('play', 'b_r', 'm', 'travel of the encoder without the link at each reversal',
-                  -0.1, 0.1, 0.0, 5e-4, expected=USUAL, turning=(-0.5, 0.5)),
-        Parameter('windup', 'c', 'm/N', 'by which the encoder leads per load', -1.0, 1.0, 0.0,
-                  1e-6, expected=SOFT, turning=(-10.0, 10.0)))
-    variants = (('backlash',), ('play',), ('windup',))
-    unphysical_below: ClassVar[Mapping[str, float]] = {
-        'backlash': 0.0, 'play': 0.0, 'windup': 0.0}
+                  -0.1, 0.1, 0.0, 5e-4, expected=USUAL, turning=(-0.5, 0.5)))
+    variants = (('backlash',), ('play',))
+    unphysical_below: ClassVar[Mapping[str, float]] = {'backlash': 0.0, 'play': 0.0}
     card = Card(
-        'measured position = q + e, e = b sgn(tau) / 2 + c tau, or b_r / 2 before and -b_r / 2 '
+        'measured position = q + e, e = b sgn(tau) / 2, or b_r / 2 before and -b_r / 2 '
         'after a reversal',
         'weight and inertia as of a drive that stands aside, to another side where the load '
         'changes sign; with play a burst at each reversal, where the encoder moves fast and the '
         'drive does not, which looks like a delay or like hysteresis',
-        'worn teeth, a loose coupling, key or belt, a nut with clearance, an encoder on the motor; '
-        'a shaft, belt or harmonic drive that winds up',
+        'worn teeth, a loose coupling, key or belt, a nut with clearance, an encoder on the motor',
         'lock the motor and move the link to and fro by hand with a dial gauge on it: what it '
-        'moves freely is backlash, what it gives per force is windup; reverse slowly and watch '
-        'when the link follows the encoder',
+        'moves freely is backlash, what it gives per force is elastic_joint; reverse slowly and '
+        'watch when the link follows the encoder',
         'Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica '
         '38, 2002')
+
+    @classmethod
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
+        """Build it from `{drive: {parameter: value}}`; a wind-up of 0, once in files, is none."""
+        return super().from_file({drive: (
+            {name: value for name, value in block.items() if (name, value) != ('windup', 0.0)}
+            if isinstance(block, Mapping) else block) for drive, block in values.items()}
+            if isinstance(values, Mapping) else values, complete)
 
     def position_error(self, drives: Sequence[str], position: Array) -> Array:
         """Return how far encoders are ahead because of play, (N, D) [m, rad]."""
@@ -81,8 +84,7 @@ class LostMotion(MeasurementEffect):
         for name, values in self.drives.items():
             if name in drives:
                 k = drives.index(name)
-                error[:, k] = (values['backlash'] / 2 * np.sign(transmitted[:, k])
-                               + values['windup'] * transmitted[:, k])
+                error[:, k] = values['backlash'] / 2 * np.sign(transmitted[:, k])
         return error
 
 

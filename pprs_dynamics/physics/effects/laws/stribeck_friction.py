@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Dry friction that falls as the drive leaves rest: F_s exp(-|q_dot / v_s|^d) sgn(q_dot)."""
+"""Dry friction that falls as a drive leaves rest: (F_s + mu_s N) exp(-|q_dot / v_s|^d) sgn(q_dot).
+
+No load changes its size, or it follows the load.
+"""
 
 from __future__ import annotations
 
@@ -26,14 +29,17 @@ class StribeckFriction(DriveEffect):
     name: ClassVar[str] = 'stribeck_friction'
     is_friction: ClassVar[bool] = True
     linear = (Parameter('force', 'F_s', 'N', 'breakaway force beyond Coulomb friction', -1e6, 1e6,
-                        scale=0.5),)
+                        0.0, scale=0.5),
+              Parameter('coefficient', 'mu_s', '1', 'the same per load', -100.0, 100.0, 0.0,
+                        scale=0.02))
     shape = (Parameter('velocity', 'v_s', 'm/s', 'Stribeck velocity', 1e-6, FASTEST, scale=0.01,
                        turning=(1e-6, FASTEST_TURN)),
              Parameter('exponent', 'd', '1', 'steepness: 2 Gaussian, 1 exponential', 0.5, 4.0,
                        default=2.0))
-    unphysical_below: ClassVar[Mapping[str, float]] = {'force': 0.0}
+    variants = (('force',), ('coefficient',), ('force', 'coefficient'))
+    unphysical_below: ClassVar[Mapping[str, float]] = {'force': 0.0, 'coefficient': 0.0}
     card = Card(
-        'F_s exp(-|q_dot / v_s|^d) sgn(q_dot)',
+        '(F_s + mu_s N) exp(-|q_dot / v_s|^d) sgn(q_dot)',
         'a peak on either side of each reversal and wherever the drive creeps, none at speed; '
         'over velocity, friction that first falls and then rises',
         'boundary lubrication: guides or nut run dry, the wrong or aged grease, plain guides '
@@ -46,9 +52,10 @@ class StribeckFriction(DriveEffect):
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
-        """Return (exp(-|q_dot / v_s|^d) sgn q_dot,)."""
+        """Return (exp(-|q_dot / v_s|^d) sgn q_dot, and N times that)."""
         slowness = np.abs(drive.velocity / shape['velocity']) ** shape['exponent']
-        return (np.exp(-slowness) * drive.direction,)
+        peak = np.exp(-slowness) * drive.direction
+        return (peak, drive.friction_load * peak)
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:

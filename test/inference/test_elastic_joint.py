@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Joints that wind up between two encoders."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import made_up_arm
+import numpy as np
+import pytest
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint
+from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.model_file import build_model
+
+SWING, NOISE = 1, 0.02  # [N m]
+COMPLIANCE, LOSS = 1.5e-3, 0.02  # [rad/(N m)], [s]
+
+
+def wound_up(model: MechanismModel, compliance: float, loss: float = 0.0, second: bool = True,
+             shift: float = 0.0) -> Recording:
+    """Record a motor that leads a link which moves smoothly, and the link.
+
+    k w + d dw/dt = tau, step by step; friction turns over with the motor.
+    """
+    moved = made_up_arm.motion(20.0)
+    assert moved.time is not None
+    forces = model.drive_forces(moved)
+    load = forces.mechanism.transmitted[:, SWING]
+    step = moved.time[1] - moved.time[0]
+    windup = np.empty_like(load)
+    windup[0] = compliance * load[0]
+    kept = np.exp(-step / loss) if loss else 0.0
+    for k in range(1, len(load)):
+        windup[k] = kept * windup[k - 1] + (1 - kept) * compliance * load[k]
+    width = float(model.reversal.widths(3)[SWING])
+    link = moved.velocity[:, SWING]
+    motor_speed = link + np.gradient(windup, step)
+    viscous, dry = (made_up_arm.FRICTION[f'friction.{name}'][SWING]
+                    for name in ('viscous', 'coulomb'))
+    forces.total[:, SWING] += viscous * (motor_speed - link) + dry * (
+        np.tanh(motor_speed / width) - np.tanh(link / width))
+    random = np.random.default_rng(3)
+
+    def read(position: Array) -> Array:
+        return position + 1e-5 * random.normal(size=position.shape)
+
+    motor = moved.position.copy()
+    motor[:, SWING] += windup + shift
+    effort = forces.total + NOISE * random.normal(size=forces.total.shape)
+    return Recording.from_arrays('run', moved.time, read(motor), None, effort, model.drives, {
+        'link_position': read(moved.position + 0.01)} if second else {})
+
+
+def with_elastic(model: MechanismModel, compliance: float, loss: float) -> MechanismModel:
+    found = build_model({**model.values, 'effects.active': ['elastic_joint'],
+                         'effects.elastic_joint.swing.compliance': compliance,
+                         'effects.elastic_joint.swing.loss': loss}, model.source)
+    assert isinstance(found, MechanismModel)
+    return found
+
+
+def left(model: MechanismModel, recording: Recording) -> float:
+    found = reconstruct(model, recording)
+    error = found.treat(found.effort) - treated_forces(model, found)['total']
+    return float(error[:, SWING].std())
+
+
+def test_a_second_encoder_says_where_the_link_is_and_what_it_carries() -> None:
+    random = np.random.default_rng(1)
+    load = 40 * random.normal(size=200)
+    w = COMPLIANCE * load + 0.003  # its zero is another
+    windup = np.zeros((3, 200, 2))
+    windup[:, :, 1] = w, random.normal(size=200), random.normal(size=200)
+    transmitted = np.stack((load, load), axis=1)
+    effect = ElasticJoint({'turn': {'compliance': 1e-3, 'loss': 0.0}, 'swing': {
+        'compliance': COMPLIANCE, 'loss': 0.0}})
+    drives = ('turn', 'swing')
+    by_load = effect.loaded_position_error(drives, transmitted)
+    np.testing.assert_allclose(by_load, transmitted * [1e-3, COMPLIANCE])
+    q, q_dot, q_ddot = effect.windup_error(drives, transmitted, windup)
+    # Of loads that are right there is nothing to add but the accelerations of the wind-up.
+    np.testing.assert_allclose(q, 0.0, atol=1e-12)
+    np.testing.assert_array_equal(q_dot, 0.0)
+    np.testing.assert_allclose(q_ddot[:, 1], windup[2, :, 1])
+    assert not q_ddot[:, 0].any()  # without a second encoder
+    # A load that the model does not know of is felt by the encoder.
+    heavier = windup.copy()
+    heavier[0, 50, 1] += COMPLIANCE * 10
+    q, _, _ = effect.windup_error(drives, transmitted, heavier)
+    assert q[50, 1] == pytest.approx(COMPLIANCE * 10, rel=0.05)
+
+
+def test_a_model_with_the_joint_leaves_the_noise(tmp_path: Path) -> None:
+    model = made_up_arm.real_arm(tmp_path)
+    recording = wound_up(model, COMPLIANCE, LOSS)
+    noise = left(model, wound_up(model, 0.0))
+    before, after = left(model, recording), left(with_elastic(model, COMPLIANCE, LOSS), recording)
+    assert before > 5 * noise
+    assert after < 1.2 * noise
+    # The load alone tells less than the link's own encoder.
+    alone = wound_up(model, COMPLIANCE, LOSS, second=False)
+    assert after < left(with_elastic(model, COMPLIANCE, LOSS), alone) < before
+
+
+def test_an_elastic_joint_is_found_with_its_compliance(tmp_path: Path) -> None:
+    model = made_up_arm.real_arm(tmp_path)
+    found = diagnose(model, [wound_up(model, COMPLIANCE, LOSS)])
+    assert [(one.name, one.drives) for one in found.effects] == [('elastic_joint', ('swing',))]
+    told = found.effects[0].parameters
+    assert told['swing.compliance'].value == pytest.approx(COMPLIANCE, rel=0.1)
+    assert told['swing.loss'].value == pytest.approx(LOSS, abs=0.01)
+
+
+def test_what_efforts_do_not_show_the_second_encoder_tells(tmp_path: Path) -> None:
+    model = made_up_arm.real_arm(tmp_path)
+    found = diagnose(model, [wound_up(model, 2e-5, LOSS)])
+    assert not found.effects
+    said, = (one for one in found.warnings if 'second encoder' in one)
+    assert 'link of swing' in said
+    number = re.search(r'winds up by (\S+) rad/\(N m\), (\S+) ms', said)
+    assert number is not None
+    assert float(number[1]) == pytest.approx(2e-5, rel=0.1)
+    assert 1e-3 * float(number[2]) == pytest.approx(LOSS, rel=0.3)
+
+
+def test_a_zero_that_is_off_is_none(tmp_path: Path) -> None:
+    model = made_up_arm.real_arm(tmp_path)
+    found = diagnose(model, [wound_up(model, 0.0, shift=0.02)])
+    assert [(one.name, one.drives) for one in found.effects] == [('homing_error', ('swing',))]
+
+
+def test_without_a_second_encoder_it_is_told_by_the_load(tmp_path: Path) -> None:
+    model = made_up_arm.real_arm(tmp_path)
+    found = diagnose(model, [wound_up(model, COMPLIANCE, second=False)])
+    assert found.effects[0].name == 'elastic_joint'
+    told = found.effects[0].parameters['swing.compliance']
+    assert told.value == pytest.approx(COMPLIANCE, rel=0.15)
