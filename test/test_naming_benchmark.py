@@ -11,6 +11,7 @@ import runpy
 import sys
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ from benchmarks.naming.entrants.pprs import answer_of
 from benchmarks.naming.entrants.sindy import unlike
 from benchmarks.naming.entrants.spike_and_slab import spike_and_slab
 from benchmarks.naming.entrants.stepwise import stepwise
-from benchmarks.naming.generate import draws, make
+from benchmarks.naming.generate import draws, make, write_problem
 from benchmarks.naming.page import (
     best_of_settings,
     better_than_ours,
@@ -33,12 +34,20 @@ from benchmarks.naming.page import (
     is_right,
     write_page,
 )
-from benchmarks.naming.problems import Answer, AnswerError, Column, Named, Problem, Truth
+from benchmarks.naming.problems import (
+    VERDICTS,
+    Answer,
+    AnswerError,
+    Column,
+    Named,
+    Problem,
+    Truth,
+)
 from benchmarks.naming.robots import OFFERED, ROBOTS, hidden_names
 from benchmarks.naming.run import enter_all, make_all, score_all
 from benchmarks.naming.scoring import FIGURES, Rate, Scored, figures, judge
 from pprs_dynamics.inference.residuals.noise import NoiseShapes
-from pprs_dynamics.inference.search import fitted_sets, relinearisation, search
+from pprs_dynamics.inference.search import fitted_sets, ranking, relinearisation, search
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.simulation.arm_forms import NAMES
@@ -52,6 +61,8 @@ PAIR = Truth('p', 'axis', 'two', 'white', 1.0, (Named('spring', ('b',)), Named('
 NOTHING = Truth('p', 'axis', 'nothing', 'white', 0.0, ())
 UNKNOWN = Truth('p', 'axis', 'unknown', 'white', 5.0, (Named('bump', ('a',)),))
 FORM = Truth('p', 'axis', 'form', 'white', 5.0, (Named('viscous', ('a',)),))
+ABLATIONS = (ablations.white_noise, ablations.without_prices, ablations.greedy,
+             ablations.given_model)
 TRUTHS = (DRIFT, PAIR, NOTHING, UNKNOWN, FORM)
 
 
@@ -260,12 +271,11 @@ def test_every_entrant_has_a_key_of_its_own() -> None:
     assert all(one.tuning for one in PEERS.values())
 
 
-@pytest.mark.parametrize('without', [
-    ablations.white_noise, ablations.without_prices, ablations.greedy, ablations.given_model])
+@pytest.mark.parametrize('without', ABLATIONS)
 def test_a_part_that_is_left_out_is_there_and_comes_back(
     without: Callable[[Problem], Answer], monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    owners = NoiseShapes, Search, fitted_sets, relinearisation, search
+    owners = NoiseShapes, Search, fitted_sets, ranking, relinearisation, search
     before = [dict(vars(owner)) for owner in owners]
     within: list[bool] = []
 
@@ -276,6 +286,15 @@ def test_a_part_that_is_left_out_is_there_and_comes_back(
     without(problem(0, {}))
     assert within == [True]
     assert [dict(vars(owner)) for owner in owners] == before
+
+
+@pytest.mark.parametrize('without', ABLATIONS)
+def test_this_package_answers_without_a_part_of_it(
+    without: Callable[[Problem], Answer], tmp_path: Path,
+) -> None:
+    draw = next(one for one in draws(1, 24) if one.robot == 'axis')
+    write_problem(draw, tmp_path / draw.name, seconds=8.0)
+    assert without(replace(problem(0, {}), folder=tmp_path / draw.name)).verdict in VERDICTS
 
 
 def test_of_two_settings_the_better_one_is_ranked_and_peers_ahead_are_told() -> None:
