@@ -7,14 +7,17 @@ from __future__ import annotations
 
 import gzip
 import json
+import runpy
+import sys
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.naming import fetch, run
+from benchmarks.naming import columns, fetch, real, run
 from benchmarks.naming.entrants import CONTROL, ENTRANTS, PEERS, Entrant, ablations
 from benchmarks.naming.entrants.controls import perfect, random, silent
 from benchmarks.naming.entrants.cross_validation import block_cross_validation
@@ -23,7 +26,7 @@ from benchmarks.naming.entrants.pprs import answer_of
 from benchmarks.naming.entrants.sindy import unlike
 from benchmarks.naming.entrants.spike_and_slab import spike_and_slab
 from benchmarks.naming.entrants.stepwise import stepwise
-from benchmarks.naming.generate import draws
+from benchmarks.naming.generate import draws, make, write_problem
 from benchmarks.naming.page import (
     best_of_settings,
     better_than_ours,
@@ -31,13 +34,22 @@ from benchmarks.naming.page import (
     is_right,
     write_page,
 )
-from benchmarks.naming.problems import Answer, AnswerError, Column, Named, Problem, Truth
-from benchmarks.naming.robots import ROBOTS, hidden_names
+from benchmarks.naming.problems import (
+    VERDICTS,
+    Answer,
+    AnswerError,
+    Column,
+    Named,
+    Problem,
+    Truth,
+)
+from benchmarks.naming.robots import OFFERED, ROBOTS, hidden_names
 from benchmarks.naming.run import enter_all, make_all, score_all
 from benchmarks.naming.scoring import FIGURES, Rate, Scored, figures, judge
 from pprs_dynamics.inference.residuals.noise import NoiseShapes
-from pprs_dynamics.inference.search import fitted_sets, relinearisation, search
+from pprs_dynamics.inference.search import fitted_sets, ranking, relinearisation, search
 from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.simulation.arm_forms import NAMES
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
 
@@ -49,6 +61,8 @@ PAIR = Truth('p', 'axis', 'two', 'white', 1.0, (Named('spring', ('b',)), Named('
 NOTHING = Truth('p', 'axis', 'nothing', 'white', 0.0, ())
 UNKNOWN = Truth('p', 'axis', 'unknown', 'white', 5.0, (Named('bump', ('a',)),))
 FORM = Truth('p', 'axis', 'form', 'white', 5.0, (Named('viscous', ('a',)),))
+ABLATIONS = (ablations.white_noise, ablations.without_prices, ablations.greedy,
+             ablations.given_model)
 TRUTHS = (DRIFT, PAIR, NOTHING, UNKNOWN, FORM)
 
 
@@ -167,6 +181,17 @@ def test_files_of_an_entrant_of_ones_own_are_scored(tmp_path: Path) -> None:
     assert found['intervals hold'] == Rate(1, 1)
 
 
+def test_the_entrant_of_the_protocols_page_runs_and_is_scored(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    page = (Path(run.__file__).parent / 'README.md').read_text()
+    (tmp_path / 'mine.py').write_text(page.partition('```python\n')[2].partition('```')[0])
+    folder_of(tmp_path, 'one', 'other')
+    monkeypatch.setattr(sys, 'argv', ['mine.py', str(tmp_path)])
+    runpy.run_path(str(tmp_path / 'mine.py'))
+    assert figures(score_all(tmp_path)['mine'])['exact, one'] == Rate(2, 2)
+
+
 def folder_of(tmp_path: Path, *problems: str) -> Path:
     """Return a folder with problems in which a spring is hidden."""
     (tmp_path / 'truth').mkdir()
@@ -246,12 +271,11 @@ def test_every_entrant_has_a_key_of_its_own() -> None:
     assert all(one.tuning for one in PEERS.values())
 
 
-@pytest.mark.parametrize('without', [
-    ablations.white_noise, ablations.without_prices, ablations.greedy, ablations.given_model])
+@pytest.mark.parametrize('without', ABLATIONS)
 def test_a_part_that_is_left_out_is_there_and_comes_back(
     without: Callable[[Problem], Answer], monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    owners = NoiseShapes, Search, fitted_sets, relinearisation, search
+    owners = NoiseShapes, Search, fitted_sets, ranking, relinearisation, search
     before = [dict(vars(owner)) for owner in owners]
     within: list[bool] = []
 
@@ -262,6 +286,15 @@ def test_a_part_that_is_left_out_is_there_and_comes_back(
     without(problem(0, {}))
     assert within == [True]
     assert [dict(vars(owner)) for owner in owners] == before
+
+
+@pytest.mark.parametrize('without', ABLATIONS)
+def test_this_package_answers_without_a_part_of_it(
+    without: Callable[[Problem], Answer], tmp_path: Path,
+) -> None:
+    draw = next(one for one in draws(1, 24) if one.robot == 'axis')
+    write_problem(draw, tmp_path / draw.name, seconds=8.0)
+    assert without(replace(problem(0, {}), folder=tmp_path / draw.name)).verdict in VERDICTS
 
 
 def test_of_two_settings_the_better_one_is_ranked_and_peers_ahead_are_told() -> None:
@@ -352,6 +385,30 @@ def test_a_diagnosis_is_an_answer_with_its_rivals() -> None:
 def test_what_may_be_hidden_can_be_simulated() -> None:
     for robot in ROBOTS:
         assert set(hidden_names(robot)) <= set(IN_CATALOGUE if robot == '3-PPRS' else NAMES)
+
+
+def test_columns_are_of_the_library_whatever_the_catalogue_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert {name for robot in ROBOTS for name in hidden_names(robot)} <= OFFERED <= set(CATALOGUE)
+    draw = next(one for one in draws(1, 24) if one.robot == 'axis')
+    monkeypatch.setattr(columns, 'OFFERED', OFFERED - {'viscous_friction'})
+    make(draw, tmp_path)
+    effects = {one.effect for one in Problem.read(tmp_path / draw.name).columns}
+    assert 'coulomb_friction' in effects
+    assert 'viscous_friction' not in effects
+
+
+def test_recordings_are_shipped_with_licence_and_source() -> None:
+    text = (real.RECORDINGS / 'README.md').read_text()
+    folders = sorted(one for one in real.RECORDINGS.iterdir() if one.is_dir())
+    assert [one.name for one in folders] == ['iiwa', 'kr300', 'pendulum', 'schunk']
+    for folder in folders:
+        assert (folder / 'LICENSE').stat().st_size > 0
+        assert f'| `{folder.name}` | [' in text
+        needed = {file for part in real.PARTS if part.folder == folder.name
+                  for file in (part.recording, part.model, *part.fitted)}
+        assert needed <= {one.name for one in folder.iterdir()}
 
 
 def test_seeds_give_the_same_problems_and_names_that_tell_nothing() -> None:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The columns that every entrant gets: what each effect of the catalogue would add, as arrays."""
+"""The columns that every entrant gets: what each effect of the library would add, as arrays."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from benchmarks.naming.problems import Column, Problem
+from benchmarks.naming.robots import OFFERED
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design, searched_in_drives
 from pprs_dynamics.measurement.files.recording import Recording
@@ -26,6 +27,8 @@ def problem_of(model: ForceModel, recording: Recording) -> Problem:
     columns: list[Column] = []
     rows: list[Array] = []
     for effect in searched_in_drives(design):
+        if effect.name not in OFFERED:
+            continue
         for d, drive in enumerate(design.drives):
             if not design.acts_on(effect, d):
                 continue
@@ -34,6 +37,8 @@ def problem_of(model: ForceModel, recording: Recording) -> Problem:
             for shape in shapes:
                 _add(columns, rows, design, effect, d, drive, shape)
     for term in design.structure:
+        if term.effect.name not in OFFERED:
+            continue
         for k, coefficient in enumerate(term.names):
             rows.append(_stacked({d: of[k] for d, of in term.rows.items()}, error.shape))
             columns.append(Column(term.effect.name, coefficient, None))

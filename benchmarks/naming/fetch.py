@@ -6,9 +6,9 @@
     python -m benchmarks.naming.fetch FOLDER        # then: export PPRS_DATA=FOLDER
 
 UR10e (S. Mamedov) and da Vinci (Y. Wang et al., RA-L 2019) carry no licence: they are yours to
-measure with, and not ours to ship. The pendulum is DFKI's (F. Wiebe et al., JOSS 2022, BSD-3).
-EMPS (A. Janot, M. Gautier, M. Brunot, 2019) is on nonlinearbenchmark.org: put its two MAT files
-into FOLDER/emps. What has another checksum than it had is refused.
+measure with, and not ours to ship. EMPS (A. Janot, M. Gautier, M. Brunot, 2019) is on
+nonlinearbenchmark.org: put its two MAT files into FOLDER/emps. What has another checksum than it
+had is refused.
 """
 
 from __future__ import annotations
@@ -31,8 +31,6 @@ PSM_JOINTS, PSM_SENSORS = ('yaw', 'pitch', 'insertion'), 7
 RAW = 'https://raw.githubusercontent.com'
 UR10E = f'{RAW}/shamilmamedov/dynamic_calibration/11af40e7deb758ec080a175fed8fcdd6c99aca29'
 PSM = f'{RAW}/WPI-AIM/dvrk_dynamics_identification/7697d3a6c90866c1846f0d3054d7f78384ab1ef9/data'
-PENDULUM = (f'{RAW}/dfki-ric-underactuated-lab/torque_limited_simple_pendulum/'
-            'ed17ea2d32a35ad944944ca03ef57693e2986732/results')
 
 
 @dataclass(frozen=True)
@@ -83,14 +81,6 @@ def psm(rate: float) -> Callable[[bytes], bytes]:
     return convert
 
 
-def every(first: int, step: int) -> Callable[[bytes], bytes]:
-    """Return what thins a CSV with a header."""
-    def convert(content: bytes) -> bytes:
-        head, *rows = content.decode().splitlines()
-        return gzip.compress('\n'.join((head, *rows[first::step], '')).encode(), mtime=0)
-    return convert
-
-
 SOURCES = (
     Source(f'{UR10E}/dataset_ur10e/identification_data/ur-20_02_10-30sec_12harm.csv',
            '341fff80f177be564c8720ea898165addfd46d7cbe6f3ffd8923eeaae0eef000',
@@ -125,15 +115,6 @@ SOURCES = (
     Source(f'{PSM}/psm_simplified/measured_trajectory/one_results_0.5_scale_105_grams_parallel.csv',
            '31c78632def6143f6dc56dd734fbf632ed5a3b3e8fa5ba8bb2dfaa62c96e9e7b',
            'dvrk/load_parallel_105_slow.csv.gz', psm(100.0)),
-    Source(f'{PENDULUM}/control_method_gravity_compensation/data_measured.csv',
-           '1d15acddde86dbe513418bc964cfac8230c3d2afa4d088a2ba9fd94b68da0c78',
-           'pendulum/gc.csv.gz', every(0, 10)),
-    Source(f'{PENDULUM}/control_method_energy_shaping/data_measured.csv',
-           'e1844e56f87cf763bdecb3f6f7e5b622a9a3b2d71e907b48ed6148b0a059c209',
-           'pendulum/free.csv.gz', every(2, 4)),
-    Source(f'{PENDULUM}/control_method_energy_shaping/data_measured_1kg.csv',
-           '61d782d4797500fb2e7f42b4ad80c8c694e5e5ebdf5862535acb94a475b950d2',
-           'pendulum/kg.csv.gz', every(2, 4)),
 )
 
 

@@ -5,11 +5,12 @@
 
     python -m benchmarks.naming.real FOLDER
 
-The recordings are not part of the package: `benchmarks.naming.fetch` gets what may be had from its
-source; what is not in ../shared or below PPRS_DATA is passed over. What is known: the authors'
-finding (EMPS), a weight that was put on (UR10e, da Vinci, pendulum), that efforts are the
-controller's own command (pendulum), or that a number of a fitted model was set to 0. Base models
-come from `pprs fit`, on runs without the weight. FOLDER is entered and scored like any other.
+Recordings whose licence allows it lie in `recordings`; `benchmarks.naming.fetch` gets others from
+their source, and what is then not in ../shared/data or below PPRS_DATA is passed over. What is
+known: the authors' finding (EMPS), a weight that was put on (UR10e, da Vinci, pendulum), that
+efforts are the controller's own command (pendulum) or late (iiwa), or that a number of a fitted
+model was set to 0. Base models come from `pprs fit`, on runs without the weight. FOLDER is entered
+and scored like any other.
 """
 
 from __future__ import annotations
@@ -28,7 +29,6 @@ from pathlib import Path
 from benchmarks import ROOT
 from benchmarks.naming.columns import problem_of
 from benchmarks.naming.problems import Named, Truth
-from benchmarks.naming.robots import MODELS
 from pprs_dynamics.app.commands.pprs import main as pprs
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 from pprs_dynamics.physics.model.model_file import load_model
@@ -43,7 +43,7 @@ import recorded_data
 
 UR10E_FREE = tuple(f'{name}.csv.gz' for name in arms.FITTED)
 UR10E_JOINTS = ('shoulder_lift_joint', 'elbow_joint', 'wrist_2_joint')
-CASES = '../shared/cases'  # beside the project; else as `recorded_data.find_data` looks for it
+RECORDINGS = Path(__file__).parent / 'recordings'  # that are shipped
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Part:
     ----------
     machine : str
     folder : str
-        Where its files are, below one of those of `_data`.
+        Of its files, below one of those of `_data`.
     recording : str
     effect : str
         What the model lacks; '' for efforts that are no measurement.
@@ -111,22 +111,21 @@ PARTS = (
               UR10E_FREE),
     *(Part('psm', 'dvrk', f'{name}.csv.gz', 'link_mass', None, PSM, (closed_chain.FREE,), True)
       for name in closed_chain.LOADED),
-    Part('pendulum', 'pendulum', 'kg.csv.gz', 'payload_mass', None, str(MODELS / 'pendulum.yaml'),
+    Part('pendulum', 'pendulum', 'kg.csv.gz', 'payload_mass', None, 'pendulum.yaml',
          ('free.csv.gz',)),
-    Part('pendulum', 'pendulum', 'gc.csv.gz', '', None, str(MODELS / 'pendulum.yaml')),
-    Part('iiwa', 'kuka_lag', 'j4_1_half.csv.gz', 'time_delay', ('j4',), 'j4.yaml',
+    Part('pendulum', 'pendulum', 'gc.csv.gz', '', None, 'pendulum.yaml'),
+    Part('iiwa', 'iiwa', 'j4_1_half.csv.gz', 'time_delay', ('j4',), 'j4.yaml',
          ('j4_1_half.csv.gz',)),
-    *_without('kr300', 'kr300_degrees', 'A.csv.gz', 'kr.yaml', ('a2', 'a3'), 'viscous',
-              ('A.csv.gz',)),
-    *_without('schunk', 'noise_zero', 'm100.csv.gz', 'base.yaml', ('a2', 'a4'), 'viscous'),
+    *_without('kr300', 'kr300', 'A.csv.gz', 'kr.yaml', ('a2', 'a3'), 'viscous', ('A.csv.gz',)),
+    *_without('schunk', 'schunk', 'm100.csv.gz', 'lwa.yaml', ('a2', 'a4'), 'viscous'),
 )
 
 
 def _data(part: Part) -> Path | None:
     """Return the folder with a part's files, None where there is none."""
-    case = ROOT / CASES / part.folder
-    return recorded_data.find_data(part.folder, part.recording) or (
-        case if (case / part.recording).is_file() else None)
+    shipped = RECORDINGS / part.folder
+    return (shipped if (shipped / part.recording).is_file()
+            else recorded_data.find_data(part.folder, part.recording))
 
 
 def _base(part: Part, data: Path, folder: Path) -> Path:

@@ -22,6 +22,11 @@ OF_PLATFORM = ('homing_error', 'effort_filter', 'joint_friction', 'joint_spring'
                'link_mass')
 OF_ARM = ('gear_efficiency', 'homing_error', 'effort_filter', 'payload_mass', 'link_mass',
           'base_tilt', 'external_wrench')
+# What columns are offered of: all that may be hidden, and what else a regression may take it for.
+# A list of its own for the same reason: with another column a problem is another one.
+OFFERED = frozenset({
+    *ON_DRIVES, *OF_PLATFORM, *OF_ARM, 'counterbalance', 'coupled_drives', 'current_gain',
+    'friction_temperature', 'lost_motion'})
 
 
 def model_of(robot: str) -> Path:

@@ -19,7 +19,7 @@ def silent(problem: Problem) -> Answer:
 
 def random(problem: Problem) -> Answer:
     """Name one effect of the columns at random, on a drive at random where it sits on drives."""
-    text = str(problem.folder or problem.time[-1])
+    text = problem.folder.name if problem.folder else str(problem.time[-1])
     rng = np.random.default_rng(zlib.crc32(text.encode()))
     names = sorted({column.effect for column in problem.columns})
     name = names[int(rng.integers(len(names)))]
