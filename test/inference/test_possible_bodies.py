@@ -84,3 +84,16 @@ def test_a_moment_has_a_mass_within_reach(robot: Mechanism, tmp_path: Path) -> N
     assert found is not None
     assert np.linalg.norm(found[1:]) <= REACH * robot.structure.size * found[0] * (1 + 1e-9)
     assert found[0] > 0.1
+
+
+@pytest.mark.filterwarnings('error')
+def test_a_body_of_which_the_fit_says_nothing_is_any(robot: Mechanism) -> None:
+    """As of a stretch of four samples: its steps overflowed."""
+    component = payload(robot, 3)
+    assert len(component.names) == 10
+    unknown = np.diag([11.5 ** 2, *[1e300] * 9])
+    found = nearest_possible(robot, component, np.zeros(10), unknown)
+    assert found is not None
+    added, left = least_extents(robot, component, found)
+    assert added > -1e-6
+    assert left > -1e-6

@@ -128,6 +128,7 @@ def _offers(fits: FittedSets, base: CandidateSet,
     residuals, shape = fits.design.residuals, fits.design.residuals.measured.shape
     courses = list(_courses(fits))
     weights = np.array([one.weight(residuals.time, residuals.period) for one in courses])
+    lengths = weights.sum(axis=1)
     for found, candidate in effects:
         force = fits.library.force(found, candidate, shape)
         rows = {d: fits.regression.series[d].transform(
@@ -139,7 +140,10 @@ def _offers(fits: FittedSets, base: CandidateSet,
                  for d, series in fits.regression.series.items()}
         test = ScoreTest(fits.regression, every,
                          [Entry(course, (k,)) for k, course in enumerate(courses)])
+        # Of a stretch of no more samples than coefficients anything can be said.
+        told = lengths > sum(len(one.names) for one in candidate.components)
         for labels, gains in test.gains(base.fit):
+            gains = np.where(told, gains, -np.inf)
             ranked = np.argsort(-gains)
             for kind in (DRIFT, SINCE, DURING):
                 at = next(k for k in ranked if labels[k].kind == kind)

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 MARGIN = 1e-6  # of a body's size, by which it is possible: values are rounded
 THIN = 1e-6  # of a body's largest second moment, which its least is taken to have
 MOST_STEPS, MOST_HALVINGS = 40, 20
+HEAVIEST = 1e9  # [kg, kg m, kg m^2]: beyond it nothing is a body
 RADIUS, LEAST_MASS = 0.02, 1e-6  # [m, kg], of a small ball, and of a body that is any
 DOUBTED = 2.0  # deviations, within which it may be added or taken away
 POINT = {'mass', *(f'moment_{axis}' for axis in AXES)}  # what makes a body without extent
@@ -123,13 +124,25 @@ def _nearest(robot: Mechanism, component: Component, c: Array, covariance: Array
 
     from scipy.optimize import NonlinearConstraint, minimize  # here: commands start without it
 
+    impossible = np.full(len(margins(start)), -1.0)
+
     def distance(u: Array) -> float:
         return float(u @ u)
 
+    def is_body(values: Array) -> bool:
+        return bool(np.max(np.abs(values)) < HEAVIEST)  # which NaN is not
+
+    def possible(u: Array) -> Array:
+        values: Array = c + root @ u
+        return margins(values) if is_body(values) else impossible
+
     u = minimize(distance, np.linalg.solve(root, start - c), method='SLSQP',
-                 constraints=NonlinearConstraint(lambda u: margins(c + root @ u), 0.0, np.inf),
+                 constraints=NonlinearConstraint(possible, 0.0, np.inf),
                  options={'maxiter': MOST_STEPS}).x
+    # Steps run away where a body weighs next to nothing, or the fit says nothing of it.
     found: Array = c + root @ u
+    if not is_body(found):
+        found = start
     # What rounding leaves outside is brought back towards the ball.
     for share in (0.0, 1e-6, 1e-4, 1e-2, 0.1, 0.3, 1.0):
         within: Array = found + share * (start - found)
