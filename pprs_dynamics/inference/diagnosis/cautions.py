@@ -12,7 +12,7 @@ import numpy as np
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.search.candidates import SINCE, CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint, told_by_windup
+from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint
 
 
 def find_cautions(
@@ -65,18 +65,11 @@ def _wound_up(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]
     """Look for second encoders that tell of a wind-up which efforts do not."""
     design = fits.design
     told = {name for one in effects if one.name == ElasticJoint.name for name in one.drives or ()}
-    read = [(one.transmitted, found.windup) for one, found in zip(
-        design.recordings, design.reconstructions, strict=False) if found.windup is not None]
-    for d, name in enumerate(design.drives if read else ()):
-        load = np.concatenate([one[:, d] for one, _ in read])
-        windup = np.concatenate([one[:, :, d] for _, one in read], axis=1)
-        if name in told or not np.ptp(load) or not np.any(windup):
-            continue
-        stiffness, damping, said = told_by_windup(load, windup)
-        if stiffness > 0 and np.var(said) > fits.decisions.explained * np.var(load):
-            units = design.given.units[d]
+    for d, windup in design.windups.items():
+        name, units = design.drives[d], design.given.units[d]
+        if name not in told and windup.explained > fits.decisions.explained:
             yield (f'the link of {name} is not where its motor is: by its second encoder it winds '
-                   f'up by {1 / stiffness:.3g} {units.of("m/N")}, {1e3 * damping / stiffness:.2g} '
+                   f'up by {windup.compliance:.3g} {units.of("m/N")}, {1e3 * windup.loss:.2g} '
                    'ms behind its load, which changes the efforts by less than can be told')
 
 

@@ -68,6 +68,7 @@ from pprs_dynamics.physics.effects.drive_effect import (
 )
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
+from pprs_dynamics.physics.effects.laws.elastic_joint import Windup, told_by_windup
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -320,6 +321,22 @@ class Design:
                 base += [replace(one, rows=design.present_rows(one))
                          for one in present_columns(effect, design.uncertainties(effect))]
         return replace(design, base=tuple(base))
+
+    @cached_property
+    def windups(self) -> dict[int, Windup]:
+        """What second encoders tell of drives that wind up under their loads."""
+        read = [(one.transmitted, found.windup) for one, found in zip(
+            self.recordings, self.reconstructions, strict=False) if found.windup is not None]
+        found = {}
+        for d in range(len(self.drives) if read else 0):
+            load = np.concatenate([one[:, d] for one, _ in read])
+            windup = np.concatenate([one[:, :, d] for _, one in read], axis=1)
+            if np.ptp(load) and np.any(windup):
+                stiffness, damping, said = told_by_windup(load, windup)
+                if stiffness > 0:
+                    found[d] = Windup(1 / stiffness, damping / stiffness,
+                                      float(np.var(said) / np.var(load)))
+        return found
 
     def moving(self, drive: int) -> np.typing.NDArray[np.bool_]:
         """Return when a drive is in motion, (M,)."""

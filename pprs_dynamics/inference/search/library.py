@@ -35,6 +35,7 @@ from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint
 from pprs_dynamics.system.parallel import lazy
 
 
@@ -237,14 +238,24 @@ class Library:
         precision = np.zeros(max(len(component.names), 1))
         given = self.design.given
         known = {c.name: c for c in component.effect.coefficients}
+        seen = self._seen(component)
         for k, name in enumerate(component.names):
             expected = known[name].expected
             if expected is not None:
                 limit = given.values.get(f'tolerances.{component.effect.name}.{name}')
-                usual = expected[component.drive is not None
-                                 and given.units[component.drive].turns]
+                # A second encoder sees a joint that is softer than joints usually are.
+                usual = max(seen.get(name, 0.0), expected[
+                    component.drive is not None and given.units[component.drive].turns])
                 precision[k] = (limit / DEVIATIONS if limit else usual) ** -2
         return np.diag(precision)
+
+    def _seen(self, component: Component) -> dict[str, float]:
+        """Return sizes of coefficients that a further sensor shows, by name."""
+        windup = (self.design.windups.get(component.drive)
+                  if component.effect is ElasticJoint and component.drive is not None else None)
+        if windup is None or windup.explained <= self.prices.decisions.explained:
+            return {}
+        return {'compliance': windup.compliance, 'loss': abs(windup.loss)}
 
     def at_edge(self, component: Component, share: float) -> list[str]:
         """Return the shape parameters at the edge of what is tried, `share` of it or nearer."""
@@ -309,7 +320,8 @@ class Library:
 
         With signs that are physical; what others cost more is known once they are fitted.
         That an effect is usually small makes large values unlikely, and small ones no likelier:
-        it costs by how much that narrows the prior, and the odds that it is otherwise at all.
+        it costs by how much that narrows the prior, and the odds that it is otherwise at all, which
+        a further sensor settles.
         """
         if component not in self._prices:
             usual, narrowed, odds = self._expected(component), 0.0, 0.0
@@ -317,7 +329,7 @@ class Library:
                 decisions, both = self.prices.decisions, self.block(component).precision
                 both = both[:len(usual), :len(usual)]
                 narrowed = float(np.linalg.slogdet(both)[1] - np.linalg.slogdet(both - usual)[1])
-                if component.drive is not None:
+                if component.drive is not None and not self._seen(component):
                     odds = -2 * float(np.log(
                         decisions.zero_odds if component.effect.shifts_positions()
                         else decisions.gain_odds))

@@ -12,6 +12,7 @@ speed is as read.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -66,6 +67,23 @@ class ElasticJoint(MeasurementEffect):
             error[0, :, k] = values['compliance'] * (said - load) - values['loss'] * w[1]
             error[2, :, k] = values['compliance'] * stiffness * w[2]
         return error
+
+
+@dataclass(frozen=True)
+class Windup:
+    """What a second encoder tells of a drive.
+
+    Parameters
+    ----------
+    compliance, loss : float
+        Wind-up per load [m/N, rad/(N m)], and by how much it is behind it [s].
+    explained : float
+        Share of the load's variance that the wind-up explains.
+    """
+
+    compliance: float
+    loss: float
+    explained: float
 
 
 def told_by_windup(load: Array, windup: Array) -> tuple[float, float, Array]:
