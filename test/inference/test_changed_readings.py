@@ -13,6 +13,7 @@ import pytest
 
 from pprs_dynamics import DriveModel, Recording
 from pprs_dynamics.inference.residuals.conventions import find_mistakes
+from pprs_dynamics.inference.residuals.excerpt import excerpt_of, forces_on
 from pprs_dynamics.inference.residuals.mistakes import OtherReading
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
@@ -72,3 +73,17 @@ def test_positions_that_change_to_millimetres(is_after: bool, words: str) -> Non
     part = AFTER if is_after else ~AFTER
     found = told(position=POSITION * np.where(part, 1e3, 1.0))
     assert any('millimetres' in one.text and words in one.text for one in found)
+
+
+def test_a_drive_that_is_held_for_a_while_is_in_no_other_unit() -> None:
+    """As axis 4 of a KR 300: next to nothing is asked of it at first, and a brake pushes."""
+    held = 4000
+    position, effort = POSITION.copy(), EFFORT.copy()
+    position[:held] = position[held]
+    excerpt = excerpt_of(Recording.from_arrays('r', TIME, position, None, effort))
+    assert excerpt is not None
+    forces = forces_on(MODEL, excerpt.motion, excerpt.time)
+    assert forces is not None
+    effort[:held] = forces[excerpt.time < TIME[held // 2]][-1]
+    effort[:held, 1] = 20.0
+    assert told(position, effort) == []

@@ -128,7 +128,10 @@ def _change(effort: Array, forces: Array) -> tuple[float, int, bool] | None:
         for is_after, (one, two) in ((True, (plain, other)), (False, (other, plain))):
             left = one[0][splits] + two[0][-1] - two[0][splits]
             size = one[1][splits] + two[1][-1] - two[1][splits]
-            unlike = left / size
+            # A part in which next to nothing is asked for is small in any larger unit: what
+            # changed must itself be as the model has it.
+            part = [two[k][-1] - two[k][splits] if is_after else one[k][splits] for k in (0, 1)]
+            unlike = np.where(part[0] < GOOD_FIT * part[1], left / size, np.inf)
             at = int(np.argmin(unlike))
             if CLEARLY_BETTER * unlike[at] < min(least, whole) and unlike[at] < GOOD_FIT and (
                     best is None or unlike[at] < best[0]):
