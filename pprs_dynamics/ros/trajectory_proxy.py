@@ -31,7 +31,7 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.preparation import prepare
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.ros.force_command import DriveTrajectory, Feedforward, parameters_for
+from pprs_dynamics.ros.force_command import Feedforward, parameters_for
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.serialisation import CommandObjects
@@ -174,9 +174,9 @@ class TrajectoryProxyNode(ExplainsRefusals):
         model, own = self._settings.model, self._settings.own
         feedforward = Feedforward(model, own)
         answer = feedforward.answer(self._request(model, goal))
-        drives = DriveTrajectory(answer.request.offsets, answer.forces.drive_motion, answer.effort)
-        if np.abs(drives.drive_motion[1][-1]).max() <= STILL:  # else it is refused
-            drives = feedforward.ending_at_rest(answer, SETTLING)
+        velocity = answer.forces.drive_motion[1]
+        is_still = np.abs(velocity[-1]).max() <= STILL  # else it is refused
+        drives = feedforward.ending_at_rest(answer, SETTLING if is_still else 0.0)
         trajectory = CommandObjects(RobotNames.of(model)).joint_trajectory(
             0, drives.offsets, drives, drives.effort)
         given = goal.trajectory if goal.trajectory.points else goal.multi_dof_trajectory

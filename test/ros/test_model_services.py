@@ -17,7 +17,8 @@ from rclpy.parameter import Parameter
 from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.monitor import MonitorNode
 
-std_srvs = pytest.importorskip('std_srvs.srv')
+std_srvs = pytest.importorskip(
+    'std_srvs.srv', reason='services are offered where std_srvs is installed, as make test does')
 
 pytestmark = pytest.mark.nodes
 

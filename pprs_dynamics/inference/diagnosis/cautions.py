@@ -65,9 +65,9 @@ def _wound_up(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]
     """Look for second encoders that tell of a wind-up which efforts do not."""
     design = fits.design
     told = {name for one in effects if one.name == ElasticJoint.name for name in one.drives or ()}
-    for d, windup in design.windups.items():
+    for d, windup in fits.library.windups.items():
         name, units = design.drives[d], design.given.units[d]
-        if name not in told and windup.explained > fits.decisions.explained:
+        if name not in told:
             yield (f'the link of {name} is not where its motor is: by its second encoder it winds '
                    f'up by {windup.compliance:.3g} {units.of("m/N")}, {1e3 * windup.loss:.2g} '
                    'ms behind its load, which changes the efforts by less than can be told')

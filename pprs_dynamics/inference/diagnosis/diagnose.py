@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -535,13 +536,15 @@ class _Answer:
 
     def _above_noise(self, floors: Mapping[str, float]) -> dict[str, float]:
         """Return the drives that keep more than noise and forms leave, as multiples of noise."""
-        # A constant that slow noise would show as well is none of it.
-        kept = {self.drives[d]: float(np.nanstd(self.remaining[:, d])) / max(
-            floors[self.drives[d]], 1e-300) for d in self.fits.regression.drives}
-        allowed = {name: np.hypot(self.decisions.left_ratio, self._lack_of_fit(
-            self.drives.index(name)) / max(floors[name], 1e-300)) for name in kept}
-        return {name: ratio for name, ratio in kept.items() if ratio > allowed[name]
-                and self._is_worth_a_word(self.drives.index(name))}
+        found = {}
+        for d in self.fits.regression.drives:
+            floor = max(floors[self.drives[d]], 1e-300)
+            # A constant that slow noise would show as well is none of it.
+            kept = float(np.nanstd(self.remaining[:, d])) / floor
+            allowed = np.hypot(self.decisions.left_ratio, self._lack_of_fit[d] / floor)
+            if kept > allowed and self._is_worth_a_word(d):
+                found[self.drives[d]] = kept
+        return found
 
     def _is_worth_a_word(self, d: int) -> bool:
         """Return whether what is left on a drive is more than a negligible share of its effort."""
@@ -571,19 +574,20 @@ class _Answer:
                     libraries[d], candidate, self.dated.fit.of(block), evidence))
         drifting = levels(self.fits.regression.residuals, dict(noise), self.decisions)
         statements += [one for name, one in drifting.items()
-                       if one.amplitude > self._lack_of_fit(self.drives.index(name))]
+                       if one.amplitude > self._lack_of_fit[self.drives.index(name)]]
         return tuple(sorted(statements, key=lambda one: -one.evidence))
 
-    def _lack_of_fit(self, d: int) -> float:
-        """Return what the forms of the adopted effects may leave on a drive, rms [N].
+    @cached_property
+    def _lack_of_fit(self) -> list[float]:
+        """What the forms of the adopted effects may leave, by drive, rms [N].
 
         A share of their sum: what others nearly cancel is no force of a machine.
         """
-        force = np.zeros(len(self.remaining))
+        force = np.zeros(self.remaining.shape)
         for one in self.dated.effects:
             if one.effect.idealised:
-                force += self.dated_fits.library.force(self.dated, one, self.remaining.shape)[:, d]
-        return self.decisions.form_share * root_mean_square(force)
+                force += self.dated_fits.library.force(self.dated, one, self.remaining.shape)
+        return [self.decisions.form_share * root_mean_square(of_drive) for of_drive in force.T]
 
     def _candidates(self) -> tuple[RankedEffect, ...]:
         """Return the effects that were fitted as the only one, the best first."""

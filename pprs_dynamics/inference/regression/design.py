@@ -65,10 +65,11 @@ from pprs_dynamics.physics.effects.drive_effect import (
     DriveSamples,
     GainEffect,
     MeasurementEffect,
+    Windup,
 )
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
-from pprs_dynamics.physics.effects.laws.elastic_joint import Windup, told_by_windup
+from pprs_dynamics.physics.effects.laws.elastic_joint import told_by_windup
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.force_model import ForceModel

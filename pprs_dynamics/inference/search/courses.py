@@ -140,7 +140,7 @@ def _offers(fits: FittedSets, base: CandidateSet,
                  for d, series in fits.regression.series.items()}
         test = ScoreTest(fits.regression, every,
                          [Entry(course, (k,)) for k, course in enumerate(courses)])
-        # Of a stretch of no more samples than coefficients anything can be said.
+        # A stretch of no more samples than coefficients can be explained by anything.
         told = lengths > sum(len(one.names) for one in candidate.components)
         for labels, gains in test.gains(base.fit):
             gains = np.where(told, gains, -np.inf)

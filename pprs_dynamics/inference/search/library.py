@@ -33,9 +33,8 @@ from pprs_dynamics.inference.search.candidates import (
 )
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect, Windup
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint
 from pprs_dynamics.system.parallel import lazy
 
 
@@ -249,13 +248,18 @@ class Library:
                 precision[k] = (limit / DEVIATIONS if limit else usual) ** -2
         return np.diag(precision)
 
-    def _seen(self, component: Component) -> dict[str, float]:
+    @cached_property
+    def windups(self) -> dict[int, Windup]:
+        """What second encoders tell of the drives whose wind-up follows their load."""
+        return {d: windup for d, windup in self.design.windups.items()
+                if windup.explained > self.prices.decisions.explained}
+
+    def _seen(self, component: Component) -> Mapping[str, float]:
         """Return sizes of coefficients that a further sensor shows, by name."""
-        windup = (self.design.windups.get(component.drive)
-                  if component.effect is ElasticJoint and component.drive is not None else None)
-        if windup is None or windup.explained <= self.prices.decisions.explained:
+        effect, d = component.effect, component.drive
+        if d is None or d not in self.windups or not issubclass(effect, MeasurementEffect):
             return {}
-        return {'compliance': windup.compliance, 'loss': abs(windup.loss)}
+        return effect.sizes_seen(self.windups[d])
 
     def at_edge(self, component: Component, share: float) -> list[str]:
         """Return the shape parameters at the edge of what is tried, `share` of it or nearer."""

@@ -86,6 +86,23 @@ class DriveRange:
     middle: float = 0.0
 
 
+@dataclass(frozen=True)
+class Windup:
+    """What a second encoder, on the link, tells of a drive.
+
+    Parameters
+    ----------
+    compliance, loss : float
+        Wind-up per load [m/N, rad/(N m)], and by how much it is behind it [s].
+    explained : float
+        Share of the load's variance that the wind-up explains.
+    """
+
+    compliance: float
+    loss: float
+    explained: float
+
+
 class DriveEffect(CatalogueEffect):
     """An effect that acts in drives, each with its own parameters.
 
@@ -263,14 +280,14 @@ class MeasurementEffect(DriveEffect):
                           ) -> tuple[Array, ...]:
         """Return how what real sensors add departs from the form, (N,) each; see `deviations`.
 
-        Parameters
-        ----------
-        effort : (N,) array
-            Of one drive, as the sensor would see it without the effect [N].
-        time : (N,) array or None
-            [s]
+        Of effort and time as `sensor_columns` has them.
         """
         return ()
+
+    @classmethod
+    def sizes_seen(cls, windup: Windup) -> Mapping[str, float]:
+        """Return how large coefficients are by a second encoder on the link, none by default."""
+        return {}
 
     @classmethod
     def shifts_positions(cls) -> bool:

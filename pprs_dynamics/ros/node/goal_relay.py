@@ -129,9 +129,10 @@ class GoalRelay:
             nonlocal was_there
             # Discovery is one-sided: a server may see us a moment after we see it, and its answer
             # to a goal in between is lost.
+            is_there = self.server_is_there()
             if not found.done() and (was_there or time.monotonic() > deadline):
-                found.set_result(self.server_is_there())
-            was_there = self.server_is_there()
+                found.set_result(is_there)
+            was_there = is_there
 
         timer = steady_timer(self._node, LOOK_PERIOD, look)
         try:

@@ -23,7 +23,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import DriveRange, MeasurementEffect
+from pprs_dynamics.physics.effects.drive_effect import ALONE, DriveRange, MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 
 LAGS = 2
@@ -62,10 +62,9 @@ class EffortFilter(MeasurementEffect):
         """Return what one lag instead of two adds, of which other orders do a share."""
         if time is None or len(time) < 2:
             return (np.zeros_like(effort),)
-        step, T = float(np.median(np.diff(time))), shape['time_constant']
-        half = lag(effort, step, T / 2, effort[0], effort[0])
-        two = lag(half, step, T / 2, half[0], half[0])
-        return (lag(effort, step, T, effort[0], effort[0]) - two,)
+        step = float(np.median(np.diff(time)))
+        two = cls({ALONE: shape}).sensed(effort[:, None], time, (ALONE,))[:, 0]
+        return (lag(effort, step, shape['time_constant'], effort[0], effort[0]) - two,)
 
     @classmethod
     def drive_memory(cls) -> Any:

@@ -12,13 +12,12 @@ speed is as read.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect, Windup
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
 
 LINK_POSITION = 'link_position'
@@ -49,6 +48,11 @@ class ElasticJoint(MeasurementEffect):
         'Spong, Modeling and control of elastic joint robots, ASME J. Dynamic Systems, '
         'Measurement, and Control 109, 1987')
 
+    @classmethod
+    def sizes_seen(cls, windup: Windup) -> Mapping[str, float]:
+        """Return compliance and loss."""
+        return {'compliance': windup.compliance, 'loss': abs(windup.loss)}
+
     def loaded_position_error(self, drives: Sequence[str], transmitted: Array) -> Array:
         """Return how far encoders are ahead because of loads, (N, D) [m, rad]."""
         softness = [self.drives.get(name, {}).get('compliance', 0.0) for name in drives]
@@ -67,23 +71,6 @@ class ElasticJoint(MeasurementEffect):
             error[0, :, k] = values['compliance'] * (said - load) - values['loss'] * w[1]
             error[2, :, k] = values['compliance'] * stiffness * w[2]
         return error
-
-
-@dataclass(frozen=True)
-class Windup:
-    """What a second encoder tells of a drive.
-
-    Parameters
-    ----------
-    compliance, loss : float
-        Wind-up per load [m/N, rad/(N m)], and by how much it is behind it [s].
-    explained : float
-        Share of the load's variance that the wind-up explains.
-    """
-
-    compliance: float
-    loss: float
-    explained: float
 
 
 def told_by_windup(load: Array, windup: Array) -> tuple[float, float, Array]:
