@@ -20,6 +20,7 @@ import numpy as np
 import pytest
 from workbench_bench import HIDDEN, write_hidden
 
+from pprs_dynamics import read_recording
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench import Session
@@ -29,6 +30,7 @@ from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.long_work import DesignedMotion
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.offered import Offered
+from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
 from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.views import EXACT, FITTED, LINEAR
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
@@ -496,3 +498,63 @@ def test_a_recording_is_let_go_of(tmp_path: Path) -> None:
     session.remove(str(other))
     assert session.to_dict()['held_out'] == []
     assert session.fits is fits
+
+
+class TestASavedSession:
+    def test_goes_on_where_it_was_left(self, recording: Path, tmp_path: Path) -> None:
+        session = Session.open([recording])
+        session.tick('payload_mass')
+        session.settle()
+        assert session.adopt('payload_mass', force=True).result(120).adopted
+        session.tick('coulomb_friction', ['lift_2'])
+        session.choose('coulomb_friction', 'lift_2.force', 0.7)
+        shown = session.settle()
+        session.save(tmp_path / 'session.json')
+        again = Session.load(tmp_path / 'session.json')
+        assert again.model.values == session.model.values
+        assert [step.effect for step in again.steps] == [step.effect for step in session.steps]
+        assert again.history.undoes == ''  # nothing was done in this one
+        after = again.settle()
+        assert set(after.ticks) == {'coulomb_friction'}
+        assert after.estimates['coulomb_friction']['lift_2.force'].value == 0.7
+        assert after.departure == pytest.approx(shown.departure, rel=1e-6)
+        np.testing.assert_allclose(again.now, session.now, atol=1e-9)
+        again.undo()
+        assert again.steps == []
+
+    @pytest.mark.parametrize(('change', 'said'), [
+        (lambda run, file: run.write_text(run.read_text() + '\n'), 'run.csv has changed since'),
+        (lambda run, file: run.unlink(), 'run.csv: No such file'),
+        (lambda run, file: file.write_text('{'), 'cannot be read as a session'),
+        (lambda run, file: file.write_text('[]'), 'is no session'),
+        (lambda run, file: file.write_text(file.read_text().replace('"ticks": [', '"tick": [')),
+         'is no session')])
+    def test_is_refused_where_it_is_none_any_more(
+        self, session: Session, recording: Path, tmp_path: Path, change: Any, said: str,
+    ) -> None:
+        run, file = tmp_path / 'run.csv', tmp_path / 'session.json'
+        run.write_bytes(recording.read_bytes())
+        session.save(file)
+        file.write_text(file.read_text().replace(str(recording), str(run)))
+        assert SavedSession.read(file).ticks == ()
+        change(run, file)
+        with pytest.raises(PprsError, match=said):
+            SavedSession.read(file)
+
+    def test_has_effects_of_the_catalogue(self, session: Session, tmp_path: Path) -> None:
+        saved = SavedSession(session.inputs, session.model, (SavedTick('payload', None, {}),))
+        with pytest.raises(PprsError, match="unknown effect 'payload'"):
+            session.resume(saved)
+
+    def test_is_not_written_of_what_is_in_no_file(self, recording: Path, tmp_path: Path) -> None:
+        session = Session(load_model('config/paper.yaml'), {'run': read_recording(recording)})
+        with pytest.raises(SessionError, match='recording run is in no file'):
+            session.save(tmp_path / 'session.json')
+        assert not (tmp_path / 'session.json').exists()
+
+    def test_is_opened_alone(self, session: Session, recording: Path, tmp_path: Path,
+                             capsys: pytest.CaptureFixture[str]) -> None:
+        file = tmp_path / 'session.json'
+        session.save(file)
+        assert main(['workbench', str(file), str(recording), '--no-browser']) == 2
+        assert 'is a session, must be given alone' in capsys.readouterr().err

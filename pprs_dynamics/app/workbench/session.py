@@ -21,6 +21,7 @@ from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.history import History, Moment
 from pprs_dynamics.app.workbench.long_work import DesignedMotion, designed, diagnosed
 from pprs_dynamics.app.workbench.masks import Mask, quantity, region_mask, shares_in, span_mask
+from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
 from pprs_dynamics.app.workbench.tick_fits import Place, Tick, TickFits
 from pprs_dynamics.app.workbench.views import DriveError, Share, ViewState
 from pprs_dynamics.arrays import Array, root_mean_square
@@ -141,6 +142,53 @@ class Session:
         session.inputs = inputs
         return session
 
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Session:
+        """Go on with a session that was saved.
+
+        Raises
+        ------
+        PprsError
+            As `SavedSession.read`; as `of`.
+        """
+        saved = SavedSession.read(path)
+        session = cls.of(saved.inputs)
+        session.resume(saved)
+        session.find_mistakes()
+        return session
+
+    def resume(self, saved: SavedSession) -> None:
+        """Take over the model and the ticks of a saved session of the same recordings.
+
+        Raises
+        ------
+        PprsError
+            As `tick` and `choose`.
+        """
+        with self._lock:
+            self._use(self._fits_of(saved.model))
+            for tick in saved.ticks:
+                self.tick(tick.effect, tick.drives)
+                for key, value in tick.values.items():
+                    self.choose(tick.effect, key, value)
+            self.history = History()
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write what `load` goes on with.
+
+        Raises
+        ------
+        PprsError
+            As `SavedSession.write`.
+        """
+        with self._lock:
+            ticks = tuple(SavedTick(name, views.names_of(tick.best, self.drives), {
+                (name if drive is None else f'{self.drives[drive]}.{name}'): value
+                for (drive, name), value in tick.chosen.items()})
+                for name, tick in self.view_state.ticks.items())
+            saved = SavedSession(self.inputs, self.model, ticks)
+        saved.write(path)
+
     def _use(self, fits: TickFits, ticks: Mapping[str, Tick] | None = None) -> None:
         """Begin with a model, from what was ticked under another."""
         with self._lock:
@@ -182,7 +230,7 @@ class Session:
         with self._reading:
             fewer = self.inputs.without(name)
             while not self._take(fewer, self.fits if name in self.inputs.validation
-                                 else TickFits(self.model, fewer.fitted)):
+                                 else TickFits(self.model, fewer.fitted, fewer.reference)):
                 pass  # the model was changed meanwhile
         self.notify()
 
@@ -436,7 +484,7 @@ class Session:
                 return self._linear(dict(moment.ticks))
             self.diagnosis = self.diagnosis if moment.model is self.model else None
             fits = (self.fits if moment.model is self.model
-                    else TickFits(moment.model, self.fits.recordings))
+                    else self._fits_of(moment.model))
             self._use(fits, moment.ticks)
             return self.view_state
 
@@ -587,9 +635,12 @@ class Session:
             values, step = without_last_step(self.model.values)
             model = replace(build_model(values), source=self.model.source)
             self.diagnosis = None
-            self._use(TickFits(model, self.fits.recordings, self.inputs.reference),
-                      self.view_state.ticks)
+            self._use(self._fits_of(model), self.view_state.ticks)
             return step
+
+    def _fits_of(self, model: ForceModel) -> TickFits:
+        """Return the fits of another model to the same recordings."""
+        return TickFits(model, self.fits.recordings, self.inputs.reference)
 
     # What goes out
 

@@ -131,7 +131,7 @@ class Api:
 
     def answers(self) -> dict[str, Callable[[Any], Response]]:
         """Return what is asked for by GET, with a query."""
-        return {'model.yaml': self.model, 'ledger.json': self.ledger,
+        return {'model.yaml': self.model, 'ledger.json': self.ledger, 'session.json': self.session,
                 'experiment.csv': self.experiment_file, 'live/machine': self.live_machine,
                 **{work.__name__: work for work in (
                     self.screen, self.curves, self.scatter, self.robot, self.files, self.live)}}
@@ -221,6 +221,10 @@ class Api:
         steps = [step.to_dict() for step in self.hub.the_session.steps]
         return attached('ledger.json', 'application/json',
                         json.dumps({'steps': steps}, indent=2).encode())
+
+    def session(self, query: Any) -> Response:
+        """Answer what `pprs workbench` goes on with."""
+        return self._download('session.json', 'application/json', self.hub.save)
 
     @staticmethod
     def _download(name: str, kind: str, write: Callable[[Path], None]) -> Response:
