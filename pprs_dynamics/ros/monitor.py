@@ -253,6 +253,9 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
                 f'than two in a row; {text}')
         elif self._changed:
             self._status.report('WARN', 'CHANGED', f'{self._changed}; {text}')
+        elif different := self._model_services.difference():
+            self._status.report('WARN', 'MODEL', f'{different}: what is compared is not what '
+                                f'drives; {text}')
         else:
             self._status.report('OK', 'OK', text)
 

@@ -33,6 +33,7 @@ from pprs_dynamics.app.workbench.server.offered import Offered
 from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
 from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.views import EXACT, FITTED, LINEAR
+from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.ledger import read_steps
@@ -498,6 +499,19 @@ def test_a_recording_is_let_go_of(tmp_path: Path) -> None:
     session.remove(str(other))
     assert session.to_dict()['held_out'] == []
     assert session.fits is fits
+
+
+def test_a_reference_stays_when_a_recording_goes(tmp_path: Path) -> None:
+    healthy, run, other = (write_hidden(tmp_path / f'{seed}.csv', seed, hidden={
+        'effects.active': ['coulomb_friction'], 'effects.coulomb_friction.lift_2.force': 0.2})
+        for seed in (1, 2, 3))
+    alone = Session.of(Inputs.of('config/paper.yaml', run).since([healthy])).before
+    # What was there in the reference, too, is no error.
+    without = Session.open([run]).before
+    assert root_mean_square(alone[:, 4]) < 0.8 * root_mean_square(without[:, 4])
+    session = Session.of(Inputs.of('config/paper.yaml', [run, other]).since([healthy]))
+    session.remove(str(other))
+    np.testing.assert_allclose(session.before, alone, atol=1e-9)
 
 
 class TestASavedSession:
