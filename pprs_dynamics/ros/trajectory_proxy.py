@@ -46,7 +46,7 @@ from pprs_dynamics.ros.messages.trajectory_request import (
 from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.ros.node.parameters import drive_count, own_parameter
+from pprs_dynamics.ros.node.parameters import drive_count, node_parameter
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.senders import publishers_of
@@ -54,10 +54,10 @@ from pprs_dynamics.ros.node.status import StatusReporter
 
 # Of the feedforward node's parameters, those that say what may go out.
 SHARED = ('feedforward_scale', 'effort_limits', 'limit_policy', 'missing_derivatives')
-ACTION = own_parameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
-                       'of the controller that the goals are passed on to', stays=True)
-TIMEOUT = own_parameter('controller_timeout', 5.0, 'silence of the controller after which a goal '
-                        'is aborted [s]; 0: only where it has gone', lower=0, upper=3600)
+ACTION = node_parameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
+                        'of the controller that the goals are passed on to', stays=True)
+TIMEOUT = node_parameter('controller_timeout', 5.0, 'silence of the controller after which a goal '
+                         'is aborted [s]; 0: only where it has gone', lower=0, upper=3600)
 Goal = FollowJointTrajectory.Goal
 Result = FollowJointTrajectory.Result
 # [s] after the last point of a goal at rest in which its inertia's effort goes over to none: the

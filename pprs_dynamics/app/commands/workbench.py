@@ -11,8 +11,8 @@ from __future__ import annotations
 import argparse
 import re
 
+from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.arguments import add_reference, add_topic, add_validation, whole
-from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.server.hub import Hub, LiveSource
 from pprs_dynamics.app.workbench.server.offered import Offered, is_folder

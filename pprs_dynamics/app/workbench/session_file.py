@@ -16,7 +16,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.app.front_door.inputs import Inputs
+from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.fingerprint import fingerprint
