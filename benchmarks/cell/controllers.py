@@ -193,6 +193,7 @@ def goal(ending: str) -> dict[str, Any]:
         running.wait(lambda: status, 'trajectory_proxy')
         client = ActionClient(running.node, FollowJointTrajectory,
                               '/trajectory_proxy/follow_joint_trajectory')
+        another = running.node.create_publisher(JointTrajectory, f'/{JTC}/joint_trajectory', 1)
         running.wait(client.server_is_ready, 'the proxy\'s action')
         running.spin(1.0)
         handle = running.answered(client.send_goal_async(path_goal(FollowJointTrajectory)), 'goal')
@@ -203,6 +204,11 @@ def goal(ending: str) -> dict[str, Any]:
         elif ending == 'deactivated':
             running.spin(HALF_WAY)
             running.switch(deactivate=[JTC])
+        elif ending == 'replaced':
+            running.spin(HALF_WAY)
+            now = states.since(0.0)[1][-1]
+            another.publish(JointTrajectory(
+                joint_names=list(DRIVES), points=[JointTrajectoryPoint(positions=now.tolist())]))
         elif ending in ENDED_BY:
             running.spin(HALF_WAY)
             running.end_manager(ENDED_BY[ending])
@@ -418,6 +424,7 @@ CASES: dict[str, Callable[[], dict[str, Any]]] = {
     'goal canceled': lambda: goal('canceled'),
     'goal aborted': lambda: goal('aborted'),
     'goal deactivated': lambda: goal('deactivated'),
+    'goal, trajectory replaced': lambda: goal('replaced'),
     'goal, controller killed': lambda: goal('killed'),
     'goal, controller stopped': lambda: goal('stopped'),
     'two robots': two_robots,

@@ -7,7 +7,8 @@ MoveIt and other planners send goals to `~/follow_joint_trajectory`; the node co
 efforts at every point and sends the goal on to the controller's own action. Feedback, result and
 cancelling pass through. A goal that breaks a rule, or asks for what the robot cannot do, is aborted
 with the reason in `error_string`, and nothing reaches the controller. So is one whose controller
-goes, or falls silent, in the middle of it.
+goes, or falls silent, in the middle of it, or says that it is reached long before it can be: a
+controller goes over to what comes on its topic meanwhile, and answers the goal by that.
 
 A controller holds a pose without any effort by itself, after it has become active, and after a goal
 was cancelled or aborted: the node then sends it that pose at rest, with its gravity.
@@ -45,23 +46,27 @@ from pprs_dynamics.ros.messages.trajectory_request import (
 from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.ros.node.parameters import drive_count, own_parameter
+from pprs_dynamics.ros.node.parameters import drive_count, node_parameter
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
+from pprs_dynamics.ros.node.senders import publishers_of
 from pprs_dynamics.ros.node.status import StatusReporter
 
 # Of the feedforward node's parameters, those that say what may go out.
 SHARED = ('feedforward_scale', 'effort_limits', 'limit_policy', 'missing_derivatives')
-ACTION = own_parameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
-                       'of the controller that the goals are passed on to', stays=True)
-TIMEOUT = own_parameter('controller_timeout', 5.0, 'silence of the controller after which a goal '
-                        'is aborted [s]; 0: only where it has gone', lower=0, upper=3600)
+ACTION = node_parameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
+                        'of the controller that the goals are passed on to', stays=True)
+TIMEOUT = node_parameter('controller_timeout', 5.0, 'silence of the controller after which a goal '
+                         'is aborted [s]; 0: only where it has gone', lower=0, upper=3600)
 Goal = FollowJointTrajectory.Goal
 Result = FollowJointTrajectory.Result
 # [s] after the last point of a goal at rest in which its inertia's effort goes over to none: the
 # controller holds the effort of the very last point until it is told another.
 SETTLING = 0.02
 STILL = 1.1920929e-07  # [m/s, rad/s] joint_trajectory_controller's own bound for standing
+# Share of a goal's motion before the end of which the answer that it is reached is not believed;
+# a controller's clock and its last cycles take less.
+LEFT_AT_MOST = 0.1
 ERROR_CODES = {'NAMES': Result.INVALID_JOINTS}  # of rejections; INVALID_GOAL for all others
 
 
@@ -88,6 +93,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
         self._joints = RobotNames.of(self._settings.model).joints
         self._controller, self._hold_is_due = ControllerWatch(self._joints), False
         where = own['action'].rpartition('/')[0]
+        self._speed_scaling = 1.0  # the largest that the controller has told
         self._hold = publisher(self, JointTrajectory, f'{where}/joint_trajectory')
         subscription(self, JointTrajectoryControllerState, f'{where}/{STATE_TOPIC}',
                      self._on_controller)
@@ -101,17 +107,23 @@ class TrajectoryProxyNode(ExplainsRefusals):
             reason = Rejection.of(error)
             return self._refused(handle, reason.code, reason.text,
                                  ERROR_CODES.get(reason.code, Result.INVALID_GOAL))
-        if said := self._is_late(goal):
-            return self._refused(handle, 'TIME', said, Result.OLD_HEADER_TIMESTAMP)
+        duration = _duration(goal, self.get_clock().now().nanoseconds)
+        if duration < 0:
+            return self._refused(handle, 'TIME', f'the trajectory ended {-duration:.3f} s ago',
+                                 Result.OLD_HEADER_TIMESTAMP)
         if max(np.abs(goal.trajectory.points[-1].velocities)) > STILL:
             return self._refused(handle, 'REFUSED', 'the last point is in motion: the controller '
                                  'would never say that the goal is reached; end at rest',
                                  Result.INVALID_GOAL)
         try:
-            watched = await self._relay.accepted(handle, goal, self._duration(goal))
+            tolerance = conversions.nanoseconds(goal.goal_time_tolerance)
+            watched = await self._relay.accepted(
+                handle, goal, duration + tolerance / conversions.NANOSECONDS)
             self._counters['passed_on'] += 1
             self._status.report('OK', 'OK', 'a goal was passed on with its efforts')
             answer = await self._relay.finished(watched)
+            if answer.status == GoalStatus.STATUS_SUCCEEDED:
+                self._check_in_time(goal, watched.sent_at)
         except ControllerError as error:
             self._hold_is_due = self._hold_is_due or error.began
             # It has not kept to the path, and where it is is not known.
@@ -132,8 +144,11 @@ class TrajectoryProxyNode(ExplainsRefusals):
 
     def _on_controller(self, state: Any) -> None:
         """Let the controller hold with gravity where it would hold without."""
-        active = self._controller.heard(state) is not None
-        if not (active or self._hold_is_due) or not self._relay.is_idle or (
+        self._speed_scaling = max(self._speed_scaling, state.speed_scaling_factor)
+        if self._controller.heard(state) is not None:  # it has become active
+            self._hold_is_due = True
+        # It would go over to the hold in the middle of a goal, which brings its own efforts.
+        if not (self._hold_is_due and self._relay.is_idle) or (
                 not set(self._joints) <= set(state.joint_names)):
             return
         values = dict(zip(state.joint_names, state.reference.positions, strict=False))
@@ -149,12 +164,22 @@ class TrajectoryProxyNode(ExplainsRefusals):
             0, np.zeros(1, dtype=np.int64), held.forces, held.effort))
         self.get_logger().info('the controller holds with gravity')
 
-    def _is_late(self, goal: Any) -> str:
-        """Return that a goal's motion would be over by now; '' where it is not."""
-        start = conversions.nanoseconds(goal.trajectory.header.stamp)
-        end = start + conversions.nanoseconds(goal.trajectory.points[-1].time_from_start)
-        late = (self.get_clock().now().nanoseconds - end) / conversions.NANOSECONDS
-        return f'the trajectory ended {late:.3f} s ago' if start and late > 0 else ''
+    def _check_in_time(self, goal: Any, sent_at: int) -> None:
+        """Check that a goal's motion can be over.
+
+        Raises
+        ------
+        ControllerError
+            Where the controller, which says that the goal is reached, has followed something else.
+        """
+        passed = (self.get_clock().now().nanoseconds - sent_at) / conversions.NANOSECONDS
+        left = _duration(goal, sent_at) - passed * self._speed_scaling
+        if left > LEFT_AT_MOST * _duration(goal, sent_at):
+            topic = self._hold.topic_name
+            raise ControllerError(
+                f'the controller says that the goal is reached {left:.2f} s before its last point: '
+                f'it followed another trajectory, which came on {topic}, where these publish: '
+                f'{publishers_of(self, topic)}', began=True)
 
     def _refused(self, handle: Any, status: Code, text: str, code: int) -> Any:
         self._counters['refused'] += 1
@@ -185,13 +210,6 @@ class TrajectoryProxyNode(ExplainsRefusals):
             trajectory=trajectory, path_tolerance=goal.path_tolerance,
             goal_tolerance=goal.goal_tolerance, goal_time_tolerance=goal.goal_time_tolerance)
 
-    def _duration(self, goal: Any) -> float:
-        """Return how long from now a goal's motion may take [s]."""
-        start = conversions.nanoseconds(goal.trajectory.header.stamp)
-        ahead = max(start - self.get_clock().now().nanoseconds, 0) if start else 0
-        return (ahead + conversions.nanoseconds(goal.trajectory.points[-1].time_from_start)
-                + conversions.nanoseconds(goal.goal_time_tolerance)) / conversions.NANOSECONDS
-
     def _request(self, model: Any, goal: Any) -> TrajectoryRequest:
         now = self.get_clock().now().nanoseconds
         missing = self._settings.own['missing_derivatives']
@@ -209,6 +227,13 @@ class TrajectoryProxyNode(ExplainsRefusals):
         found = solve_forward_motion(
             model.robot.geometry, drives.position, drives.velocity, drives.acceleration)
         return TrajectoryRequest(found.motion, request.start, request.offsets)
+
+
+def _duration(goal: Any, now: int) -> float:
+    """Return how long a goal's motion takes from a moment [ns] on, in which it is sent [s]."""
+    start = conversions.nanoseconds(goal.trajectory.header.stamp) or now
+    end = start + conversions.nanoseconds(goal.trajectory.points[-1].time_from_start)
+    return (end - now) / conversions.NANOSECONDS
 
 
 def _end_at_rest(goal: Any) -> None:

@@ -26,7 +26,7 @@ def node(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 @needs_node
-@pytest.mark.parametrize('name', ['curve_files', 'format', 'ridge', 'server', 'views'])
+@pytest.mark.parametrize('name', ['curve_files', 'format', 'ridge', 'client', 'views'])
 def test_modules_do_what_they_say(name: str) -> None:
     done = node('--test', ROOT / 'test' / 'browser' / f'{name}.test.mjs')
     assert done.returncode == 0, done.stdout

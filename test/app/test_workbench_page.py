@@ -20,6 +20,7 @@ from workbench_page import Page
 from workbench_server import Workbench, workbench
 
 from pprs_dynamics.app.commands.pprs import main
+from pprs_dynamics.app.workbench.session_file import SavedSession
 from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_file import load_model
 
@@ -328,10 +329,22 @@ def test_adopt_refuse_export_undo(page: Page, folder: Path) -> None:
         found = json.loads((folder / 'compared.json').read_text())
         for drive, one in shown['errors'].items():
             assert one[key] == pytest.approx(found['drives'][drive]['rms'], rel=5e-5)
+    with page.tab.expect_download() as started:
+        page.tab.locator('#save-session').click()
+    started.value.save_as(folder / 'session.json')
+    saved = SavedSession.read(folder / 'session.json')
+    assert [one.effect for one in saved.ticks] == ['coulomb_friction']
+    assert [step.effect for step in read_steps(saved.model.values)] == ['payload_mass']
     page.tab.locator('#undo').click()
     page.tab.wait_for_function('bench.state.steps.length === 0')
     page.settled()
     assert page.tab.locator('#undo').is_disabled()
+    # What cannot be saved is told on the page.
+    run = folder / 'run.csv'
+    run.rename(folder / 'elsewhere.csv')
+    page.tab.locator('#save-session').click()
+    page.tab.locator('#message', has_text='run.csv: No such file').wait_for()
+    (folder / 'elsewhere.csv').rename(run)
 
 
 def test_an_adoption_is_called_off(page: Page) -> None:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import yaml
 from controller_rules import WAY, ControllerSettings, objection
 from node_bench import bench
 from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
@@ -217,15 +219,35 @@ class TestTrajectoryProxy:
             running.spin_for(0.8)
             assert not result.done()
 
-            def execute(handle: Any) -> Any:
+            held = running.listen(JointTrajectory, '/arm/joint_trajectory')
+            states = JointStates(running, resting_goal(action).trajectory.points[0].positions)
+
+            async def execute(handle: Any) -> Any:
+                await after(running, duration_of(handle.request.trajectory))
                 handle.succeed()
                 return action.Result()
 
+            running.spin_for(0.3)
             server = ActionServer(running.probe, action, '/arm/follow_joint_trajectory', execute)
             assert running.spin_until(result.done)
             assert result.result().result.error_code == 0, result.result().result.error_string
+            running.spin_for(0.3)
+            # A controller that has just become active would go over to the hold, and call the
+            # goal reached; the goal brings its own gravity.
+            assert held == []
+            states.stop()
             server.destroy()
             client.destroy()
+
+    @pytest.mark.nodes
+    def test_a_goal_that_something_else_replaced_is_not_told_as_reached(self, action: Any) -> None:
+        with controller(action, share=0.5) as (bench, client, _):
+            publisher = bench.probe.create_publisher(JointTrajectory, '/arm/joint_trajectory', 1)
+            result = answered(bench, client, resting_goal(action, 2.0)).result
+            assert result.error_code == action.Result.PATH_TOLERANCE_VIOLATED
+            assert result.error_string.startswith('CONTROLLER: the controller says that the goal')
+            assert '/probe, /trajectory_proxy' in result.error_string
+            bench.probe.destroy_publisher(publisher)
 
     @pytest.mark.nodes
     @pytest.mark.parametrize('ending', ['abort', 'succeed'])
@@ -284,11 +306,11 @@ class TestFeedforwardOfAController:
 class JointStates:
     """States of a controller that holds one position."""
 
-    def __init__(self, bench: Any, position: np.ndarray, controller: str = '/arm') -> None:
+    def __init__(self, bench: Any, position: Sequence[float], controller: str = '/arm') -> None:
         from control_msgs.msg import JointTrajectoryControllerState
 
         message = JointTrajectoryControllerState(joint_names=list(DRIVES))
-        message.reference.positions = position.tolist()
+        message.reference.positions = list(position)
         message.output.effort = [0.0] * len(DRIVES)
         publisher = bench.probe.create_publisher(
             type(message), f'{controller}/controller_state', 10)
@@ -299,12 +321,12 @@ class JointStates:
         self._timer.cancel()
 
 
-def resting_goal(action: Any) -> Any:
-    """Return a goal that is reached at rest."""
+def resting_goal(action: Any, duration: float = 0.2) -> Any:
+    """Return a goal that is reached at rest after a duration [s]."""
     found = DriveModel.load().drive_forces(HelicalPath().motion([1.0]).held()).drive_motion
     goal = action.Goal()
     goal.trajectory.joint_names = list(DRIVES)
-    goal.trajectory.points.append(point(0.2, *(each[0] for each in found)))
+    goal.trajectory.points.append(point(duration, *(each[0] for each in found)))
     return goal
 
 
@@ -327,8 +349,28 @@ def answered(bench: Any, client: Any, goal: Any) -> Any:
     return result.result()
 
 
-def controller(action: Any, ending: str = 'succeed') -> Any:
-    """Return a context with the proxy, a client of it, and what reaches a stand-in controller."""
+def duration_of(trajectory: JointTrajectory) -> float:
+    """Return when a trajectory reaches its last point [s]."""
+    return conversions.nanoseconds(trajectory.points[-1].time_from_start) / 1e9
+
+
+def after(bench: Any, duration: float) -> Future[None]:
+    """Return what is done after a time [s]."""
+    passed: Future[None] = Future()
+
+    def end() -> None:
+        timer.cancel()
+        passed.set_result(None)
+
+    timer = bench.probe.create_timer(duration, end)
+    return passed
+
+
+def controller(action: Any, ending: str = 'succeed', share: float = 1.0) -> Any:
+    """Return a context with the proxy, a client of it, and what reaches a stand-in controller.
+
+    It ends a goal after a share of its motion.
+    """
     from contextlib import contextmanager
 
     from rclpy.action import ActionClient, ActionServer
@@ -341,13 +383,14 @@ def controller(action: Any, ending: str = 'succeed') -> Any:
         with bench() as running_bench:
             taken: list[Any] = []
 
-            def execute(handle: Any) -> Any:
+            async def execute(handle: Any) -> Any:
                 trajectory = handle.request.trajectory
                 now = running_bench.probe.get_clock().now().nanoseconds
                 if said := objection(trajectory, settings(), now):
                     handle.abort()
                     return action.Result(error_code=-1, error_string=said)
                 taken.append(trajectory)
+                await after(running_bench, share * duration_of(trajectory))
                 getattr(handle, ending)()
                 return action.Result()
 

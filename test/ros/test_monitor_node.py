@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 
 import numpy as np
@@ -15,10 +16,12 @@ from node_bench import bench
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from supervisor import Supervisor
 
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.node.qos import LATCHED
 
 pytestmark = pytest.mark.nodes
 
@@ -75,6 +78,25 @@ def test_an_effort_that_is_not_a_number_is_no_measurement(monitor: MonitorBench)
     assert np.isfinite(np.delete(residual, 2, axis=1)).all()
     assert np.isfinite(monitor.error[-1].data).all()
     assert np.isfinite([message.effort for message in monitor.model_effort]).all()
+
+
+def test_a_feedforward_of_another_model_is_told(monitor: MonitorBench) -> None:
+    publisher = monitor.bench.probe.create_publisher(String, '/feedforward/status', LATCHED)
+    own = monitor.node._settings.model.fingerprint
+    for sha256, code in (('0' * 64, 'MODEL'), (own, 'OK')):
+        publisher.publish(String(data=json.dumps({'model': {'sha256': sha256}})))
+        assert monitor.bench.spin_until(
+            lambda sha256=sha256: monitor.node._model_services._in_force == sha256)
+        monitor.send(400)
+        assert monitor.bench.status[-1]['code'] == code
+    publisher.publish(String(data=json.dumps({'model': {'sha256': '0' * 64}})))
+    monitor.send(300)
+    assert f'sha256 {12 * "0"}, not {own[:12]}' in monitor.bench.status[-1]['message']
+    monitor.bench.probe.destroy_publisher(publisher)  # nothing drives any more
+    assert monitor.bench.spin_until(
+        lambda: not monitor.node.count_publishers('/feedforward/status'))
+    monitor.send(300)
+    assert monitor.bench.status[-1]['code'] == 'OK'
 
 
 def test_messages_that_are_no_joint_states_of_this_robot_are_counted_and_survived(
@@ -163,7 +185,8 @@ def test_all_joints_are_published_while_somebody_draws_them(monitor: MonitorBenc
     joints = monitor.bench.listen(JointState, '/monitor/joint_states_full', 1000)
     assert monitor.bench.connected()
     monitor.send(200)
-    assert monitor.bench.spin_until(lambda: monitor.node._joints._made)  # beside the node
+    # Beside the node; compilers take their time where nothing is compiled yet.
+    assert monitor.bench.spin_until(lambda: monitor.node._joints._made, 60)
     monitor.send(200)
     assert monitor.bench.spin_until(lambda: joints)
     monitor.bench.spin_for(0.2)

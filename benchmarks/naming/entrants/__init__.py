@@ -27,7 +27,7 @@ from benchmarks.naming.entrants.stepwise import stepwise
 from benchmarks.naming.problems import Answer, Problem
 
 OURS, PEER, PART, CONTROL = 'ours', 'peer', 'ours without a part', 'control'
-ROOMS = ('physics', 'measurement', 'inference', 'app/front_door')  # that a diagnosis is made of
+LAYERS = ('physics', 'measurement', 'inference', 'app/api')  # that a diagnosis is made of
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ class Entrant:
                  if name.startswith(f'{__name__}.')]
         if self.sort in (OURS, PART):
             package = Path(pprs_dynamics.__file__).parent
-            files += [file for room in ROOMS for file in sorted((package / room).rglob('*.py'))]
+            files += [file for room in LAYERS for file in sorted((package / room).rglob('*.py'))]
         return files
 
 

@@ -125,7 +125,7 @@ export const svgOf = (seen, range) => {
     parts.join('\n')}</svg>\n`;
 };
 
-/* Let the browser save a text. */
+/* Let the browser save a text or a blob. */
 export const save = (name, kind, content) => {
   const link = Object.assign(document.createElement('a'),
     {href: URL.createObjectURL(new Blob([content], {type: kind})), download: name});

@@ -13,7 +13,7 @@ import {adoptionSaid, showExperiment, showFiles, showJobs, showLedger, showRecor
 import {drawScale, Robot} from './robot.mjs';
 import {Scatter} from './scatter.mjs';
 import {followScheme, switchScheme} from './scheme.mjs';
-import {rowsOf, Server} from './server.mjs';
+import {Client, rowsOf} from './client.mjs';
 import {showShares} from './shares.mjs';
 
 /* Measured by tests and benchmarks: from an action to the paint that shows its answer [ms]. */
@@ -217,7 +217,7 @@ const loadRobot = async () => {
 
 /* -- what there is ------------------------------------------------------------------------ */
 
-const server = new Server(show, tell);
+const server = new Client(show, tell);
 const ticked = (began) => () => {
   if (began === undefined) return;
   noted(bench.latencies, began);
@@ -302,6 +302,19 @@ on('robot-error', 'change', () => {
   robot.what = $('robot-error').value;
   robot.draw();
 });
+// A link's own way would end in the browser's list of downloads, without the reason.
+for (const link of document.querySelectorAll('a[download]')) {
+  link.addEventListener('click', async (event) => {
+    event.preventDefault();
+    tell('');
+    try {
+      const content = await server.file(link.href);
+      save(link.download, content.type, content);
+    } catch (error) {
+      tell(error.message);
+    }
+  });
+}
 on('undo', 'click', () => server.change('undo', {}));
 for (const id of ['back', 'forward']) on(id, 'click', () => server.change(id, {}));
 on('scheme', 'click', switchScheme);

@@ -11,11 +11,13 @@ from __future__ import annotations
 import argparse
 import re
 
+from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.arguments import add_reference, add_topic, add_validation, whole
-from pprs_dynamics.app.front_door.inputs import Inputs
+from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.server.hub import Hub, LiveSource
 from pprs_dynamics.app.workbench.server.offered import Offered, is_folder
 from pprs_dynamics.app.workbench.server.serve import serve
+from pprs_dynamics.app.workbench.session_file import ENDING, SavedSession
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.system.plain_text import displayed
@@ -31,7 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('recordings', metavar='RECORDING', nargs='*',
                         help='rosbag2 folder, .mcap, .db3 or .csv; or a folder of them, or a '
-                        'store of pprs survey, to choose from in the browser')
+                        'store of pprs survey, to choose from in the browser; or a saved '
+                        'session.json, alone')
     add_validation(parser, 'adoptions are judged on it')
     add_reference(parser)
     add_topic(parser)
@@ -55,12 +58,24 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     given = [path for path in options.recordings if not is_folder(path)]
     # What cannot be read ends the command; measuring takes longer, and goes on behind the page.
-    inputs = Inputs.read(options.model, given, options.validate, options.topic).since(
-        options.reference)
+    saved = _saved(options)
+    inputs = saved.inputs if saved else Inputs.read(
+        options.model, given, options.validate, options.topic).since(options.reference)
     live = _live(options, inputs.model) if options.live else None
-    hub = Hub(inputs, Offered.of(options.recordings), live)
+    hub = Hub(inputs, Offered.of([] if saved else options.recordings), live, saved)
     serve(hub, options.host, options.port, not options.no_browser)
     return 0
+
+
+def _saved(options: argparse.Namespace) -> SavedSession | None:
+    """Read a saved session, which has its recordings and its model in itself; None for none."""
+    paths = [path for path in options.recordings if path.endswith(ENDING)]
+    if not paths:
+        return None
+    if len(options.recordings) > 1 or options.validate or options.reference is not None:
+        raise SessionError(f'{displayed(paths[0])} is a session, must be given alone: it names its '
+                           'recordings')
+    return SavedSession.read(paths[0])
 
 
 def _one_address(text: str) -> str:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.app.fleet.trend import FleetTrends, Quantity, Trend
-from pprs_dynamics.app.fleet.words import change_text, reach_text, sentences
+from pprs_dynamics.app.fleet.trend_sentences import change_text, reach_text, sentences
 from pprs_dynamics.app.report.charts import plotly_objects
 from pprs_dynamics.app.report.page import Page, one_script
 from pprs_dynamics.app.report.pictures import BLUE, GREY, RED

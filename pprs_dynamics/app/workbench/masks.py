@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pprs_dynamics.app.workbench.tick_fits import TickFits
-from pprs_dynamics.app.workbench.views import Share, ViewState, names_of
+from pprs_dynamics.app.workbench.view_state import Share, ViewState, names_of
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 

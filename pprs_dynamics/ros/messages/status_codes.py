@@ -28,7 +28,7 @@ Condition = Literal['OK', 'WAITING', 'CLOCK', 'CONFLICT',
                     'CURVE',
                     'UNCONFIGURED', 'INACTIVE', 'FINALIZED',
                     'HOLD', 'LATE', 'REFUSED', 'SATURATED', 'STOPPED',
-                    'CHANGED', 'UNEXPLAINED', 'GAPS',
+                    'CHANGED', 'UNEXPLAINED', 'GAPS', 'MODEL',
                     'CONTROLLER']
 Code = RejectionCode | Condition
 

@@ -78,18 +78,22 @@ class GoalRelay:
         ------
         ControllerError
         """
-        if not await self._found():
-            raise ControllerError(f'nobody serves {self._name}: is the controller active?')
-        watched = _Watched(handle, duration)
-        sent = self._client.send_goal_async(goal, feedback_callback=watched.on_feedback)
-        if said := await self._lost(sent, watched):
-            sent.add_done_callback(_cancel_late)
-            raise ControllerError(f'{said}; the goal was not accepted')
-        theirs = sent.result()
-        if not theirs.accepted:
-            raise ControllerError('the controller rejected the goal; its log says why')
+        watched = self._running[bytes(handle.goal_id.uuid)] = _Watched(handle, duration)
+        try:
+            if not await self._found():
+                raise ControllerError(f'nobody serves {self._name}: is the controller active?')
+            watched.sent(self._node.get_clock().now().nanoseconds)
+            sent = self._client.send_goal_async(goal, feedback_callback=watched.on_feedback)
+            if said := await self._lost(sent, watched):
+                sent.add_done_callback(_cancel_late)
+                raise ControllerError(f'{said}; the goal was not accepted')
+            theirs = sent.result()
+            if not theirs.accepted:
+                raise ControllerError('the controller rejected the goal; its log says why')
+        except ControllerError:
+            self._forget(watched)
+            raise
         watched.accepted(theirs)
-        self._running[bytes(handle.goal_id.uuid)] = watched
         if handle.is_cancel_requested:  # while the controller made up its mind
             watched.cancel()
         return watched
@@ -110,13 +114,16 @@ class GoalRelay:
                                       'not known', began=True)
             return answer.result()
         finally:
-            watched.ended = True
-            del self._running[bytes(watched.handle.goal_id.uuid)]
+            self._forget(watched)
 
     @property
     def is_idle(self) -> bool:
-        """Whether no goal is being followed."""
+        """Whether no goal is being followed, or is on its way to the server."""
         return not self._running
+
+    def _forget(self, watched: _Watched) -> None:
+        watched.ended = True
+        del self._running[bytes(watched.handle.goal_id.uuid)]
 
     async def _found(self) -> bool:
         """Return whether discovery knows a server, as soon as it does and after a while at most."""
@@ -175,8 +182,12 @@ class _Watched:
     def __init__(self, handle: Any, duration: float) -> None:
         self.handle, self.ended = handle, False
         self.theirs: Any = None
+        self.sent_at = 0  # [ns] by the node's clock
         self._duration = duration
         self._due = time.monotonic()
+
+    def sent(self, now: int) -> None:
+        self.sent_at, self._due = now, time.monotonic()
 
     def accepted(self, theirs: Any) -> None:
         self.theirs = theirs
@@ -188,8 +199,9 @@ class _Watched:
             self.handle.publish_feedback(message.feedback)
 
     def cancel(self) -> None:
-        self._due = min(self._due, time.monotonic())
-        self.theirs.cancel_goal_async()
+        if self.theirs is not None:  # else as soon as it is accepted
+            self._due = min(self._due, time.monotonic())
+            self.theirs.cancel_goal_async()
 
     def silence(self) -> float:
         """Return for how long something has been due [s]."""

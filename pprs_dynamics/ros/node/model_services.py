@@ -68,17 +68,31 @@ class ModelServices:
         self._in_force = ''  # fingerprint of the other node's model
         self._is_busy = False
         self._steps: ModelSteps | None = None
+        subscription(node, String, f'{other}/status', self._on_status, profile=LATCHED)
         if Trigger is None:
             return
         # The one that drives a machine is set last: it is not touched where this one refuses.
         clients = {name: AsyncParameterClient(node, name)
                    for name in (node.get_fully_qualified_name(), other)}
         self._steps = ModelSteps(clients, model()[1])
-        subscription(node, String, f'{other}/status', self._on_status, profile=LATCHED)
         # In a group of their own: while they wait, this node's parameters are set.
         group = ReentrantCallbackGroup()
         for name, work in (('~/adopt_confirmed', self._adopt), ('~/restore', self._restore)):
             node.create_service(Trigger, name, self._answering(work), callback_group=group)
+
+    def difference(self) -> str:
+        """Return that the other node has another model in force; '' where it has not, or is gone.
+
+        What is being set is on one of them first.
+        """
+        is_known = self._in_force and self._node.count_publishers(f'{self._other}/status')
+        return '' if self._is_busy or not is_known else self._different()
+
+    def _different(self) -> str:
+        own = self._model()[0]
+        return '' if self._in_force == own else (
+            f'{self._other} has another model in force than {self._node.get_name()} '
+            f'(sha256 {self._in_force[:12] or "unknown"}, not {own[:12]})')
 
     def _on_status(self, message: String) -> None:
         with suppress(ValueError, AttributeError):
@@ -122,10 +136,8 @@ class ModelServices:
 
     def _adopt(self, steps: ModelSteps, names: Sequence[str]) -> NodeAnswer:
         values = self._adoptable()
-        if self._other in names and self._in_force != self._model()[0]:
-            raise NotAdoptedError(
-                f'{self._other} has another model in force than {self._node.get_name()} '
-                f'(sha256 {self._in_force[:12] or "unknown"}, not {self._model()[0][:12]})')
+        if self._other in names and (different := self._different()):
+            raise NotAdoptedError(different)
         return steps.set_model(values, names)
 
     def _restore(self, steps: ModelSteps, names: Sequence[str]) -> NodeAnswer:

@@ -33,7 +33,7 @@ from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.offered import index_of
 from pprs_dynamics.app.workbench.server.wire import BadRequestError, Fields, attached, binary
 from pprs_dynamics.app.workbench.session import Session
-from pprs_dynamics.app.workbench.views import units_to_dict
+from pprs_dynamics.app.workbench.view_state import units_to_dict
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
@@ -131,7 +131,7 @@ class Api:
 
     def answers(self) -> dict[str, Callable[[Any], Response]]:
         """Return what is asked for by GET, with a query."""
-        return {'model.yaml': self.model, 'ledger.json': self.ledger,
+        return {'model.yaml': self.model, 'ledger.json': self.ledger, 'session.json': self.session,
                 'experiment.csv': self.experiment_file, 'live/machine': self.live_machine,
                 **{work.__name__: work for work in (
                     self.screen, self.curves, self.scatter, self.robot, self.files, self.live)}}
@@ -162,7 +162,8 @@ class Api:
             known = index_of(str((query or {}).get('since', '')), hub.log.version + 1)
             changes = hub.log.since(-1 if known is None else known)
             return binary({**changes, 'count': count, 'version': hub.log.version},
-                          {'now': session.now.T} if session and 'drawn' in changes else {})
+                          {'now': session.current_residual.T}
+                          if session and 'drawn' in changes else {})
 
     def curves(self, query: Any) -> Response:
         """Answer times and the error before."""
@@ -175,7 +176,7 @@ class Api:
                 {'generation': self.hub.generation, 'drives': list(session.drives),
                  'quantities': quantities(data)},
                 {'seconds': whole, 'rest': data.time - whole, 'segment': data.segment.astype(float),
-                 'before': session.before.T, 'measured': data.measured.T})
+                 'before': session.given_residual.T, 'measured': data.measured.T})
 
     def tick(self, body: Fields) -> Response:
         """Tick or untick an effect."""
@@ -196,8 +197,8 @@ class Api:
             drive = body.get('drive')
             mask = session.span(*body.range('time'), None if drive is None else [str(drive)])
         return JSONResponse({'shares': [asdict(one) for one in session.shares(mask)],
-                             'before': finite(root_mean_square(session.before[mask])),
-                             'now': finite(root_mean_square(session.now[mask])),
+                             'before': finite(root_mean_square(session.given_residual[mask])),
+                             'now': finite(root_mean_square(session.current_residual[mask])),
                              'spans': spans_of(session.data, mask),
                              'samples': int(mask.sum()), 'revision': session.revision})
 
@@ -221,6 +222,10 @@ class Api:
         steps = [step.to_dict() for step in self.hub.the_session.steps]
         return attached('ledger.json', 'application/json',
                         json.dumps({'steps': steps}, indent=2).encode())
+
+    def session(self, query: Any) -> Response:
+        """Answer what `pprs workbench` goes on with."""
+        return self._download('session.json', 'application/json', self.hub.save)
 
     @staticmethod
     def _download(name: str, kind: str, write: Callable[[Path], None]) -> Response:

@@ -17,11 +17,12 @@ from tempfile import TemporaryDirectory, mkdtemp
 from threading import Event, Lock, Thread
 from typing import Any, Protocol
 
-from pprs_dynamics.app.front_door.inputs import Inputs
+from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.server.change_log import ChangeLog
 from pprs_dynamics.app.workbench.server.offered import ENDINGS, Offered
 from pprs_dynamics.app.workbench.session import Session
+from pprs_dynamics.app.workbench.session_file import SavedSession
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.force_model import ForceModel
 
@@ -64,10 +65,13 @@ class Hub:
     offered : Offered
         What browsers may choose from.
     live : LiveSource, optional
+    saved : SavedSession, optional
+        What is taken over once the session has begun.
     """
 
-    def __init__(self, inputs: Inputs, offered: Offered, live: LiveSource | None = None) -> None:
-        self.inputs, self.offered, self.live = inputs, offered, live
+    def __init__(self, inputs: Inputs, offered: Offered, live: LiveSource | None = None,
+                 saved: SavedSession | None = None) -> None:
+        self.inputs, self.offered, self.live, self.saved = inputs, offered, live, saved
         self.session: Session | None = None
         self.failure = ''
         self.is_beginning = True
@@ -194,6 +198,16 @@ class Hub:
                 self._uploaded -= 1
             raise
 
+    def save(self, path: Path) -> None:
+        """Write the session; errors as `Session.save`."""
+        session = self.the_session
+        for name in (*session.inputs.recordings, *session.inputs.validation):
+            if Path(name).is_relative_to(self._uploads.name):
+                raise SessionError(f'{Path(name).name} came from the browser and is gone with the '
+                                   'server, must be opened from a folder for the session to be '
+                                   'saved')
+        session.save(path)
+
     def _use(self, session: Session) -> None:
         self.session, self.failure = session, ''
         session.subscribe(self._changed)
@@ -212,7 +226,10 @@ class Hub:
         try:
             with self._opening:  # what a browser opens meanwhile comes on top
                 if self.inputs.recordings:
-                    self._use(Session.of(self.inputs))
+                    begun = Session.of(self.inputs)
+                    if self.saved is not None:
+                        begun.resume(self.saved)
+                    self._use(begun)
                     self._is_unjudged = True
         except Exception as error:
             self._fail(error)

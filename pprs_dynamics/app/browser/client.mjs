@@ -26,8 +26,8 @@ export const merged = (state, changes) => {
   return next;
 };
 
-const request = async (path, options) => {
-  const response = await fetch(`/api/${path}`, options);
+const answered = async (url, options) => {
+  const response = await fetch(url, options);
   if (!response.ok) {
     const text = await response.text();
     let sentence = text || `${response.status}`;
@@ -36,11 +36,16 @@ const request = async (path, options) => {
     } catch { /* it is the sentence itself */ }
     throw Object.assign(new Error(sentence), {status: response.status});
   }
+  return response;
+};
+
+const request = async (path, options) => {
+  const response = await answered(`/api/${path}`, options);
   return response.headers.get('content-type').includes('octet-stream')
     ? unpack(await response.arrayBuffer()) : response.json();
 };
 
-export class Server {
+export class Client {
   /* `show` is called with the state before, the state now and arrays that changed; `tell` with
      what goes wrong. */
   constructor(show, tell) {
@@ -57,6 +62,11 @@ export class Server {
   upload(file, query) {
     return request(`upload?${new URLSearchParams({...query, since: this.state?.version ?? -1})}`,
                    {method: 'POST', body: file});
+  }
+
+  /* What is at an address of the server, as a file. */
+  async file(url) {
+    return (await answered(url)).blob();
   }
 
   take({header, arrays}) {
