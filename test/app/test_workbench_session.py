@@ -30,6 +30,7 @@ from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.long_work import DesignedMotion
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.offered import Offered
+from pprs_dynamics.app.workbench.masks import MOST_POINTS, drawn_samples
 from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
 from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
@@ -499,6 +500,20 @@ def test_a_recording_is_let_go_of(tmp_path: Path) -> None:
     session.remove(str(other))
     assert session.to_dict()['held_out'] == []
     assert session.fits is fits
+
+
+def test_a_scatter_of_a_long_recording_keeps_every_peak() -> None:
+    x = np.linspace(0.0, 1.0, 100_003)
+    y = np.random.default_rng(0).normal(0.0, 1.0, len(x))
+    peaks = [12_345, 77_777]
+    y[peaks] = 40.0, -40.0
+    at = drawn_samples(x, y)
+    assert set(peaks) < set(at.tolist())
+    assert len(at) <= MOST_POINTS
+    # As dense everywhere as all of them.
+    share, _ = np.histogram(x[at], 20, (0.0, 1.0))
+    assert share.min() > 0.95 * share.max()
+    assert drawn_samples(x[:500], y[:500]).tolist() == list(range(500))
 
 
 def test_a_reference_stays_when_a_recording_goes(tmp_path: Path) -> None:
