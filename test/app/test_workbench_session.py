@@ -28,9 +28,9 @@ from pprs_dynamics.app.workbench import session as session_module
 from pprs_dynamics.app.workbench.background import Cancelled, EndedError, Job, run_in_process
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.long_work import DesignedMotion
+from pprs_dynamics.app.workbench.masks import MOST_POINTS, drawn_samples
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.offered import Offered
-from pprs_dynamics.app.workbench.masks import MOST_POINTS, drawn_samples
 from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
 from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
