@@ -131,8 +131,6 @@ def random_values(effect, rng):
     (DriveSpring, {'stiffness': 20.0, 'position': 0.05}, {'q': 0.2}, 3.0),
     *((StopContact, {'upper': 300.0, 'lower': 200.0, 'position': 0.05}, {'q': q, 'v': v}, force)
       for q, v, force in ((0.07, 0.1, 6.0), (0.07, -0.1, 6.0), (0.02, 0.1, -6.0))),
-    # By Hertz, 2 cm beyond: 300 * 0.02 * sqrt(2).
-    (StopContact, {'upper': 300.0, 'position': 0.05, 'exponent': 1.5}, {'q': 0.07}, 8.4852814),
     (StopContact, {'upper': 300.0, 'position': 0.05}, {'q': 0.02}, 0.0),
     (StopContact, {'lower': 200.0, 'position': 0.05}, {'q': 0.07}, 0.0),
     (ForceRipple, {'force': 0.5, 'phase': math.pi / 6, 'pitch': 0.004}, {'q': 0.001},

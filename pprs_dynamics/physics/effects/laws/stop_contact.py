@@ -1,10 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A stop that a drive runs against: k x (x / x_1)^(n - 1), x = q - q_s beyond q_s.
-
-Nothing before it. Flat on flat n is 1, rubber that is round 1.5 (Hertz), foam more.
-"""
+"""A stop that a drive runs against: k (q - q_s) beyond q_s, nothing before it."""
 
 from __future__ import annotations
 
@@ -21,27 +18,20 @@ from pprs_dynamics.physics.effects.relaxed_position import FARTHEST
 # Where stops are tried, in strokes from either end. Over more of the stroke than the last it is a
 # spring that comes loose, which a spring with lack of fit explains as well.
 REACHES = (0.03, 0.07, 0.13, 0.22)
-USUAL = 0.01  # x_1 [m, rad]
-# Share by which rubber pushes more on the way in than on the way out, at the drive's top speed.
-DAMPING = 0.3
 
 
 class StopContact(DriveEffect):
     """One-sided stiffness from a position on: a bumper, a stop, a cable that gets taut."""
 
     name: ClassVar[str] = 'stop_contact'
-    linear = (Parameter('upper', 'k_u', 'N/m', 'stiffness above q_s, x_1 beyond it', -1e9, 1e9,
-                        0.0, scale=100.0),
-              Parameter('lower', 'k_l', 'N/m', 'stiffness below q_s, x_1 beyond it', -1e9, 1e9,
-                        0.0, scale=100.0))
+    linear = (Parameter('upper', 'k_u', 'N/m', 'stiffness above q_s', -1e9, 1e9, 0.0, scale=100.0),
+              Parameter('lower', 'k_l', 'N/m', 'stiffness below q_s', -1e9, 1e9, 0.0, scale=100.0))
     shape = (Parameter('position', 'q_s', 'm', 'position at which it is touched', -FARTHEST,
-                       FARTHEST, scale=0.01),
-             Parameter('exponent', 'n', '1', 'of the way beyond it', 0.5, 3.0, 1.0))
+                       FARTHEST, scale=0.01),)
     variants = (('upper',), ('lower',))
     unphysical_below: ClassVar[Mapping[str, float]] = {'upper': 0.0, 'lower': 0.0}
     card = Card(
-        'k_u x (|x| / x_1)^(n - 1) for x > 0, k_l in the place of k_u for x < 0, x = q - q_s, x_1 '
-        'a centimetre or a hundredth of a radian',
+        'k_u (q - q_s) for q > q_s, k_l (q - q_s) for q < q_s',
         'nothing over most of the stroke, and beyond one position near an end a force that grows '
         'with every millimetre, on the way there and back, at any speed: at each visit a peak',
         'a bumper, a bellows or telescopic cover that is pressed together, a soft limit set '
@@ -53,26 +43,16 @@ class StopContact(DriveEffect):
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
-        """Return what the way above q_s gives, and that below it with its sign."""
+        """Return how far the drive is above q_s, and below it with its sign."""
         beyond = drive.position - shape['position']
-        return tuple(_grown(one, shape['exponent'])
-                     for one in (np.maximum(beyond, 0.0), np.minimum(beyond, 0.0)))
-
-    @classmethod
-    def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
-        """Return what damping adds on the way in, and takes on the way out."""
-        into = DAMPING * drive.velocity / (np.abs(drive.velocity).max() or 1.0)
-        return (tuple(into * np.abs(one) for one in cls.columns(drive, **shape)),)
+        return np.maximum(beyond, 0.0), np.minimum(beyond, 0.0)
 
     @classmethod
     def averaged(cls, drive: DriveSamples, period: float,
                  shapes: Sequence[Mapping[str, float]]) -> Array:
         """Return the columns at mean positions, which they change little about."""
-        places, exponents = (np.array([shape[name] for shape in shapes])[:, None]
-                             for name in ('position', 'exponent'))
-        beyond = drive.position - places
-        return np.stack([_grown(one, exponents) for one in (
-            np.maximum(beyond, 0.0), np.minimum(beyond, 0.0))], axis=1)
+        beyond = drive.position - np.array([shape['position'] for shape in shapes])[:, None]
+        return np.stack((np.maximum(beyond, 0.0), np.minimum(beyond, 0.0)), axis=1)
 
     @classmethod
     def may_show(cls, covered: DriveRange) -> bool:
@@ -83,11 +63,5 @@ class StopContact(DriveEffect):
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
         """Return positions near either end of the stroke."""
         half = float(np.clip(covered.stroke, 1e-6, FARTHEST)) / 2
-        return [{'position': float(covered.middle + side * (1 - 2 * reach) * half),
-                 'exponent': 1.0} for side in (-1, 1) for reach in REACHES]
-
-
-def _grown(way: Array, exponent: Array | float) -> Array:
-    """Return x (|x| / x_1)^(n - 1)."""
-    grown: Array = np.sign(way) * USUAL * (np.abs(way) / USUAL) ** exponent
-    return grown
+        return [{'position': float(covered.middle + side * (1 - 2 * reach) * half)}
+                for side in (-1, 1) for reach in REACHES]
