@@ -15,12 +15,9 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import LimitError, PprsError
 from pprs_dynamics.measurement.files.samples import Indices
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.pose_spline import load_splines
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import RIGID_BODY, Forces, ModelState
 from pprs_dynamics.physics.model.limits import DriveLimits
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import REJECT, SPLINE, Motion, TrajectoryRequest
@@ -305,10 +302,7 @@ class Feedforward:
             Where the robot cannot be there, or there is no such force.
         """
         rest = np.zeros((1, len(position)))
-        motion: Motion = JointMotion(position[None], rest, rest, np.zeros(1))
-        if isinstance(self._model, DriveModel):
-            motion = solve_forward_motion(
-                self._model.robot.geometry, position[None], rest, rest).motion.held()
+        motion = self._model.motion_of_drives(position[None], rest, rest).held()
         request = TrajectoryRequest(motion, 0, np.zeros(1, dtype=np.int64))
         return self._at_rest(request, gravity=True)
 

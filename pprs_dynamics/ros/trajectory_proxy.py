@@ -31,7 +31,6 @@ from trajectory_msgs.msg import JointTrajectory
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.preparation import prepare
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.ros.force_command import Feedforward, parameters_for
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
@@ -224,9 +223,8 @@ class TrajectoryProxyNode(ExplainsRefusals):
         request = read_joint_trajectory(
             goal.trajectory, RobotNames.of(model).joints, now, missing)
         drives: Any = request.motion
-        found = solve_forward_motion(
-            model.robot.geometry, drives.position, drives.velocity, drives.acceleration)
-        return TrajectoryRequest(found.motion, request.start, request.offsets)
+        motion = model.motion_of_drives(drives.position, drives.velocity, drives.acceleration)
+        return TrajectoryRequest(motion, request.start, request.offsets)
 
 
 def _duration(goal: Any, now: int) -> float:

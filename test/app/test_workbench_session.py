@@ -28,6 +28,7 @@ from pprs_dynamics.app.workbench import session as session_module
 from pprs_dynamics.app.workbench.background import Cancelled, EndedError, Job, run_in_process
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.long_work import DesignedMotion
+from pprs_dynamics.app.workbench.masks import MOST_POINTS, drawn_samples
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.offered import Offered
 from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
@@ -501,6 +502,20 @@ def test_a_recording_is_let_go_of(tmp_path: Path) -> None:
     assert session.fits is fits
 
 
+def test_a_scatter_of_a_long_recording_keeps_every_peak() -> None:
+    x = np.linspace(0.0, 1.0, 100_003)
+    y = np.random.default_rng(0).normal(0.0, 1.0, len(x))
+    peaks = [12_345, 77_777]
+    y[peaks] = 40.0, -40.0
+    at = drawn_samples(x, y)
+    assert set(peaks) < set(at.tolist())
+    assert len(at) <= MOST_POINTS
+    # As dense everywhere as all of them.
+    share, _ = np.histogram(x[at], 20, (0.0, 1.0))
+    assert share.min() > 0.95 * share.max()
+    assert drawn_samples(x[:500], y[:500]).tolist() == list(range(500))
+
+
 def test_a_reference_stays_when_a_recording_goes(tmp_path: Path) -> None:
     healthy, run, other = (write_hidden(tmp_path / f'{seed}.csv', seed, hidden={
         'effects.active': ['coulomb_friction'], 'effects.coulomb_friction.lift_2.force': 0.2})
@@ -539,7 +554,8 @@ class TestASavedSession:
     @pytest.mark.parametrize(('change', 'said'), [
         (lambda run, file: run.write_text(run.read_text() + '\n'), 'run.csv has changed since'),
         (lambda run, file: run.unlink(), 'run.csv: No such file'),
-        (lambda run, file: file.write_text('{'), 'cannot be read as a session'),
+        (lambda run, file: file.write_text('{'), 'session.json: '),
+        (lambda run, file: file.write_text(100_000 * '['), 'session.json: .*deep'),
         (lambda run, file: file.write_text('[]'), 'is no session'),
         (lambda run, file: file.write_text(file.read_text().replace('"ticks": [', '"tick": [')),
          'is no session')])

@@ -26,7 +26,7 @@ from starlette.routing import Route
 from pprs_dynamics.app.report.page import CURVES, CURVES_STYLE, assets, vendored
 from pprs_dynamics.app.report.page import asset as packaged
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
-from pprs_dynamics.app.workbench.masks import quantities, quantity, spans_of
+from pprs_dynamics.app.workbench.masks import drawn_samples, quantities, quantity, spans_of
 from pprs_dynamics.app.workbench.robot_motion import robot_motion
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys, TooLongError
 from pprs_dynamics.app.workbench.server.hub import Hub
@@ -41,7 +41,6 @@ from pprs_dynamics.system.numbers import finite
 
 UPLOAD = '/api/upload'
 MOST_UPLOADED = 256_000_000  # bytes: an hour of six drives at 500 Hz as CSV
-MOST_POINTS = 20_000  # of a scatter
 HEARTBEAT = 15.0  # [s] between signs of life
 VENDORED = {'uplot.js': CURVES, 'uplot.css': CURVES_STYLE}
 TYPES = {'.mjs': 'text/javascript', '.js': 'text/javascript', '.css': 'text/css'}
@@ -242,8 +241,8 @@ class Api:
         with session.steady():
             x, y = (quantity(session.fits, session.view_state, query.get(axis, ''), d)
                     for axis in ('x', 'y'))
-        step = max(1, -(-len(x) // MOST_POINTS))
-        return binary({}, {'x': x[::step], 'y': y[::step]})
+        at = drawn_samples(x, y)
+        return binary({}, {'x': x[at], 'y': y[at]})
 
     def robot(self, query: Any) -> Response:
         """Answer the robot's joints along the recordings, and the errors there."""
