@@ -12,18 +12,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.front_door.adopt import (
+    from pprs_dynamics.app.api.adopt import (
         AdoptionResult,
         AdoptionRunResult,
         adopt,
         adopt_all,
     )
-    from pprs_dynamics.app.front_door.changed import ChangeResult, changed
-    from pprs_dynamics.app.front_door.compare import ComparisonResult, compare
-    from pprs_dynamics.app.front_door.diagnose import DiagnosisResult, diagnose
-    from pprs_dynamics.app.front_door.fit import FitResult, fit
-    from pprs_dynamics.app.front_door.next_experiment import ExperimentResult, next_experiment
-    from pprs_dynamics.app.front_door.simulate import SimulationResult, simulate
+    from pprs_dynamics.app.api.changed import ChangeResult, changed
+    from pprs_dynamics.app.api.compare import ComparisonResult, compare
+    from pprs_dynamics.app.api.diagnose import DiagnosisResult, diagnose
+    from pprs_dynamics.app.api.fit import FitResult, fit
+    from pprs_dynamics.app.api.next_experiment import ExperimentResult, next_experiment
+    from pprs_dynamics.app.api.simulate import SimulationResult, simulate
     from pprs_dynamics.app.workbench.session import Session
     from pprs_dynamics.arrays import Array
     from pprs_dynamics.errors import (
@@ -76,13 +76,13 @@ __version__ = '0.1.0'
 
 # Loaded at first use: `pprs --help` and a node's refusal need neither numpy nor a model.
 _HOMES = {
-    'app.front_door.adopt': ('AdoptionResult', 'AdoptionRunResult', 'adopt', 'adopt_all'),
-    'app.front_door.changed': ('ChangeResult', 'changed'),
-    'app.front_door.compare': ('ComparisonResult', 'compare'),
-    'app.front_door.diagnose': ('DiagnosisResult', 'diagnose'),
-    'app.front_door.fit': ('FitResult', 'fit'),
-    'app.front_door.next_experiment': ('ExperimentResult', 'next_experiment'),
-    'app.front_door.simulate': ('SimulationResult', 'simulate'),
+    'app.api.adopt': ('AdoptionResult', 'AdoptionRunResult', 'adopt', 'adopt_all'),
+    'app.api.changed': ('ChangeResult', 'changed'),
+    'app.api.compare': ('ComparisonResult', 'compare'),
+    'app.api.diagnose': ('DiagnosisResult', 'diagnose'),
+    'app.api.fit': ('FitResult', 'fit'),
+    'app.api.next_experiment': ('ExperimentResult', 'next_experiment'),
+    'app.api.simulate': ('SimulationResult', 'simulate'),
     'app.workbench.session': ('Session',),
     'arrays': ('Array',),
     'errors': (

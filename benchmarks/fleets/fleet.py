@@ -34,7 +34,7 @@ from pprs_dynamics.app.fleet.manifest import read_manifest
 from pprs_dynamics.app.fleet.store import Store
 from pprs_dynamics.app.fleet.survey import SurveyJob
 from pprs_dynamics.app.fleet.trend import FleetTrends, fleet_trends, main_change
-from pprs_dynamics.app.fleet.words import sentences
+from pprs_dynamics.app.fleet.trend_sentences import sentences
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.simulation.hidden_bodies import payload_mass

@@ -90,7 +90,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
                           **dict.fromkeys(REJECTIONS, 0)}
         self._senders = Senders()
         self._margins_due, self._margins, self._beyond_curve = 0.0, Margins(None, 1.0, ''), ''
-        self._last_unjudged: ForceCommand | None = None  # when its margins were not due
+        self._last_unchecked: ForceCommand | None = None  # when its margins were not due
         self._compute_time, self._lag = Durations(), Durations()
         self._counted = (0, 0, time.monotonic())
         self._files = files_given(options.get('cli_args') or sys.argv)
@@ -192,7 +192,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         if info['received_timestamp']:
             self._lag.add(max(0.0, _since(info['received_timestamp'])
                               - (time.perf_counter() - began)))
-        self._judge(answer)
+        self._report_condition(answer)
 
     def _command(self, command: ForceCommand) -> None:
         """Send efforts to the drives, and the currents that give them where they are known."""
@@ -219,10 +219,10 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
                 each.publish(self._written.joint_state(
                     request.first_stamp, self._feedforward.part(answer, name)))
 
-    def _judge(self, answer: ForceCommand) -> None:
+    def _report_condition(self, answer: ForceCommand) -> None:
         own, report, now = self._settings.own, self._status.report, time.monotonic()
-        self._last_unjudged = None if now > self._margins_due else answer
-        if self._last_unjudged is None:
+        self._last_unchecked = None if now > self._margins_due else answer
+        if self._last_unchecked is None:
             self._margins_due = now + MARGINS_PERIOD
             self._margins = left = margins(self._settings.model, answer.forces.mechanism)
             if left.singularity is not None:
@@ -364,9 +364,9 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
 
     def _refresh(self) -> None:
         """Bring what is told once a second up to date."""
-        if self._last_unjudged is not None and self._status.code == 'OK':
+        if self._last_unchecked is not None and self._status.code == 'OK':
             # Nothing came after it: where it leads to is told all the same.
-            self._judge(self._last_unjudged)
+            self._report_condition(self._last_unchecked)
         accepted, passed, now = (self._counters['accepted'], self._counters[PASSED_OVER],
                                  time.monotonic())
         before, passed_before, then = self._counted

@@ -15,57 +15,54 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import LimitError, PprsError
 from pprs_dynamics.measurement.files.samples import Indices
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.pose_spline import load_splines
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import RIGID_BODY, Forces, ModelState
 from pprs_dynamics.physics.model.limits import DriveLimits
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import REJECT, SPLINE, Motion, TrajectoryRequest
 from pprs_dynamics.ros.node.managed_node import AUTOSTART
 from pprs_dynamics.ros.node.model_parameters import NodeModel
-from pprs_dynamics.ros.node.parameters import NodeParameter, own_parameter
+from pprs_dynamics.ros.node.parameters import NodeParameter, node_parameter
 
 REVERSAL_VELOCITY = 'friction.reversal_velocity'
 CLAMP = 'clamp'
 HOLD_GRAVITY, ZERO, SILENT = 'hold_gravity', 'zero', 'silent'
 
-FRAME = own_parameter('frame_id', '', 'frame of poses and forces; empty: base, for a platform',
-                      stays=True)
+FRAME = node_parameter('frame_id', '', 'frame of poses and forces; empty: base, for a platform',
+                       stays=True)
 
 _PARAMETERS = (
     AUTOSTART,
     FRAME,
-    own_parameter('max_age', 0.1, 'oldest header stamp that is accepted, and longest time since a '
-                  'message without one was sent [s]; 0: any', lower=0),
-    own_parameter('max_ahead', 0.5, 'how far ahead of its moment a first point is accepted, which '
-                  'is executed at once [s]; 0: any', lower=0),
-    own_parameter('max_duration', 600.0, 'longest trajectory that is accepted [s]: its command is '
-                  'not stale before its end', lower=0.001, upper=3600),
-    own_parameter('missing_derivatives', REJECT, 'points without velocities or accelerations: '
-                  'reject the message, or take them from a spline through the points',
-                  choices=(REJECT, SPLINE)),
-    own_parameter('feedforward_scale', 1.0, 'multiplies every effort that goes out [1]: less '
-                  'than 1 while a robot is commissioned', lower=0, upper=1),
-    own_parameter('ramp_time', 0.0, 'in which efforts go over to those of a changed model or '
-                  'feedforward_scale while commands flow [s]; 0: at once', lower=0, upper=60),
-    own_parameter('stop_time', 0.0, 'in which a last point of ~/joint_trajectory that moves is '
-                  'followed by one at rest [s]; 0: none is', lower=0, upper=10),
-    own_parameter('effort_limits', (), 'largest absolute effort that goes out, per drive [N, '
-                  'N m]; the smaller one of this and the model\'s counts', size=6, positive=True),
-    own_parameter('limit_policy', REJECT, 'an effort over its limit: reject the message, or clamp '
-                  'the effort to the limit', choices=(REJECT, CLAMP)),
-    own_parameter('command_timeout', 0.1, 'how long after the end of the last accepted '
-                  'trajectory its command goes stale [s]; 0: never', lower=0, upper=3600),
-    own_parameter('timeout_action', HOLD_GRAVITY, 'what goes out once when the command is '
-                  'stale: the efforts that hold the last pose at rest, zeros, or nothing',
-                  choices=(HOLD_GRAVITY, ZERO, SILENT)),
-    own_parameter('warning_margin', 0.1, 'share of the way to a limit of workspace or '
-                  'conditioning that is left when warnings begin [1]', lower=0, upper=1),
-    own_parameter('lag_warning', 0.02, 'time that messages wait for the node, at the median, '
-                  'when warnings begin [s]; 0: never', lower=0, upper=3600),
+    node_parameter('max_age', 0.1, 'oldest header stamp that is accepted, and longest time since a '
+                   'message without one was sent [s]; 0: any', lower=0),
+    node_parameter('max_ahead', 0.5, 'how far ahead of its moment a first point is accepted, which '
+                   'is executed at once [s]; 0: any', lower=0),
+    node_parameter('max_duration', 600.0, 'longest trajectory that is accepted [s]: its command is '
+                   'not stale before its end', lower=0.001, upper=3600),
+    node_parameter('missing_derivatives', REJECT, 'points without velocities or accelerations: '
+                   'reject the message, or take them from a spline through the points',
+                   choices=(REJECT, SPLINE)),
+    node_parameter('feedforward_scale', 1.0, 'multiplies every effort that goes out [1]: less '
+                   'than 1 while a robot is commissioned', lower=0, upper=1),
+    node_parameter('ramp_time', 0.0, 'in which efforts go over to those of a changed model or '
+                   'feedforward_scale while commands flow [s]; 0: at once', lower=0, upper=60),
+    node_parameter('stop_time', 0.0, 'in which a last point of ~/joint_trajectory that moves is '
+                   'followed by one at rest [s]; 0: none is', lower=0, upper=10),
+    node_parameter('effort_limits', (), 'largest absolute effort that goes out, per drive [N, '
+                   'N m]; the smaller one of this and the model\'s counts', size=6, positive=True),
+    node_parameter('limit_policy', REJECT, 'an effort over its limit: reject the message, or clamp '
+                   'the effort to the limit', choices=(REJECT, CLAMP)),
+    node_parameter('command_timeout', 0.1, 'how long after the end of the last accepted '
+                   'trajectory its command goes stale [s]; 0: never', lower=0, upper=3600),
+    node_parameter('timeout_action', HOLD_GRAVITY, 'what goes out once when the command is '
+                   'stale: the efforts that hold the last pose at rest, zeros, or nothing',
+                   choices=(HOLD_GRAVITY, ZERO, SILENT)),
+    node_parameter('warning_margin', 0.1, 'share of the way to a limit of workspace or '
+                   'conditioning that is left when warnings begin [1]', lower=0, upper=1),
+    node_parameter('lag_warning', 0.02, 'time that messages wait for the node, at the median, '
+                   'when warnings begin [s]; 0: never', lower=0, upper=3600),
 )
 
 
@@ -305,10 +302,7 @@ class Feedforward:
             Where the robot cannot be there, or there is no such force.
         """
         rest = np.zeros((1, len(position)))
-        motion: Motion = JointMotion(position[None], rest, rest, np.zeros(1))
-        if isinstance(self._model, DriveModel):
-            motion = solve_forward_motion(
-                self._model.robot.geometry, position[None], rest, rest).motion.held()
+        motion = self._model.motion_of_drives(position[None], rest, rest).held()
         request = TrajectoryRequest(motion, 0, np.zeros(1, dtype=np.int64))
         return self._at_rest(request, gravity=True)
 

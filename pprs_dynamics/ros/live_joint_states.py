@@ -45,7 +45,7 @@ from pprs_dynamics.ros.node.qos import LATCHED, MEASURED, OFFERED
 from pprs_dynamics.system.numbers import finite
 
 NAME = 'workbench'
-JUDGED = 0.05  # [s] between looks at what came in
+COMPARED = 0.05  # [s] between looks at what came in
 MOST_SAMPLES = 300_000  # in the ring: ten minutes at 500 Hz
 SHOWN = 20.0  # [s] of residuals that are kept to be drawn
 COMMANDS = {'std_msgs/msg/Float64MultiArray', 'sensor_msgs/msg/JointState',
@@ -98,7 +98,7 @@ class LiveJointStates(Node):
         for name in (monitor, feedforward):
             self.create_subscription(String, f'{name}/status', partial(self._on_status, name),
                                      LATCHED, raw=True)
-        self.create_timer(JUDGED, self._judge)
+        self.create_timer(COMPARED, self._compare)
         self.clients_of = {name: AsyncParameterClient(self, name)
                            for name in (monitor, feedforward)}
 
@@ -189,7 +189,7 @@ class LiveJointStates(Node):
             if isinstance(found, dict):
                 self._diagnosis = found
 
-    def _judge(self) -> None:
+    def _compare(self) -> None:
         self._take_what_is_offered()
         with self._lock:
             try:

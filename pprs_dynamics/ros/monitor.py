@@ -39,7 +39,7 @@ from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.managed_node import AUTOSTART, ManagedNode
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.model_services import ModelServices, NotAdoptedError
-from pprs_dynamics.ros.node.parameters import NodeParameter, overrides, own_parameter
+from pprs_dynamics.ros.node.parameters import NodeParameter, node_parameter, overrides
 from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import files_given, hardware_of
 from pprs_dynamics.ros.node.qos import (
@@ -60,20 +60,20 @@ except ImportError:  # it comes with a ROS 2 installation only
 PARAMETERS = (
     AUTOSTART,
     FRAME,
-    own_parameter('window', WINDOW, 'of the smoothing that gives velocity and acceleration; '
-                  'answers lag by half of it [s]', lower=0.01, upper=2.0, stays=True),
-    own_parameter('error_span', ERROR_SPAN, 'over which ~/error is taken [s]', lower=0.05,
-                  upper=600.0, stays=True),
-    own_parameter('update_rate', 50.0, 'how often samples are judged, many at a time [Hz]',
-                  lower=1.0, upper=1000.0, stays=True),
-    own_parameter('diagnose_every', 0.0, 'how often the latest window of the stream is diagnosed, '
-                  'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0, stays=True),
-    own_parameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
-                  upper=3600.0, stays=True),
-    own_parameter('diagnose_since', (), 'recordings of days on which the machine was right: '
-                  'windows are diagnosed for what has changed since then', stays=True),
-    own_parameter('feedforward', 'feedforward', 'node that gets what ~/adopt_confirmed sets, '
-                  'absolute or in the namespace of this one', stays=True),
+    node_parameter('window', WINDOW, 'of the smoothing that gives velocity and acceleration; '
+                   'answers lag by half of it [s]', lower=0.01, upper=2.0, stays=True),
+    node_parameter('error_span', ERROR_SPAN, 'over which ~/error is taken [s]', lower=0.05,
+                   upper=600.0, stays=True),
+    node_parameter('update_rate', 50.0, 'how often samples are judged, many at a time [Hz]',
+                   lower=1.0, upper=1000.0, stays=True),
+    node_parameter('diagnose_every', 0.0, 'how often the latest window of the stream is diagnosed, '
+                   'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0, stays=True),
+    node_parameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
+                   upper=3600.0, stays=True),
+    node_parameter('diagnose_since', (), 'recordings of days on which the machine was right: '
+                   'windows are diagnosed for what has changed since then', stays=True),
+    node_parameter('feedforward', 'feedforward', 'node that gets what ~/adopt_confirmed sets, '
+                   'absolute or in the namespace of this one', stays=True),
 )
 
 # Of the samples of a second: from fewer compared ones on the stream is called broken.
@@ -151,7 +151,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._tf = self._publisher(TFMessage, '/tf') if TFMessage else None
         self._input = subscription(self, JointState, 'joint_states', self._on_state, raw=True,
                                    profile=MEASURED)
-        self._clocks = [steady_timer(self, 1.0 / own['update_rate'], self._judge)]
+        self._clocks = [steady_timer(self, 1.0 / own['update_rate'], self._compare)]
         if own['diagnose_every']:
             self._diagnosis = self._publisher(String, '~/diagnosis', LATCHED)
             self._clocks.append(steady_timer(self, LOOK, self._diagnose))
@@ -213,7 +213,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
             self._tf.publish(TFMessage(
                 transforms=conversions.transforms(stamp, tree.base, tree.bodies, pose.bodies)))
 
-    def _judge(self) -> None:
+    def _compare(self) -> None:
         if self.state != 'active':
             return
         self._draw()

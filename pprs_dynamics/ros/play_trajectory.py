@@ -30,8 +30,8 @@ from pprs_dynamics.ros.node.parameters import (
     current_values,
     declare_model,
     declare_own,
+    node_parameter,
     overrides,
-    own_parameter,
     refuse_unknown,
 )
 from pprs_dynamics.ros.node.qos import publisher
@@ -44,20 +44,20 @@ EXCITATION = 'excitation'
 SOURCES = ('helix', EXCITATION, 'csv')
 
 PARAMETERS = (
-    own_parameter('source', 'helix', 'what to play', choices=SOURCES),
-    own_parameter('file', '', 'CSV of poses, for source csv'),
-    own_parameter('rate', 100.0, 'messages per second [Hz]', lower=0.1, upper=10_000),
+    node_parameter('source', 'helix', 'what to play', choices=SOURCES),
+    node_parameter('file', '', 'CSV of poses, for source csv'),
+    node_parameter('rate', 100.0, 'messages per second [Hz]', lower=0.1, upper=10_000),
     # (points - 1) / rate + ahead is how long a message may be on its way before a
     # joint_trajectory_controller drops it; messages took 11.5 ms at the median where it did.
-    own_parameter('points', 10, 'points per message: the present one and those that follow',
-                  lower=1),
-    own_parameter('repeat', 1, 'how often to play; 0: until stopped', lower=0),
-    own_parameter('duration', 20.0, 'length of an excitation [s]', lower=0.1),
-    own_parameter('seed', 0, 'of an excitation', lower=0),
-    own_parameter('lead_in', 0.0, 'time to go from the home pose to where the path starts [s]; '
-                  '0: start there', lower=0),
-    own_parameter('ahead', 0.02, 'how far ahead of its moment each message is stamped [s]',
-                  lower=0),
+    node_parameter('points', 10, 'points per message: the present one and those that follow',
+                   lower=1),
+    node_parameter('repeat', 1, 'how often to play; 0: until stopped', lower=0),
+    node_parameter('duration', 20.0, 'length of an excitation [s]', lower=0.1),
+    node_parameter('seed', 0, 'of an excitation', lower=0),
+    node_parameter('lead_in', 0.0, 'time to go from the home pose to where the path starts [s]; '
+                   '0: start there', lower=0),
+    node_parameter('ahead', 0.02, 'how far ahead of its moment each message is stamped [s]',
+                   lower=0),
 )
 
 

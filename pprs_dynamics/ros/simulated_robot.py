@@ -31,8 +31,8 @@ from pprs_dynamics.ros.node.parameters import (
     current_values,
     declare_model,
     declare_own,
+    node_parameter,
     overrides,
-    own_parameter,
 )
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
@@ -46,33 +46,33 @@ from pprs_dynamics.simulation.sensors import SensorSettings
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
 PARAMETERS = (
-    own_parameter('rate', 500.0, 'of joint_states, a divisor of 2000 [Hz]', lower=10, upper=2000),
-    own_parameter('stiffness', 4000.0, 'gain of the PD loop [N/m]', lower=0, upper=1e9),
-    own_parameter('damping', 150.0, 'gain of the PD loop [N s/m]', lower=0, upper=1e9),
-    own_parameter('use_effort', True, 'true: the effort of ~/joint_command is the feedforward; '
-                  'false: it is ignored, and the PD loop compensates gravity by itself'),
-    own_parameter('command_timeout', 0.1, 'without a command for this long the drives hold [s]; '
-                  '0: never', lower=0, upper=3600),
-    own_parameter('actuation_delay', 0.0, 'from command to force [s]', lower=0, upper=1),
-    own_parameter('encoder_resolution', 1e-6, '0 for none [m]', lower=0),
-    own_parameter('effort_noise', 0.08, 'standard deviation, 64 % white, 36 % coloured [N]',
-                  lower=0),
-    own_parameter('hidden_effects', (), 'names of effects that the model does not know of, '
-                  'or random for one drawn at random; drives may follow: '
-                  'coulomb_friction:lift_1,lift_2'),
-    own_parameter('hidden_scale', 1.0, 'multiplies their strength', lower=0),
-    own_parameter('seed', 0, 'of noise and hidden effects', lower=0),
+    node_parameter('rate', 500.0, 'of joint_states, a divisor of 2000 [Hz]', lower=10, upper=2000),
+    node_parameter('stiffness', 4000.0, 'gain of the PD loop [N/m]', lower=0, upper=1e9),
+    node_parameter('damping', 150.0, 'gain of the PD loop [N s/m]', lower=0, upper=1e9),
+    node_parameter('use_effort', True, 'true: the effort of ~/joint_command is the feedforward; '
+                   'false: it is ignored, and the PD loop compensates gravity by itself'),
+    node_parameter('command_timeout', 0.1, 'without a command for this long the drives hold [s]; '
+                   '0: never', lower=0, upper=3600),
+    node_parameter('actuation_delay', 0.0, 'from command to force [s]', lower=0, upper=1),
+    node_parameter('encoder_resolution', 1e-6, '0 for none [m]', lower=0),
+    node_parameter('effort_noise', 0.08, 'standard deviation, 64 % white, 36 % coloured [N]',
+                   lower=0),
+    node_parameter('hidden_effects', (), 'names of effects that the model does not know of, '
+                   'or random for one drawn at random; drives may follow: '
+                   'coulomb_friction:lift_1,lift_2'),
+    node_parameter('hidden_scale', 1.0, 'multiplies their strength', lower=0),
+    node_parameter('seed', 0, 'of noise and hidden effects', lower=0),
 )
 # Of an arm or a robot with loops, whose drives are in several units and sizes.
 OF_JOINTS = (
-    own_parameter('rate', 500.0, 'of joint_states [Hz]', lower=10, upper=500),
-    own_parameter('bandwidth', 7.0, 'of the PD loop, by the inertia at home [Hz]', lower=0,
-                  upper=50),
-    own_parameter('damping_ratio', 0.9, 'of the PD loop [1]', lower=0, upper=10),
+    node_parameter('rate', 500.0, 'of joint_states [Hz]', lower=10, upper=500),
+    node_parameter('bandwidth', 7.0, 'of the PD loop, by the inertia at home [Hz]', lower=0,
+                   upper=50),
+    node_parameter('damping_ratio', 0.9, 'of the PD loop [1]', lower=0, upper=10),
     *(one for one in PARAMETERS[3:] if one.name not in ('encoder_resolution', 'effort_noise')),
-    own_parameter('encoder_resolution', 1e-6, '0 for none [m, rad]', lower=0),
-    own_parameter('effort_noise', 0.005, 'standard deviation, 64 % white, 36 % coloured, as a '
-                  'share of the largest effort of an excitation [1]', lower=0, upper=1),
+    node_parameter('encoder_resolution', 1e-6, '0 for none [m, rad]', lower=0),
+    node_parameter('effort_noise', 0.005, 'standard deviation, 64 % white, 36 % coloured, as a '
+                   'share of the largest effort of an excitation [1]', lower=0, upper=1),
 )
 # What of a running robot changes: what is hidden in it, and parameters of ROS 2 itself.
 CHANGEABLE = ('hidden_effects', 'hidden_scale', 'seed')

@@ -31,7 +31,6 @@ from trajectory_msgs.msg import JointTrajectory
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.preparation import prepare
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.ros.force_command import Feedforward, parameters_for
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
@@ -46,7 +45,7 @@ from pprs_dynamics.ros.messages.trajectory_request import (
 from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.ros.node.parameters import drive_count, own_parameter
+from pprs_dynamics.ros.node.parameters import drive_count, node_parameter
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.senders import publishers_of
@@ -54,10 +53,10 @@ from pprs_dynamics.ros.node.status import StatusReporter
 
 # Of the feedforward node's parameters, those that say what may go out.
 SHARED = ('feedforward_scale', 'effort_limits', 'limit_policy', 'missing_derivatives')
-ACTION = own_parameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
-                       'of the controller that the goals are passed on to', stays=True)
-TIMEOUT = own_parameter('controller_timeout', 5.0, 'silence of the controller after which a goal '
-                        'is aborted [s]; 0: only where it has gone', lower=0, upper=3600)
+ACTION = node_parameter('action', '/joint_trajectory_controller/follow_joint_trajectory',
+                        'of the controller that the goals are passed on to', stays=True)
+TIMEOUT = node_parameter('controller_timeout', 5.0, 'silence of the controller after which a goal '
+                         'is aborted [s]; 0: only where it has gone', lower=0, upper=3600)
 Goal = FollowJointTrajectory.Goal
 Result = FollowJointTrajectory.Result
 # [s] after the last point of a goal at rest in which its inertia's effort goes over to none: the
@@ -224,9 +223,8 @@ class TrajectoryProxyNode(ExplainsRefusals):
         request = read_joint_trajectory(
             goal.trajectory, RobotNames.of(model).joints, now, missing)
         drives: Any = request.motion
-        found = solve_forward_motion(
-            model.robot.geometry, drives.position, drives.velocity, drives.acceleration)
-        return TrajectoryRequest(found.motion, request.start, request.offsets)
+        motion = model.motion_of_drives(drives.position, drives.velocity, drives.acceleration)
+        return TrajectoryRequest(motion, request.start, request.offsets)
 
 
 def _duration(goal: Any, now: int) -> float:

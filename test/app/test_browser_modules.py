@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from pprs_dynamics.app.report.page import one_script
 from pprs_dynamics.app.report.what_if_part import MODULES
 
 ROOT = Path(__file__).parents[2]
@@ -26,7 +25,7 @@ def node(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 @needs_node
-@pytest.mark.parametrize('name', ['curve_files', 'format', 'ridge', 'server', 'views'])
+@pytest.mark.parametrize('name', ['curve_files', 'format', 'ridge', 'client', 'views'])
 def test_modules_do_what_they_say(name: str) -> None:
     done = node('--test', ROOT / 'test' / 'browser' / f'{name}.test.mjs')
     assert done.returncode == 0, done.stdout
@@ -40,19 +39,9 @@ def test_each_script_is_one(file: str) -> None:
     assert node('--check', MODULE_FOLDER / file).returncode == 0
 
 
-@needs_node
-def test_modules_make_one_script_for_a_page_without_a_server(tmp_path: Path) -> None:
-    script = one_script(MODULES)
-    assert 'import ' not in script.replace('important', '')
-    assert 'export ' not in script
-    (tmp_path / 'whole.js').write_text(script)
-    done = node('--check', tmp_path / 'whole.js')
-    assert done.returncode == 0, done.stderr
-
-
-def test_every_module_of_the_page_comes_after_those_that_it_imports() -> None:
-    for place, name in enumerate(MODULES):
+def test_a_page_has_every_module_that_its_own_import() -> None:
+    for name in MODULES:
         used = [line.rpartition("'./")[2].rstrip("';\n")
                 for line in (MODULE_FOLDER / name).read_text().splitlines()
-                if line.startswith('import ')]
-        assert {*used} <= {*MODULES[:place]}
+                if "from './" in line]
+        assert {*used} <= {*MODULES}

@@ -28,7 +28,7 @@ from pprs_dynamics.app.fleet.manifest import ManifestEntry, ManifestError, entri
 from pprs_dynamics.app.fleet.store import DONE, FAILED, Store, key_of, schema
 from pprs_dynamics.app.fleet.survey import SurveyJob, examine, identify
 from pprs_dynamics.app.fleet.trend import FALSE_ALARMS, fleet_trends, main_change
-from pprs_dynamics.app.fleet.words import sentences
+from pprs_dynamics.app.fleet.trend_sentences import sentences
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.model_file import load_model

@@ -18,7 +18,7 @@ from made_up_pages import made_up_pages
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
-from pprs_dynamics.app.report.robot_view import robot_page
+from pprs_dynamics.app.report.robot_figure import robot_page
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.comparison import compare
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis

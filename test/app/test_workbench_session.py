@@ -21,18 +21,19 @@ import pytest
 from workbench_bench import HIDDEN, write_hidden
 
 from pprs_dynamics import read_recording
+from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.pprs import main
-from pprs_dynamics.app.front_door.inputs import Inputs
 from pprs_dynamics.app.workbench import Session
 from pprs_dynamics.app.workbench import session as session_module
 from pprs_dynamics.app.workbench.background import Cancelled, EndedError, Job, run_in_process
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.long_work import DesignedMotion
+from pprs_dynamics.app.workbench.masks import MOST_POINTS, drawn_samples
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.offered import Offered
 from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
 from pprs_dynamics.app.workbench.tick_fits import TickFits
-from pprs_dynamics.app.workbench.views import EXACT, FITTED, LINEAR
+from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
@@ -94,7 +95,7 @@ def test_ticks_lower_the_error_at_once_and_find_what_was_hidden(session: Session
 def test_without_ticks_the_error_is_that_of_the_model(session: Session) -> None:
     session.tick('payload_mass')
     session.untick('payload_mass')
-    np.testing.assert_array_equal(session.now, session.before)
+    np.testing.assert_array_equal(session.current_residual, session.given_residual)
 
 
 @pytest.mark.parametrize('ticks', [('payload_mass', 'coulomb_friction'), ('time_delay',),
@@ -161,7 +162,7 @@ def test_shares_say_where_an_error_is_from_less_its_price(session: Session) -> N
 def test_a_region_of_a_scatter_is_found_in_time(session: Session) -> None:
     mask = session.region('velocity', 'error before', (0.0, 1.0), (0.0, 10.0), 'lift_2')
     velocity = session.data.variables['velocity'][:, 4]
-    chosen = (velocity >= 0) & (session.before[:, 4] >= 0)
+    chosen = (velocity >= 0) & (session.given_residual[:, 4] >= 0)
     np.testing.assert_array_equal(mask[:, 4], chosen)
     assert not mask[:, :4].any()
     with pytest.raises(PprsError, match='must be one of time'):
@@ -451,7 +452,7 @@ def test_ticks_and_values_are_taken_back_and_done_again(session: Session) -> Non
         session.back()
     assert undone == ['payload_mass unticked', 'coulomb_friction: lift_2.force chosen',
                       'coulomb_friction ticked on lift_2', 'payload_mass ticked']
-    np.testing.assert_array_equal(session.now, session.before)
+    np.testing.assert_array_equal(session.current_residual, session.given_residual)
     for _ in undone:
         session.forward()
     assert ticked(session) == after
@@ -486,13 +487,13 @@ def test_a_recording_is_let_go_of(tmp_path: Path) -> None:
     session, other = short_session(tmp_path)
     with pytest.raises(PprsError, match='at least one'):
         session.remove(session.to_dict()['recordings'][0]['key'])
-    alone = session.before
+    alone = session.given_residual
     session.add(other)
     session.tick('payload_mass')
     with pytest.raises(PprsError, match='no recording nothing'):
         session.remove('nothing')
     session.remove(str(other))
-    np.testing.assert_array_equal(session.before, alone)
+    np.testing.assert_array_equal(session.given_residual, alone)
     assert set(session.view_state.ticks) == {'payload_mass'}
     session.add(other, is_held_out=True)
     fits = session.fits
@@ -501,17 +502,31 @@ def test_a_recording_is_let_go_of(tmp_path: Path) -> None:
     assert session.fits is fits
 
 
+def test_a_scatter_of_a_long_recording_keeps_every_peak() -> None:
+    x = np.linspace(0.0, 1.0, 100_003)
+    y = np.random.default_rng(0).normal(0.0, 1.0, len(x))
+    peaks = [12_345, 77_777]
+    y[peaks] = 40.0, -40.0
+    at = drawn_samples(x, y)
+    assert set(peaks) < set(at.tolist())
+    assert len(at) <= MOST_POINTS
+    # As dense everywhere as all of them.
+    share, _ = np.histogram(x[at], 20, (0.0, 1.0))
+    assert share.min() > 0.95 * share.max()
+    assert drawn_samples(x[:500], y[:500]).tolist() == list(range(500))
+
+
 def test_a_reference_stays_when_a_recording_goes(tmp_path: Path) -> None:
     healthy, run, other = (write_hidden(tmp_path / f'{seed}.csv', seed, hidden={
         'effects.active': ['coulomb_friction'], 'effects.coulomb_friction.lift_2.force': 0.2})
         for seed in (1, 2, 3))
-    alone = Session.of(Inputs.of('config/paper.yaml', run).since([healthy])).before
+    alone = Session.of(Inputs.of('config/paper.yaml', run).since([healthy])).given_residual
     # What was there in the reference, too, is no error.
-    without = Session.open([run]).before
+    without = Session.open([run]).given_residual
     assert root_mean_square(alone[:, 4]) < 0.8 * root_mean_square(without[:, 4])
     session = Session.of(Inputs.of('config/paper.yaml', [run, other]).since([healthy]))
     session.remove(str(other))
-    np.testing.assert_allclose(session.before, alone, atol=1e-9)
+    np.testing.assert_allclose(session.given_residual, alone, atol=1e-9)
 
 
 class TestASavedSession:
@@ -532,14 +547,15 @@ class TestASavedSession:
         assert set(after.ticks) == {'coulomb_friction'}
         assert after.estimates['coulomb_friction']['lift_2.force'].value == 0.7
         assert after.departure == pytest.approx(shown.departure, rel=1e-6)
-        np.testing.assert_allclose(again.now, session.now, atol=1e-9)
+        np.testing.assert_allclose(again.current_residual, session.current_residual, atol=1e-9)
         again.undo()
         assert again.steps == []
 
     @pytest.mark.parametrize(('change', 'said'), [
         (lambda run, file: run.write_text(run.read_text() + '\n'), 'run.csv has changed since'),
         (lambda run, file: run.unlink(), 'run.csv: No such file'),
-        (lambda run, file: file.write_text('{'), 'cannot be read as a session'),
+        (lambda run, file: file.write_text('{'), 'session.json: '),
+        (lambda run, file: file.write_text(100_000 * '['), 'session.json: .*deep'),
         (lambda run, file: file.write_text('[]'), 'is no session'),
         (lambda run, file: file.write_text(file.read_text().replace('"ticks": [', '"tick": [')),
          'is no session')])

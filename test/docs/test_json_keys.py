@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 from documents import PROJECT, text_of
 
+from pprs_dynamics.app.api.adopt import AdoptionRunResult
+from pprs_dynamics.app.api.changed import ChangeResult
+from pprs_dynamics.app.api.compare import ComparisonResult
 from pprs_dynamics.app.commands import diagnose, info
-from pprs_dynamics.app.front_door.adopt import AdoptionRunResult
-from pprs_dynamics.app.front_door.changed import ChangeResult
-from pprs_dynamics.app.front_door.compare import ComparisonResult
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun
 from pprs_dynamics.inference.diagnosis.changed_number import ChangedNumber

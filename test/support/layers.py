@@ -34,7 +34,7 @@ FOLDERS = {
     'inference': ['residuals', 'regression', 'search', 'fit', 'diagnosis', 'adoption',
                   'experiments'],
     'ros': ['messages', 'node'],
-    'app': ['fleet', 'report', 'front_door', 'workbench', 'commands'],
+    'app': ['fleet', 'report', 'api', 'workbench', 'commands'],
 }
 
 

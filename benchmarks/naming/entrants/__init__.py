@@ -20,14 +20,14 @@ from benchmarks.naming.entrants.cross_validation import block_cross_validation
 from benchmarks.naming.entrants.least_squares import relative_deviations
 from benchmarks.naming.entrants.penalised import adaptive_group_lasso, lasso
 from benchmarks.naming.entrants.pprs import pprs
-from benchmarks.naming.entrants.sindy import sindy
+from benchmarks.naming.entrants.sindy import has_evidence_greedy, sindy
 from benchmarks.naming.entrants.spike_and_slab import spike_and_slab
 from benchmarks.naming.entrants.split_test import split_test
 from benchmarks.naming.entrants.stepwise import stepwise
 from benchmarks.naming.problems import Answer, Problem
 
 OURS, PEER, PART, CONTROL = 'ours', 'peer', 'ours without a part', 'control'
-ROOMS = ('physics', 'measurement', 'inference', 'app/front_door')  # that a diagnosis is made of
+LAYERS = ('physics', 'measurement', 'inference', 'app/api')  # that a diagnosis is made of
 
 
 @dataclass(frozen=True)
@@ -84,29 +84,31 @@ class Entrant:
                  if name.startswith(f'{__name__}.')]
         if self.sort in (OURS, PART):
             package = Path(pprs_dynamics.__file__).parent
-            files += [file for room in ROOMS for file in sorted((package / room).rglob('*.py'))]
+            files += [file for room in LAYERS for file in sorted((package / room).rglob('*.py'))]
         return files
 
 
 PEERS: dict[str, Entrant] = {
-    'stepwise BIC, white': Entrant(stepwise, {'whiten': False}, ('weight', (1, 3, 10, 30, 100)),
-                                   10),
-    'stepwise BIC, AR': Entrant(stepwise, {'whiten': True}, ('weight', (1, 2, 4, 8, 16))),
+    'stepwise BIC, white': Entrant(stepwise, {'whiten': False}, ('weight', (1, 3, 10, 30)), 10),
+    'stepwise BIC, AR': Entrant(stepwise, {'whiten': True}, ('weight', (1, 3, 10, 30)), 3),
     'stepwise BIC, AR again': Entrant(stepwise, {'whiten': True, 'rounds': 4},
-                                      ('weight', (1, 2, 4, 8, 16))),
+                                      ('weight', (1, 3, 10, 30)), 3),
     'block cross-validation': Entrant(block_cross_validation, {}, ('errors', (0, 1, 2, 4))),
-    'LASSO': Entrant(lasso, {}, ('errors', (0, 1)), library='scikit-learn'),
-    'adaptive group LASSO': Entrant(adaptive_group_lasso, {}, ('power', (0.5, 1, 2)),
+    'LASSO': Entrant(lasso, {}, ('errors', (0, 1, 3)), 3, library='scikit-learn'),
+    'adaptive group LASSO': Entrant(adaptive_group_lasso, {}, ('weight', (1, 3, 10, 30)), 30,
                                     library='skglm'),
     'PySINDy STLSQ': Entrant(sindy, {'optimiser': 'STLSQ'},
-                             ('threshold', (0.1, 0.2, 0.4, 0.8)), library='pysindy'),
-    'PySINDy SR3': Entrant(sindy, {'optimiser': 'SR3'}, ('threshold', (0.1, 0.4, 0.8)),
+                             ('threshold', (0.1, 0.3, 1, 3)), 3, library='pysindy'),
+    'PySINDy SR3': Entrant(sindy, {'optimiser': 'SR3'}, ('threshold', (0.1, 0.3, 1, 3)),
                            library='pysindy'),
-    'PySINDy FROLS': Entrant(sindy, {'optimiser': 'FROLS'}, ('steps', (1, 2, 3, 5)),
+    'PySINDy FROLS': Entrant(sindy, {'optimiser': 'FROLS'}, ('steps', (1, 2, 3, 10)), 1,
                              library='pysindy'),
+    'PySINDy EvidenceGreedy': Entrant(sindy, {'optimiser': 'EvidenceGreedy'},
+                                      ('precision', (1, 1e-2, 1e-4, 1e-6)), library='pysindy'),
     'Bayesian averaging, AR': Entrant(model_averaging, {}, ('window', (1.001, 20, 150))),
-    'spike and slab, AR': Entrant(spike_and_slab, {}, ('odds', (0.1, 0.01, 0.001, 1e-4))),
-    'held-out F-test (LISDD)': Entrant(split_test, {}, ('discoveries', (5e-2, 1e-3, 1e-6, 1e-12))),
+    'spike and slab, AR': Entrant(spike_and_slab, {}, ('odds', (1e-2, 1e-4, 1e-8, 1e-16))),
+    'held-out F-test (LISDD)': Entrant(split_test, {},
+                                       ('discoveries', (5e-2, 1e-6, 1e-12, 1e-24)), 1e-6),
     'least squares (FIGAROH)': Entrant(relative_deviations, {}, ('limit', (0.3, 0.1, 0.03, 0.01))),
 }
 
@@ -115,6 +117,8 @@ def _with_tuned(peers: Mapping[str, Entrant]) -> dict[str, Entrant]:
     """Return peers by their defaults, and beside those that were tuned as they are then."""
     found = {}
     for name, one in peers.items():
+        if one.settings.get('optimiser') == 'EvidenceGreedy' and not has_evidence_greedy():
+            continue  # answers of another installation are scored as they are
         found[name] = one
         if one.tuned is not None:
             assert one.tuning is not None

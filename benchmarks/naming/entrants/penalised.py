@@ -51,8 +51,8 @@ def lasso(problem: Problem, errors: float = 0.0) -> Answer:
         return equations.answered(best_shapes(equations, path()[:, chosen]))
 
 
-def adaptive_group_lasso(problem: Problem, power: float = 1.0) -> Answer:
-    """Return the groups that the adaptive group LASSO of least BIC keeps."""
+def adaptive_group_lasso(problem: Problem, power: float = 1.0, weight: float = 1.0) -> Answer:
+    """Return the groups that the adaptive group LASSO of least BIC keeps, its penalty weighted."""
     from skglm import GroupLasso
 
     equations = Equations(problem)
@@ -65,21 +65,22 @@ def adaptive_group_lasso(problem: Problem, power: float = 1.0) -> Answer:
     groups = [list(group.columns) for group in equations.groups]
     sizes = np.array([np.linalg.norm(ridge[group]) / np.sqrt(len(group)) for group in groups])
     weights = np.sqrt([len(group) for group in groups]) / np.maximum(sizes, 1e-6) ** power
-    top = max(np.linalg.norm(equations.right[group]) / n / weight
-              for group, weight in zip(groups, weights, strict=True))
+    top = max(np.linalg.norm(equations.right[group]) / n / own
+              for group, own in zip(groups, weights, strict=True))
     best = n * np.log(equations.total / n)
     chosen: list[Group] = []
     solver = GroupLasso(groups, weights=weights, fit_intercept=False, warm_start=True, tol=1e-4,
                         max_epochs=2000)
     with warnings.catch_warnings():
         warnings.simplefilter('ignore')
-        for weight in WEIGHTS:
-            solver.alpha = weight * top
+        for strength in WEIGHTS:
+            solver.alpha = strength * top
             found = best_shapes(equations, solver.fit(rows, seen).coef_)
             columns = [k for group in found for k in group.columns]
             if len(columns) > LARGEST:
                 break
-            cost = n * np.log(max(equations.fit(columns)[2], 1e-12) / n) + len(columns) * np.log(n)
+            cost = (n * np.log(max(equations.fit(columns)[2], 1e-12) / n)
+                    + weight * len(columns) * np.log(n))
             if cost < best:
                 best, chosen = cost, found
     return equations.answered(chosen)

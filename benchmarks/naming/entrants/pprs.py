@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from benchmarks.naming.problems import Answer, Named, Problem
-from pprs_dynamics.app.front_door.diagnose import diagnose
+from pprs_dynamics.app.api.diagnose import diagnose
 
 VERDICT = {'adequate': 'none', 'effect': 'effect', 'ambiguous': 'ambiguous', 'unknown': 'unknown'}
 

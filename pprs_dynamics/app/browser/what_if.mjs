@@ -122,5 +122,7 @@ const begin = async (part) => {
 
 export const prepare = () => {
   const part = document.getElementById('what-if');
-  part.closest('details').addEventListener('toggle', () => begin(part), {once: true});
+  const fold = part.closest('details');
+  if (fold.open) begin(part); // by somebody who was faster than the page
+  else fold.addEventListener('toggle', () => begin(part), {once: true});
 };

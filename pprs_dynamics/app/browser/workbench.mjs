@@ -13,7 +13,7 @@ import {adoptionSaid, showExperiment, showFiles, showJobs, showLedger, showRecor
 import {drawScale, Robot} from './robot.mjs';
 import {Scatter} from './scatter.mjs';
 import {followScheme, switchScheme} from './scheme.mjs';
-import {rowsOf, Server} from './server.mjs';
+import {Client, rowsOf} from './client.mjs';
 import {showShares} from './shares.mjs';
 
 /* Measured by tests and benchmarks: from an action to the paint that shows its answer [ms]. */
@@ -217,7 +217,7 @@ const loadRobot = async () => {
 
 /* -- what there is ------------------------------------------------------------------------ */
 
-const server = new Server(show, tell);
+const server = new Client(show, tell);
 const ticked = (began) => () => {
   if (began === undefined) return;
   noted(bench.latencies, began);

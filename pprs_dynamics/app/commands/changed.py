@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import argparse
 
+from pprs_dynamics.app.api.changed import changed
 from pprs_dynamics.app.commands import arguments
 from pprs_dynamics.app.commands.input_output import tell
-from pprs_dynamics.app.front_door.changed import changed
 from pprs_dynamics.app.report.terminal import console, staged_bar
 
 EXAMPLE = 'pprs changed monday.mcap friday.mcap --model base.yaml --report changed.html'

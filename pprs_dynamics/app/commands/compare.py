@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import argparse
 
+from pprs_dynamics.app.api.compare import compare
 from pprs_dynamics.app.commands import arguments
 from pprs_dynamics.app.commands.input_output import read_inputs, tell
-from pprs_dynamics.app.front_door.compare import compare
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 
 EXAMPLE = 'pprs compare run.mcap --model robot.yaml --report page.html'

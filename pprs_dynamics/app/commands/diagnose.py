@@ -8,10 +8,10 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from pprs_dynamics.app.api.adopt import adopt_all
+from pprs_dynamics.app.api.diagnose import DiagnosisResult, diagnose
 from pprs_dynamics.app.commands import arguments
 from pprs_dynamics.app.commands.input_output import read_inputs, tell, write_json
-from pprs_dynamics.app.front_door.adopt import adopt_all
-from pprs_dynamics.app.front_door.diagnose import DiagnosisResult, diagnose
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.fit.base_fit import require_open_numbers
 from pprs_dynamics.system.plain_text import counted

@@ -11,10 +11,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from pprs_dynamics.app.api.inputs import read_checked
 from pprs_dynamics.app.commands.arguments import UsageError, add_recordings, add_report
 from pprs_dynamics.app.commands.input_output import write_json
-from pprs_dynamics.app.front_door.inputs import read_checked
-from pprs_dynamics.app.report.mechanism_view import (
+from pprs_dynamics.app.report.mechanism_description import (
     describe_mechanism,
     mechanism_lines,
     write_mechanism_page,

@@ -12,11 +12,11 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from shlex import quote
 
+from pprs_dynamics.app.api.first_model import first_model
 from pprs_dynamics.app.commands.arguments import MODEL, UsageError, number, output_file
 from pprs_dynamics.app.commands.info import show_recordings
 from pprs_dynamics.app.commands.input_output import write_json
-from pprs_dynamics.app.front_door.first_model import first_model
-from pprs_dynamics.app.report.mechanism_view import mechanism_lines
+from pprs_dynamics.app.report.mechanism_description import mechanism_lines
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.system.output_files import write_text

@@ -19,8 +19,8 @@ from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import for_json
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.front_door.inputs import Inputs
-    from pprs_dynamics.app.front_door.result import Result
+    from pprs_dynamics.app.api.inputs import Inputs
+    from pprs_dynamics.app.api.result import Result
     from pprs_dynamics.app.report.page import Page
 
 
@@ -35,7 +35,7 @@ def read_inputs(options: argparse.Namespace, screen: Any, whole: bool = False) -
         As `Inputs.of`.
     """
     # Here, as what only writes needs no statistics.
-    from pprs_dynamics.app.front_door.inputs import Inputs
+    from pprs_dynamics.app.api.inputs import Inputs
 
     with staged_bar(screen) as progress:
         inputs = Inputs.of(options.model, options.recordings, getattr(options, 'validate', ()),

@@ -9,6 +9,7 @@ import argparse
 import math
 import shlex
 
+from pprs_dynamics.app.api.next_experiment import RATE, next_experiment
 from pprs_dynamics.app.commands.arguments import (
     POSES,
     add_as_it_is,
@@ -20,7 +21,6 @@ from pprs_dynamics.app.commands.arguments import (
     seed,
 )
 from pprs_dynamics.app.commands.input_output import read_inputs, tell
-from pprs_dynamics.app.front_door.next_experiment import RATE, next_experiment
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits

@@ -12,6 +12,7 @@ import argparse
 
 import numpy as np
 
+from pprs_dynamics.app.api.simulate import FEEDFORWARDS, NOISE, RATE, simulate
 from pprs_dynamics.app.commands.arguments import (
     RECORDING,
     add_overwrite,
@@ -21,7 +22,6 @@ from pprs_dynamics.app.commands.arguments import (
     seed,
 )
 from pprs_dynamics.app.commands.input_output import tell
-from pprs_dynamics.app.front_door.simulate import FEEDFORWARDS, NOISE, RATE, simulate
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.physics.effects.former_names import FORMER
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion

@@ -25,7 +25,7 @@ from pprs_dynamics.app.fleet.manifest import entries
 from pprs_dynamics.app.fleet.store import AUTO, Store, arrow
 from pprs_dynamics.app.fleet.survey import SurveyJob, requests_of
 from pprs_dynamics.app.fleet.trend import fleet_trends
-from pprs_dynamics.app.fleet.words import sentences
+from pprs_dynamics.app.fleet.trend_sentences import sentences
 from pprs_dynamics.app.report.fleet_page import fleet_page
 from pprs_dynamics.app.report.terminal import console, counting_bar, shown
 from pprs_dynamics.inference.fit.reference_runs import read_reference

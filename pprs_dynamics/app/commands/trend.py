@@ -12,7 +12,7 @@ from pprs_dynamics.app.commands.arguments import UsageError, add_report
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.fleet.store import Store
 from pprs_dynamics.app.fleet.trend import fleet_trends
-from pprs_dynamics.app.fleet.words import sentences, to_dict
+from pprs_dynamics.app.fleet.trend_sentences import sentences, to_dict
 from pprs_dynamics.app.report.fleet_page import fleet_page
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.system.numbers import parse_number

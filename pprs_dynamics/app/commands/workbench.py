@@ -11,8 +11,14 @@ from __future__ import annotations
 import argparse
 import re
 
-from pprs_dynamics.app.commands.arguments import add_reference, add_topic, add_validation, whole
-from pprs_dynamics.app.front_door.inputs import Inputs
+from pprs_dynamics.app.api.inputs import Inputs
+from pprs_dynamics.app.commands.arguments import (
+    DEFAULT_MODEL,
+    add_reference,
+    add_topic,
+    add_validation,
+    whole,
+)
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.server.hub import Hub, LiveSource
 from pprs_dynamics.app.workbench.server.offered import Offered, is_folder
@@ -72,9 +78,10 @@ def _saved(options: argparse.Namespace) -> SavedSession | None:
     paths = [path for path in options.recordings if path.endswith(ENDING)]
     if not paths:
         return None
-    if len(options.recordings) > 1 or options.validate or options.reference is not None:
+    if (len(options.recordings) > 1 or options.validate or options.reference is not None
+            or options.model != DEFAULT_MODEL):
         raise SessionError(f'{displayed(paths[0])} is a session, must be given alone: it names its '
-                           'recordings')
+                           'recordings, its model and its reference')
     return SavedSession.read(paths[0])
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import Page
-from pprs_dynamics.app.report.robot_view import animate_robot
+from pprs_dynamics.app.report.robot_figure import animate_robot
 from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, titled_table
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_unit

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.app.fleet.trend import FleetTrends, Quantity, Trend
-from pprs_dynamics.app.fleet.words import change_text, reach_text, sentences
+from pprs_dynamics.app.fleet.trend_sentences import change_text, reach_text, sentences
 from pprs_dynamics.app.report.charts import plotly_objects
-from pprs_dynamics.app.report.page import Page, one_script
+from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.pictures import BLUE, GREY, RED
 from pprs_dynamics.arrays import Array
 
@@ -59,7 +59,7 @@ def fleet_page(fleet: FleetTrends, beside: str | None = None,
         page.interactive('<h2 id="trend-title">Trend</h2><div id="trend" role="img"></div>'
                          '<section id="recording" class="card" hidden></section>',
                          'fleet-data', json.dumps(data, allow_nan=False),
-                         one_script(['dom.mjs', 'fleet.mjs']))
+                         ['dom.mjs', 'fleet.mjs'])
     if fleet.errors:
         page.heading('Recordings without a result')
         page.table(('recording', 'robot', 'reason'),

@@ -8,7 +8,6 @@ from __future__ import annotations
 import base64
 import gzip
 import json
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -29,7 +28,7 @@ BASIC = 'plotly-basic.min.js.gz'
 BASIC_TYPES = ('scatter', 'bar')
 # Of uPlot 1.6.32, for curves that change at once.
 CURVES, CURVES_STYLE = 'uplot.iife.min.js.gz', 'uplot.min.css'
-_IMPORT = re.compile(r'^import .*;\n', re.MULTILINE)
+FOLDER = 'pprs/'  # of the package's modules in an import map
 
 
 @dataclass(frozen=True)
@@ -70,6 +69,7 @@ class Page:
         self._menus = 0
         self._types: set[str] = set()
         self._has_board = False
+        self._modules: set[str] = set()
 
     def heading(self, text: str) -> None:
         """Start a section."""
@@ -199,9 +199,9 @@ class Page:
         self._body.append(f'<section class="card"><h3>{escape(title)}</h3><dl>{terms}</dl>'
                           f'<div class="columns">{drawn}</div></section>')
 
-    def interactive(self, elements: str, name: str, data: str, script: str,
+    def interactive(self, elements: str, name: str, data: str, modules: Sequence[str],
                     with_board: bool = False) -> None:
-        """Add a part that a script of the package fills.
+        """Add a part that modules of the package fill.
 
         Parameters
         ----------
@@ -211,12 +211,16 @@ class Page:
             Id of the element that holds the data.
         data : str
             JSON; it may hold text from files.
-        script : str
+        modules : sequence of str
+            All that are needed; the last has a function `prepare`.
         with_board : bool
             It shows what the workbench does, with uPlot after `await library('uplot')`.
         """
         self._has_board |= with_board
-        self._body.append(f'{elements}{_data(name, data)}<script>{script}</script>')
+        self._modules |= {*modules}
+        self._body.append(
+            f'{elements}{_data(name, data)}<script type="module">'
+            f"import {{prepare}} from '{FOLDER}{modules[-1]}'; prepare();</script>")
 
     def _drawn(self, figure: Any, caption: str, over_time: bool) -> str:
         from plotly.utils import PlotlyJSONEncoder
@@ -249,12 +253,14 @@ class Page:
             libraries['uplot'] = _packed(CURVES)
         library = ''.join(f'<script type="text/plain" id="{name}">{packed}</script>'
                           for name, packed in libraries.items())
+        where = (f'<script type="importmap">{_import_map(self._modules)}</script>'
+                 if self._modules else '')
         styles = ['board.css', 'page.css'] if self._has_board else ['page.css']
         style = ''.join(map(asset, styles)) + (vendored(CURVES_STYLE) if self._has_board else '')
         return ('<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
                 '<meta name="viewport" content="width=device-width, initial-scale=1">'
                 f'<title>{escape(self._title)}</title><style>{style}</style>'
-                f'</head><body><header><h1>{escape(self._title)}</h1></header>'
+                f'{where}</head><body><header><h1>{escape(self._title)}</h1></header>'
                 f'<main>{"".join(self._body)}</main>'
                 f'{library}<script>{asset("page.js")}</script></body></html>\n')
 
@@ -319,13 +325,12 @@ def vendored(name: str) -> str:
     return (gzip.decompress(content) if name.endswith('.gz') else content).decode()
 
 
-def one_script(names: Iterable[str]) -> str:
-    """Return modules as one script, for a page that no server stands behind.
+def _import_map(names: Iterable[str]) -> str:
+    """Return where modules are, for a page that no server stands behind: in the page itself.
 
-    Parameters
-    ----------
-    names : iterable of str
-        Each after those that it imports; the last has a function `prepare`.
+    A module in a `data:` address has no folder that `./` could count from, hence other names.
     """
-    text = ''.join(_IMPORT.sub('', asset(name)).replace('\nexport ', '\n') for name in names)
-    return f"(() => {{'use strict';\n{text}\nprepare();\n}})();"
+    inside = {name: asset(name).replace("from './", f"from '{FOLDER}") for name in sorted(names)}
+    return json.dumps({'imports': {
+        FOLDER + name: f'data:text/javascript;base64,{base64.b64encode(text.encode()).decode()}'
+        for name, text in inside.items()}})

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.app.report.comparison_figures import shown_samples
-from pprs_dynamics.app.report.page import Page, one_script
+from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.what_if import OptionalForces, WhatIf
 from pprs_dynamics.inference.regression.normal_equations import BEYOND_TOLERANCE
@@ -63,7 +63,7 @@ def add_what_if(page: Page, system: WhatIf, residuals: Residuals) -> None:
             'unit': residuals.unit, 'gap': GAP,
             'deviations': DEVIATIONS, 'steepness': BEYOND_TOLERANCE,
             'drives': [_drive(one, residuals) for one in system.drives],
-        }, allow_nan=False, separators=(',', ':')), one_script(MODULES), with_board=True)
+        }, allow_nan=False, separators=(',', ':')), MODULES, with_board=True)
 
 
 def _drive(one: OptionalForces, residuals: Residuals) -> dict[str, Any]:

@@ -10,8 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pprs_dynamics.app.report.charts import extremes
 from pprs_dynamics.app.workbench.tick_fits import TickFits
-from pprs_dynamics.app.workbench.views import Share, ViewState, names_of
+from pprs_dynamics.app.workbench.view_state import Share, ViewState, names_of
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 
@@ -20,6 +21,7 @@ Mask = NDArray[np.bool_]
 
 EFFORTS = ('measured', 'error before', 'error now')
 MOST_SPANS = 200  # of time, in which samples of a mask lie
+MOST_POINTS = 20_000  # of a scatter
 SHORT = 5  # samples between two spans that count as one
 
 
@@ -69,6 +71,14 @@ def quantity(fits: TickFits, view: ViewState, name: str, drive: int) -> Array:
 def quantities(data: Residuals) -> list[str]:
     """Return the names of what may be drawn."""
     return ['time', *(name for name in data.variables), *EFFORTS]
+
+
+def drawn_samples(x: Array, y: Array) -> NDArray[np.int_]:
+    """Return the samples of a scatter that are drawn: as dense as all, and every peak of both."""
+    if len(x) <= MOST_POINTS:
+        return np.arange(len(x))
+    evenly = np.arange(0, len(x), -(-2 * len(x) // MOST_POINTS))
+    return np.union1d(evenly, extremes(x, y, points=MOST_POINTS // 4))
 
 
 def shares_in(mask: Mask, fits: TickFits, view: ViewState) -> list[Share]:

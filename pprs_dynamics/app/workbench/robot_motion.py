@@ -52,7 +52,8 @@ def robot_motion(session: Session) -> RobotMotion:
             found.append(Skeleton.of(model, one.motion[starts[here]]))
     drawn = replace(found[0], points=np.concatenate([one.points for one in found]))
     return RobotMotion(session.data.time[chosen], drawn,
-                       _rms_between(session.before, chosen), _rms_between(session.now, chosen))
+                       _rms_between(session.given_residual, chosen),
+                       _rms_between(session.current_residual, chosen))
 
 
 def _rms_between(error: Array, chosen: np.typing.NDArray[np.int_]) -> Array:

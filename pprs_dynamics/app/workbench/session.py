@@ -14,8 +14,8 @@ from pathlib import Path
 from threading import Lock, RLock
 from typing import Any
 
-from pprs_dynamics.app.front_door.inputs import Inputs
-from pprs_dynamics.app.workbench import views
+from pprs_dynamics.app.api.inputs import Inputs
+from pprs_dynamics.app.workbench import view_state
 from pprs_dynamics.app.workbench.background import Cancelled, Job, run_in_process
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.history import History, Moment
@@ -23,7 +23,7 @@ from pprs_dynamics.app.workbench.long_work import DesignedMotion, designed, diag
 from pprs_dynamics.app.workbench.masks import Mask, quantity, region_mask, shares_in, span_mask
 from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
 from pprs_dynamics.app.workbench.tick_fits import Place, Tick, TickFits
-from pprs_dynamics.app.workbench.views import DriveError, Share, ViewState
+from pprs_dynamics.app.workbench.view_state import DriveError, Share, ViewState
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt, original
@@ -182,7 +182,7 @@ class Session:
             As `SavedSession.write`.
         """
         with self._lock:
-            ticks = tuple(SavedTick(name, views.names_of(tick.best, self.drives), {
+            ticks = tuple(SavedTick(name, view_state.names_of(tick.best, self.drives), {
                 (name if drive is None else f'{self.drives[drive]}.{name}'): value
                 for (drive, name), value in tick.chosen.items()})
                 for name, tick in self.view_state.ticks.items())
@@ -196,11 +196,11 @@ class Session:
             self.noise_floors: dict[str, float] | None = None
             self.revision += 1
             self.generation += 1
-            self.view_state = views.without_ticks(fits, self.revision)
+            self.view_state = view_state.without_ticks(fits, self.revision)
             for name, tick in (ticks or {}).items():
                 with suppress(PprsError):  # what cannot act under this model is ticked no more
                     self._tick(EffectRequest.named(
-                        name, views.names_of(tick.best, fits.drives), fits.drives).placed(
+                        name, view_state.names_of(tick.best, fits.drives), fits.drives).placed(
                             fits.model), tick.chosen)
             self.notify()
 
@@ -302,12 +302,12 @@ class Session:
         return self.fits.candidates()
 
     @property
-    def before(self) -> Array:
+    def given_residual(self) -> Array:
         """What the model leaves, (M, D) [N]."""
         return self.fits.before
 
     @property
-    def now(self) -> Array:
+    def current_residual(self) -> Array:
         """What is left with the ticked effects, (M, D) [N]."""
         return self.view_state.residual
 
@@ -320,11 +320,13 @@ class Session:
 
     def errors(self) -> dict[str, DriveError]:
         """Return the error of every drive that was measured: before, now, and of the noise."""
-        return views.errors_of(self.before, self.now, self.noise, self.drives)
+        return view_state.errors_of(self.given_residual, self.current_residual, self.noise,
+                                    self.drives)
 
     def overall(self) -> DriveError:
         """Return the error over all samples and drives."""
-        return DriveError(root_mean_square(self.before), root_mean_square(self.now),
+        return DriveError(root_mean_square(self.given_residual),
+                          root_mean_square(self.current_residual),
                           root_mean_square(list(self.noise.values())))
 
     @property
@@ -415,7 +417,7 @@ class Session:
             with self._lock:
                 fits, view = self.fits, self.view_state
             if not view.is_settled:
-                for one in views.following(fits, view):
+                for one in view_state.following(fits, view):
                     if not self._show(one):
                         break
             return self.view_state
@@ -490,7 +492,7 @@ class Session:
 
     def _linear(self, ticks: dict[str, Tick]) -> ViewState:
         self.revision += 1
-        self.view_state = views.linear(self.fits, self.view_state, ticks, self.revision)
+        self.view_state = view_state.linear(self.fits, self.view_state, ticks, self.revision)
         self.notify()
         return self.view_state
 
@@ -551,7 +553,7 @@ class Session:
         with self._lock:
             self._require(revision)
             tick = self.view_state.ticks.get(effect)
-            on = drives or (views.names_of(tick.best, self.drives) if tick else None)
+            on = drives or (view_state.names_of(tick.best, self.drives) if tick else None)
             request = EffectRequest.named(effect, on or None, self.drives).placed(self.model)
             if 'adopt' in self.jobs and self.jobs['adopt'].is_running:
                 raise SessionError(f'{self.jobs["adopt"].what} is being adopted, must end first')
@@ -683,18 +685,19 @@ class Session:
                 'departure': finite(view.departure), 'notice': view.notice,
                 'drives': list(self.drives), 'noise_is_guess': self.noise_floors is None,
                 'errors': {name: one.to_dict() for name, one in self.errors().items()},
-                'overall': self.overall().to_dict(), **views.units_to_dict(self.model),
+                'overall': self.overall().to_dict(), **view_state.units_to_dict(self.model),
                 'effects': [
-                    views.effect_to_dict(view, effect, self.model, called_for)
+                    view_state.effect_to_dict(view, effect, self.model, called_for)
                     for effect in self.candidates],
                 'verdict': diagnosis.verdict if diagnosis else None,
                 'little': word_little(little_explained(
-                    self.model, self.fits.fits.design.residuals, self.now)),
+                    self.model, self.fits.fits.design.residuals, self.current_residual)),
                 'steps': [step.to_dict() for step in self.steps],
                 'undoes': self.history.undoes, 'redoes': self.history.redoes,
                 'jobs': {kind: job.to_dict() for kind, job in self.jobs.items()},
                 'adoption': for_json(adoption.to_dict()) if adoption else None,
                 'experiment': for_json(self.experiment.promise) if self.experiment else None,
-                'recordings': views.recordings_to_dict(self.inputs.recordings, self.fits, self.now),
+                'recordings': view_state.recordings_to_dict(
+                    self.inputs.recordings, self.fits, self.current_residual),
                 'held_out': [{'key': key, 'name': one.name}
                              for key, one in self.inputs.validation.items()]}

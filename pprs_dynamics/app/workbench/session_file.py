@@ -16,12 +16,13 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.app.front_door.inputs import Inputs
+from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.fingerprint import fingerprint
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.system.bounded_yaml import read_text
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
@@ -99,15 +100,16 @@ class SavedSession:
         Raises
         ------
         UnreadableFileError
-            Where it is no session, or a recording is gone.
+            Where it is no session, larger or deeper than one, or where a recording is gone.
         SessionError
             Where a recording is not the one that it was.
         PprsError
             As `Inputs.read`; where the model is none by now.
         """
+        text = read_text(path)
         try:
-            found = json.loads(Path(path).read_bytes())
-        except (OSError, ValueError) as error:
+            found = json.loads(text)
+        except ValueError as error:
             raise UnreadableFileError(path, f'cannot be read as a session: {error}') from None
         if not isinstance(found, dict) or found.get('format') != FORMAT:
             raise UnreadableFileError(path, f'is no session, must have the format {FORMAT!r}, as '

@@ -16,7 +16,6 @@ import numpy as np
 from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
     from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
@@ -93,7 +92,7 @@ def first_step(model: ForceModel, files: GivenFiles) -> tuple[str, str]:
 
     A description alone, without friction and with the maker's masses, is fitted first.
     """
-    if isinstance(model, MechanismModel) and model.is_described:
+    if model.is_described:
         bare = not any(np.any(model.values[key]) for key in OWN_FRICTION)
         words = ('The model has no friction yet: fit inertia and friction first' if bare else
                  'Check units, signs and zeros, and that this is the model of this machine as it '

@@ -149,7 +149,7 @@ def require_open_numbers(model: ForceModel) -> None:
 
 def _is_fitted_whole(model: ForceModel) -> bool:
     """Return whether all numbers are fitted, and not those alone that tolerances leave open."""
-    return isinstance(model, MechanismModel) and model.is_described
+    return model.is_described
 
 
 def halves(recording: Recording) -> list[Recording]:

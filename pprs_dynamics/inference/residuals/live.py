@@ -16,12 +16,9 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.files.samples import Mask
 from pprs_dynamics.measurement.motion.differentiation import LocalPolynomial
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction, LiveSample
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 
 WINDOW = 0.12  # [s] of the smoothing that gives velocity and acceleration
 # Arms move ten times as slowly as the 3-PPRS, and their joints carry ten times the inertia.
@@ -202,12 +199,9 @@ class LiveComparison:
 
     def _followed(self, position: Array, velocity: Array, acceleration: Array) -> Any:
         """Return what the drives move."""
-        if not isinstance(self._model, DriveModel):
-            return JointMotion(position, velocity, acceleration)
-        found = solve_forward_motion(
-            self._model.robot.geometry, position, velocity, acceleration, self._seed)
-        self._seed = found.motion[-1:]
-        return found.motion
+        found = self._model.motion_of_drives(position, velocity, acceleration, self._seed)
+        self._seed = found[-1:]
+        return found
 
 
 def _is_unexplained(error: Array, model: Array, moving: Mask) -> bool:

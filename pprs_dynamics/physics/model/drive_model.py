@@ -135,6 +135,12 @@ class DriveModel(ForceModel):
             return cls(robot=robot, effects=effects, limits=limits, reversal=reversal,
                        equations=values['equations'], values=values, source=source)
 
+    def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
+                         seed: PlatformMotion | None = None) -> PlatformMotion:
+        """Return the platform's motion, by forward kinematics."""
+        return solve_forward_motion(
+            self.robot.geometry, position, velocity, acceleration, seed).motion
+
     def mechanism(self, motion: PlatformMotion) -> ThreePprsState:
         """Return drive motion, Jacobians and frictionless forces for a platform motion.
 

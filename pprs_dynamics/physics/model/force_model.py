@@ -338,6 +338,24 @@ class ForceModel(ABC):
         return (find_effect(effect.name) or effect).bound(self.mechanism_of_effects)
 
     @abstractmethod
+    def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
+                         seed: Any = None) -> Any:
+        """Return the motion, of a kind in `motions`, that belongs to one of the drives.
+
+        Parameters
+        ----------
+        position, velocity, acceleration : (N, D) array
+            [m, rad], per second and per second squared.
+        seed : motion, optional
+            The sample before the first one.
+
+        Raises
+        ------
+        PprsError
+            Where positions do not close the mechanism, or it is singular there.
+        """
+
+    @abstractmethod
     def mechanism(self, motion: Any) -> Any:
         """Return what effects take of a motion of this kind; see `drive_forces`."""
 

@@ -259,6 +259,11 @@ class MechanismModel(ForceModel):
             state.closed[self.robot.structure] = mechanism.closed[-1].copy()
         return forces
 
+    def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
+                         seed: JointMotion | None = None) -> JointMotion:
+        """Return the same: loops are closed where forces are evaluated."""
+        return JointMotion(position, velocity, acceleration)
+
     def mechanism(self, motion: JointMotion | PlatformMotion,
                   closed: dict[Any, Array] | None = None) -> MechanismState:
         """Return what effects take of a motion; see `drive_forces` and `ModelState.closed`."""

@@ -12,13 +12,13 @@ from typing import Any
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from pprs_dynamics.ros.messages.status_codes import Code
-from pprs_dynamics.ros.node.parameters import own_parameter
+from pprs_dynamics.ros.node.parameters import node_parameter
 from pprs_dynamics.ros.node.rclpy_internals import destroy_state_machine
 from pprs_dynamics.ros.node.status import StatusReporter
 
 CHANGE_STATE = '/change_state'
-AUTOSTART = own_parameter('autostart', True, 'true: active at once; false: a supervisor configures '
-                          'and activates the node', stays=True)
+AUTOSTART = node_parameter('autostart', True, 'true: active at once; false: a supervisor '
+                           'configures and activates the node', stays=True)
 
 
 class ManagedNode(LifecycleNode):

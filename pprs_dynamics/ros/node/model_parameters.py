@@ -33,15 +33,15 @@ from pprs_dynamics.ros.node.parameters import (
     declare_own,
     has_model,
     in_declared_type,
+    node_parameter,
     overrides,
-    own_parameter,
     with_hint,
 )
 
 NodeModel = DriveModel | MechanismModel
 Checked = TypeVar('Checked')
-DEMO = own_parameter('demo', False, 'true: without a model file this is the paper\'s robot, for '
-                     'demonstrations', stays=True)
+DEMO = node_parameter('demo', False, 'true: without a model file this is the paper\'s robot, for '
+                      'demonstrations', stays=True)
 OF_OTHERS = NODE_KEYS - {'use_sim_time', 'start_type_description_service'}  # those are ROS 2's
 
 

@@ -89,7 +89,7 @@ class NodeParameter(Key):
         return super().check(value)
 
 
-def own_parameter(
+def node_parameter(
     name: str, default: Any, description: str, size: int | None = None,
     choices: tuple[str, ...] = (), **more: Any,
 ) -> NodeParameter:

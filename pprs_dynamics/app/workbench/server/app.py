@@ -26,14 +26,14 @@ from starlette.routing import Route
 from pprs_dynamics.app.report.page import CURVES, CURVES_STYLE, assets, vendored
 from pprs_dynamics.app.report.page import asset as packaged
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
-from pprs_dynamics.app.workbench.masks import quantities, quantity, spans_of
+from pprs_dynamics.app.workbench.masks import drawn_samples, quantities, quantity, spans_of
 from pprs_dynamics.app.workbench.robot_motion import robot_motion
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys, TooLongError
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.offered import index_of
 from pprs_dynamics.app.workbench.server.wire import BadRequestError, Fields, attached, binary
 from pprs_dynamics.app.workbench.session import Session
-from pprs_dynamics.app.workbench.views import units_to_dict
+from pprs_dynamics.app.workbench.view_state import units_to_dict
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
@@ -41,7 +41,6 @@ from pprs_dynamics.system.numbers import finite
 
 UPLOAD = '/api/upload'
 MOST_UPLOADED = 256_000_000  # bytes: an hour of six drives at 500 Hz as CSV
-MOST_POINTS = 20_000  # of a scatter
 HEARTBEAT = 15.0  # [s] between signs of life
 VENDORED = {'uplot.js': CURVES, 'uplot.css': CURVES_STYLE}
 TYPES = {'.mjs': 'text/javascript', '.js': 'text/javascript', '.css': 'text/css'}
@@ -162,7 +161,8 @@ class Api:
             known = index_of(str((query or {}).get('since', '')), hub.log.version + 1)
             changes = hub.log.since(-1 if known is None else known)
             return binary({**changes, 'count': count, 'version': hub.log.version},
-                          {'now': session.now.T} if session and 'drawn' in changes else {})
+                          {'now': session.current_residual.T}
+                          if session and 'drawn' in changes else {})
 
     def curves(self, query: Any) -> Response:
         """Answer times and the error before."""
@@ -175,7 +175,7 @@ class Api:
                 {'generation': self.hub.generation, 'drives': list(session.drives),
                  'quantities': quantities(data)},
                 {'seconds': whole, 'rest': data.time - whole, 'segment': data.segment.astype(float),
-                 'before': session.before.T, 'measured': data.measured.T})
+                 'before': session.given_residual.T, 'measured': data.measured.T})
 
     def tick(self, body: Fields) -> Response:
         """Tick or untick an effect."""
@@ -196,8 +196,8 @@ class Api:
             drive = body.get('drive')
             mask = session.span(*body.range('time'), None if drive is None else [str(drive)])
         return JSONResponse({'shares': [asdict(one) for one in session.shares(mask)],
-                             'before': finite(root_mean_square(session.before[mask])),
-                             'now': finite(root_mean_square(session.now[mask])),
+                             'before': finite(root_mean_square(session.given_residual[mask])),
+                             'now': finite(root_mean_square(session.current_residual[mask])),
                              'spans': spans_of(session.data, mask),
                              'samples': int(mask.sum()), 'revision': session.revision})
 
@@ -241,8 +241,8 @@ class Api:
         with session.steady():
             x, y = (quantity(session.fits, session.view_state, query.get(axis, ''), d)
                     for axis in ('x', 'y'))
-        step = max(1, -(-len(x) // MOST_POINTS))
-        return binary({}, {'x': x[::step], 'y': y[::step]})
+        at = drawn_samples(x, y)
+        return binary({}, {'x': x[at], 'y': y[at]})
 
     def robot(self, query: Any) -> Response:
         """Answer the robot's joints along the recordings, and the errors there."""

@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory, mkdtemp
 from threading import Event, Lock, Thread
 from typing import Any, Protocol
 
-from pprs_dynamics.app.front_door.inputs import Inputs
+from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.server.change_log import ChangeLog
 from pprs_dynamics.app.workbench.server.offered import ENDINGS, Offered

@@ -45,7 +45,7 @@ const request = async (path, options) => {
     ? unpack(await response.arrayBuffer()) : response.json();
 };
 
-export class Server {
+export class Client {
   /* `show` is called with the state before, the state now and arrays that changed; `tell` with
      what goes wrong. */
   constructor(show, tell) {

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pprs_dynamics.app.front_door.inputs import (
+from pprs_dynamics.app.api.inputs import (
     InputError,
     Inputs,
     Model,
@@ -19,7 +19,7 @@ from pprs_dynamics.app.front_door.inputs import (
     Recordings,
     stage,
 )
-from pprs_dynamics.app.front_door.result import Result, data_frame
+from pprs_dynamics.app.api.result import Result, data_frame
 from pprs_dynamics.inference.experiments.arm_motions import ArmExcitation, ArmLimits, excite_arm
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import Experiment, check_purpose
@@ -31,7 +31,7 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
+    from pprs_dynamics.app.api.result import DataFrame, Figure, Page
 
 RATE = 100.0  # [Hz], the default of play_trajectory
 

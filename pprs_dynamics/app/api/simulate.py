@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pprs_dynamics.app.front_door.inputs import Model, Progress, stage
-from pprs_dynamics.app.front_door.result import Result, data_frame
+from pprs_dynamics.app.api.inputs import Model, Progress, stage
+from pprs_dynamics.app.api.result import Result, data_frame
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.measurement.files.recording import Recording, describe, write_recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
@@ -27,7 +27,7 @@ from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.simulation.drive_control import ControlSettings, Note
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
+    from pprs_dynamics.app.api.result import DataFrame, Figure, Page
 
 RATE = 500.0  # [Hz], of the 3-PPRS
 NOISE = 0.08  # [N], of its efforts
@@ -87,7 +87,7 @@ class SimulationResult(Result):
 
     def page(self) -> Page:
         """Return the page of `pprs simulate --report`: the moving robot."""
-        from pprs_dynamics.app.report.robot_view import robot_page
+        from pprs_dynamics.app.report.robot_figure import robot_page
 
         assert isinstance(self.model, (DriveModel, MechanismModel))
         return robot_page(self.model, self.motion, 'The simulated motion')

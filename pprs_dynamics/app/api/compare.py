@@ -10,8 +10,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings, stage
-from pprs_dynamics.app.front_door.result import Result, data_frame
+from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings, stage
+from pprs_dynamics.app.api.result import Result, data_frame
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.comparison import compare as compare_residuals
@@ -31,7 +31,7 @@ from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
+    from pprs_dynamics.app.api.result import DataFrame, Figure, Page
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -10,9 +10,9 @@ from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.app.front_door.diagnose import DiagnosisResult
-from pprs_dynamics.app.front_door.inputs import Given, Inputs, Model, Progress, Recordings, stage
-from pprs_dynamics.app.front_door.result import Result, data_frame
+from pprs_dynamics.app.api.diagnose import DiagnosisResult
+from pprs_dynamics.app.api.inputs import Given, Inputs, Model, Progress, Recordings, stage
+from pprs_dynamics.app.api.result import Result, data_frame
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt as adopt_effect
 from pprs_dynamics.inference.adoption.adopt import original
@@ -27,7 +27,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
+    from pprs_dynamics.app.api.result import DataFrame, Figure, Page
 
 
 class RefusedError(PprsError, ValueError):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.app.front_door.inputs import (
+from pprs_dynamics.app.api.inputs import (
     Given,
     Inputs,
     Model,
@@ -17,7 +17,7 @@ from pprs_dynamics.app.front_door.inputs import (
     Recordings,
     stage,
 )
-from pprs_dynamics.app.front_door.result import Result, data_frame
+from pprs_dynamics.app.api.result import Result, data_frame
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_recordings
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
@@ -28,7 +28,7 @@ from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
+    from pprs_dynamics.app.api.result import DataFrame, Figure, Page
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -10,8 +10,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings, stage
-from pprs_dynamics.app.front_door.result import Result, data_frame
+from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings, stage
+from pprs_dynamics.app.api.result import Result, data_frame
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.inference.fit.base_fit import BaseFit, fit_base
 from pprs_dynamics.inference.fit.reference_runs import with_own_reference
@@ -19,7 +19,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
+    from pprs_dynamics.app.api.result import DataFrame, Figure, Page
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -24,7 +24,7 @@ WIDTH = 100  # characters of a line of text
 
 
 class Result(ABC):
-    """An answer of the front door.
+    """An answer of the package's calls.
 
     Printed, it is what the command prints; in a notebook it shows the same.
     """

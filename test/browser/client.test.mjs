@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
-import {merged, rowsOf, Server, unpack} from '../../pprs_dynamics/app/browser/server.mjs';
+import {merged, rowsOf, Client, unpack} from '../../pprs_dynamics/app/browser/client.mjs';
 
 const packed = (header, values = []) => {
   const text = new TextEncoder().encode(JSON.stringify(header).padEnd(
@@ -48,7 +48,7 @@ const serve = (answers) => {
 
 test('changes go out one after the other, each with the revision before it', async () => {
   const told = [];
-  const server = new Server(() => {}, (text) => told.push(text));
+  const server = new Client(() => {}, (text) => told.push(text));
   server.state = {revision: 1, version: 1, count: 0};
   const asked = serve([
     () => ({header: {revision: 2, version: 2, count: 1}}),
@@ -63,7 +63,7 @@ test('changes go out one after the other, each with the revision before it', asy
 
 test('an answer that was overtaken is not shown', () => {
   const shown = [];
-  const server = new Server((last, state) => shown.push(state.version), () => {});
+  const server = new Client((last, state) => shown.push(state.version), () => {});
   server.take({header: {version: 3, count: 3}, arrays: {}});
   server.take({header: {version: 2, count: 2}, arrays: {}});
   assert.deepEqual(shown, [3]);
@@ -71,7 +71,7 @@ test('an answer that was overtaken is not shown', () => {
 
 test('a refusal is told, and the screen asked for', async () => {
   const told = [];
-  const server = new Server(() => {}, (text) => told.push(text));
+  const server = new Client(() => {}, (text) => told.push(text));
   server.state = {revision: 1, version: 1, count: 4};
   const asked = serve([
     () => ({status: 409, text: '{"error": "something was changed elsewhere"}'}),
@@ -84,7 +84,7 @@ test('a refusal is told, and the screen asked for', async () => {
 });
 
 test('a change that the answer to one of ours has already is not asked for', async () => {
-  const server = new Server(() => {}, () => {});
+  const server = new Client(() => {}, () => {});
   server.state = {revision: 1, version: 1, count: 4};
   const asked = serve([]);
   await server.hear(4);

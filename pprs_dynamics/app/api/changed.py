@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from math import hypot, isfinite
 from typing import TYPE_CHECKING, Any
 
-from pprs_dynamics.app.front_door.diagnose import DiagnosisResult, diagnose
-from pprs_dynamics.app.front_door.inputs import Inputs, Model, Progress, Recordings
-from pprs_dynamics.app.front_door.result import Result, data_frame
+from pprs_dynamics.app.api.diagnose import DiagnosisResult, diagnose
+from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings
+from pprs_dynamics.app.api.result import Result, data_frame
 from pprs_dynamics.inference.diagnosis.changed_number import ChangedNumber
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.paired_errors import rms, rms_by_drive
@@ -20,7 +20,7 @@ from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.uncertainties import with_uncertainties
 
 if TYPE_CHECKING:
-    from pprs_dynamics.app.front_door.result import DataFrame, Figure, Page
+    from pprs_dynamics.app.api.result import DataFrame, Figure, Page
 
 
 @dataclass(frozen=True, repr=False, eq=False)
