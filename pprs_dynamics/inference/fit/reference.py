@@ -11,9 +11,8 @@ r"""What a reference run says of another recording: its forces known in part, an
 y are the errors of the model, theta the numbers of its base, and delta what no number of it
 explains but repeats: in each drive the sum of two Gaussian processes, one over the states of all
 drives, s = (q / l_q, tanh(v / v_0) / l_v), and one over its own, which other paths meet again, of
-standard deviations sigma of the drive's own; and of what is finer than any length: waves over its
-own position, as gears and motors have them, and friction that turns over along distances, by its
-presliding states less the direction. delta' is drawn anew for every run. Given y_r, X_l theta +
+standard deviations sigma of the drive's own; and of waves over its own position, finer than any
+length, as gears and motors have them. delta' is drawn anew for every run. Given y_r, X_l theta +
 delta(s_l) is Gaussian: its mean is carried over, and the principal directions of its covariance
 are columns of unit prior. Near the states of the reference the errors of the base cancel; far from
 them what is known is what the prior says.
@@ -59,7 +58,6 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.effects.laws.hysteresis import presliding
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.reference_keys import DIRECTIONS, RESIDUAL
@@ -75,11 +73,9 @@ SLOW = 0.3  # of the rms speed of a drive: within it direction turns over
 LENGTHS = tuple((position, speed) for position in (0.5, 1.5) for speed in (0.7, 2.0))
 # The same of what is of one drive's own state.
 OWN_LENGTHS = tuple((position, speed) for position in (0.3, 1.0, 3.0) for speed in (0.5, 1.5))
-# Along which friction turns over, in standard deviations of positions.
-DISTANCES = (0.003, 0.01, 0.03, 0.1)
 # Waves of a drive: at most; from and to how many over the whole stroke; and how often the variance
 # of what is left sine and cosine explain: by chance one in 25 000 that are tried does.
-MOST_WAVES, LONGEST_WAVE, FINEST_WAVE, LEAST_WAVE = 6, 4.0, 400.0, 20.0
+MOST_WAVES, LONGEST_WAVE, FINEST_WAVE, LEAST_WAVE = 6, 10.0, 400.0, 20.0
 WAVE_STEP, FINE_STEP = 0.5, 0.02  # of a wave over the stroke, between those that are tried
 FIRST_SIZE = 0.4  # of a process, over the error: from which its size is fitted
 LEAST_SIZE = 1e-9  # [N, N m], of a process that does nothing
@@ -273,32 +269,6 @@ class Waves:
 
 
 @dataclass(frozen=True)
-class Reversals:
-    """Friction of a drive that turns over along distances, of unit size.
-
-    Parameters
-    ----------
-    drive : int
-    distances : (K,) array
-        [rad, m]
-    """
-
-    drive: int
-    distances: Array
-
-    def __len__(self) -> int:
-        return len(self.distances)
-
-    def features(self, residuals: Residuals) -> tuple[Array, Array]:
-        """Return features of a recording, (M, K), and none of new states."""
-        q, v = (one[:, self.drive] for one in _motion(residuals))
-        runs = [residuals.record == run for run in np.unique(residuals.record)]
-        found = np.stack([np.concatenate([presliding(q[run], distance) for run in runs])
-                          for distance in self.distances], axis=1) - np.sign(v)[:, None]
-        return found, np.zeros((len(found), 0))
-
-
-@dataclass(frozen=True)
 class Reference:
     """A reference run, fitted: the numbers of the base and the process, given its errors.
 
@@ -306,10 +276,10 @@ class Reference:
     ----------
     model : ForceModel
     recordings : tuple of Recording
-    processes : tuple of Process, Waves or Reversals
-        That over all drives, then those over the state of each, waves of each, reversals of each.
-    size : (D, 4) array
-        Standard deviations of a drive's four [N].
+    processes : tuple of Process or Waves
+        That over all drives, then those over the state of each, waves of each.
+    size : (D, 3) array
+        Standard deviations of a drive's three [N].
     repeats : (D,) array
         Correlation of the process in two runs.
     base : (14 n, P) array
@@ -324,7 +294,7 @@ class Reference:
 
     model: ForceModel
     recordings: tuple[Recording, ...]
-    processes: tuple[Process | Waves | Reversals, ...]
+    processes: tuple[Process | Waves, ...]
     size: Array
     repeats: Array
     base: Array
@@ -690,8 +660,8 @@ def _parts(residuals: Residuals) -> Integers:
 
 
 def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
-               ) -> tuple[Process | Waves | Reversals, ...]:
-    """Return the process over all drives, those of each, waves and reversals.
+               ) -> tuple[Process | Waves, ...]:
+    """Return the process over all drives, those of each, and waves.
 
     Lengths are those of the largest evidence, of one drive after another beside the base alone,
     then of the shared process beside these; waves those in what they leave.
@@ -713,9 +683,9 @@ def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
         if d in fits:
             explained = np.concatenate((columns[:, d], shared[1], own[d][1]), axis=1)
             left = left - explained @ fits[d][1].coefficients
-        waves.append(Waves.of(residuals, d, left - np.nanmean(left)))
-    return (shared[0], *(one for one, _ in own), *waves, *(
-        Reversals(d, plain.spread[d] * np.array(DISTANCES)) for d in drives))
+            left = left - np.nanmean(left)
+        waves.append(Waves.of(residuals, d, left))
+    return (shared[0], *(one for one, _ in own), *waves)
 
 
 def _repeats(regression: Regression, fit: JointFit, told: int, parts: Integers,
