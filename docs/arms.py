@@ -310,7 +310,7 @@ def tell(bench: Bench) -> dict[str, str]:
     from benchmarks.scores import cases as cases_on_dask
 
     if not bench.as_far:
-        arm_score.run(bench.folder / 'base.yaml', SEEDS, NOTHING, 0, DURATION,
+        arm_score.run(bench.folder / 'base.yaml', range(SEEDS), range(NOTHING), range(0), DURATION,
                       bench.folder / 'score.jsonl', cases_on_dask.here)
     outcomes = cases_on_dask.read_outcomes(bench.folder / 'score.jsonl')
     return {

@@ -4,8 +4,8 @@
 """Pages of the catalogue: each effect's card, its parameters, and a plot of its law.
 
 The plot is what the effect adds to the measured effort of the drive where it adds most, along a
-random motion of the paper's robot (of a small arm where it acts in arms only), with a typical
-value of each parameter.
+random motion of the paper's robot (of a small arm where it acts in arms only, or hardly in that
+robot), with a typical value of each parameter.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ SECONDS, RATE = 20.0, 200.0
 # What an effect's force is drawn over, where it is not the drive's velocity.
 OVER = {'counterbalance': 'position', 'current_gain': 'effort',
         'drive_inertia': 'acceleration', 'drive_spring': 'position',
-        'eccentric_encoder': 'position', 'effort_gain': 'effort',
+        'eccentric_encoder': 'position', 'effort_gain': 'effort', 'elastic_joint': 'acceleration',
         'effort_offset': 'time',
         'force_ripple': 'position', 'friction_drift': 'time',
         'homing_error': 'position', 'link_mass': 'position', 'joint_friction': 'velocity',
@@ -54,8 +54,9 @@ TYPICAL = {'asymmetric_friction': {'force_forward': 0.8, 'force_backward': 0.4},
            'current_gain': {'temperature': 0.002},
            'coupled_drives': {'wrist.coulomb': 1.0},
            'eccentric_encoder': {'amplitude': 0.001, 'phase': 0.0, 'pitch': 0.2},
-           'elastic_joint': {'compliance': 1e-4},
+           'elastic_joint': {'compliance': 1e-3},
            'friction_temperature': {'coulomb': -0.02, 'viscous': -0.2, 'reference': 40.0},
+           'friction_drift': {'force': 0.5, 'time': 10.0},
            'hysteresis': {'force': 0.5, 'distance': 0.002},
            'homing_error': {'zero': 0.002},
            'joint_friction': {'spherical.torque': 0.03},
@@ -68,6 +69,8 @@ TYPICAL = {'asymmetric_friction': {'force_forward': 0.8, 'force_backward': 0.4},
            'stribeck_friction': {'force': 0.5, 'velocity': 0.01},
            'effort_filter': {'time_constant': 0.02},
            'time_delay': {'delay': 0.02}}
+# Drawn of the arm: so stiff are screws that a 3-PPRS does not show it.
+IN_ARM = ('elastic_joint',)
 UNITS = {'time': 's', 'position': 'm', 'velocity': 'm/s', 'acceleration': 'm/s²', 'effort': 'N'}
 
 
@@ -105,7 +108,8 @@ def platform_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Ar
         # Positions are read with the error, so that the model is evaluated at another pose.
         poses = solve_forward_kinematics(model.robot.geometry,
                                          state.position
-                                         + changed.position_error(state.position))
+                                         + changed.position_error(state.position)
+                                         + changed.loaded_position_error(state.transmitted))
         at = PlatformMotion.from_poses(motion.time, poses.position, poses.orientation)
     forces = changed.drive_forces(at)
     added = changed.measured(forces).total - plain.total
@@ -118,7 +122,7 @@ def platform_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Ar
 
 
 def arm_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, str]:
-    """Return the same of a joint of a small arm."""
+    """Return the same of a turning joint of a small arm."""
     with tempfile.TemporaryDirectory() as folder:
         model = made_up_arm.real_arm(Path(folder), **{
             'friction.motors.wrist.turn': 1.0, 'friction.motors.wrist.swing': 1.0})
@@ -127,22 +131,26 @@ def arm_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, 
     assert isinstance(changed, MechanismModel)
     plain, at = model.drive_forces(motion), motion
     if changed.misreadings:  # as in `platform_law`
-        read = motion.position + changed.position_error(motion.position)
+        read = (motion.position + changed.position_error(motion.position)
+                + changed.loaded_position_error(plain.mechanism.transmitted))
         rate = np.gradient(read, motion.time, axis=0)
         at = replace(motion, position=read, velocity=rate,
                      acceleration=np.gradient(rate, motion.time, axis=0))
     added = changed.drive_forces(at).total - plain.total
     if changed.misreadings:
         added = -added
-    joint = int(np.argmax((added ** 2).sum(axis=0)))
-    return ({'time': motion.time, 'position': motion.position[:, joint],
-             'velocity': motion.velocity[:, joint], 'acceleration': motion.acceleration[:, joint],
-             'effort': plain.total[:, joint]}, added[:, joint], model.drives[joint])
+    # At the ends differences look to one side only.
+    added, inner = added[2:-2], slice(2, -2)
+    joint = int(np.argmax((added ** 2).sum(axis=0) * [unit.turns for unit in model.units]))
+    return ({'time': motion.time[inner], 'position': motion.position[inner, joint],
+             'velocity': motion.velocity[inner, joint],
+             'acceleration': motion.acceleration[inner, joint],
+             'effort': plain.total[inner, joint]}, added[:, joint], model.drives[joint])
 
 
 def draw(effect: type[CatalogueEffect], file: Path) -> None:
     """Draw what an effect adds over time and over what it depends on most."""
-    in_arm = PLATFORM not in effect.acts_in
+    in_arm = PLATFORM not in effect.acts_in or effect.name in IN_ARM
     states, added, drive = arm_law(effect) if in_arm else platform_law(effect)
     over = OVER.get(effect.name, 'velocity')
     force, units = ('N m', {**UNITS, 'position': 'rad', 'velocity': 'rad/s',

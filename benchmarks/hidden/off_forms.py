@@ -13,13 +13,15 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.simulation.hidden_effect import DriveForce, DriveMoment
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
-from pprs_dynamics.simulation.hidden_forces import effort_offset
+from pprs_dynamics.simulation.hidden_forces import effort_offset, gear_efficiency
 
 OFF = (0.05, 0.15)  # s
 WAVELENGTHS = (0.05, 0.3)  # [m]
 WAVES_OF_VELOCITY = (0.05, 0.3)  # [m/s]
 CAN_BE_OFF = tuple(name for name, effect in IN_CATALOGUE.items()
-                   if issubclass(effect, DriveForce) and effect is not effort_offset)  # a constant
+                   if issubclass(effect, DriveForce)
+                   # A constant; and what came after the public problems were drawn.
+                   and effect not in (effort_offset, gear_efficiency))
 
 
 def off_form(effect: DriveForce, rng: np.random.Generator) -> DriveForce:

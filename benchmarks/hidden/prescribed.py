@@ -139,10 +139,11 @@ class PrescribedPlant:
         structure = self._structure([e for e in effects if isinstance(e, StructureForce)])
         relative = np.einsum('nij,nj->ni', motion.rates, motion.velocity)
         moments, loads = self._passive_joints(bodies, structure, resistance, relative)
-        smooth = (bodies.joints[:, DRIVE_DOFS]
-                  + np.einsum('ni,nij->nj', bodies.joints[:, PASSIVE_DOFS] - structure, motion.T_d)
-                  + np.einsum('ni,nij->nj', moments, motion.rates[:, 6:]))
-        moment = DriveMoment(motion.time[:, None], motion.position, motion.velocity, loads[:, :6])
+        transmitted = bodies.joints[:, DRIVE_DOFS] + np.einsum(
+            'ni,nij->nj', bodies.joints[:, PASSIVE_DOFS] - structure, motion.T_d)
+        smooth = transmitted + np.einsum('ni,nij->nj', moments, motion.rates[:, 6:])
+        moment = DriveMoment(motion.time[:, None], motion.position, motion.velocity, loads[:, :6],
+                             transmitted)
         if delay is not None and np.any(delay):
             moment, smooth = _earlier(motion, moment, smooth, delay)
         relative[:, :6] = moment.velocity
@@ -249,9 +250,10 @@ def _earlier(motion: DrivenMotion, moment: DriveMoment, smooth: Array,
     position, velocity = (_at(motion, values, time, CubicSpline)
                           for values in (moment.position, moment.velocity))
     # Loads and the rest contain friction of the passive joints, with steps.
-    loads, smooth = (_at(motion, values, time, PchipInterpolator)
-                     for values in (moment.guide_load, smooth))
-    return DriveMoment(time, position, velocity, loads), smooth
+    loads, transmitted, smooth = (
+        _at(motion, values, time, PchipInterpolator)
+        for values in (moment.guide_load, moment.transmitted, smooth))
+    return DriveMoment(time, position, velocity, loads, transmitted), smooth
 
 
 def _earlier_times(motion: DrivenMotion, delay: Array) -> Array:
@@ -267,16 +269,17 @@ def _hidden_force(effect: DriveForce, moment: DriveMoment) -> Array:
     """Return an effect's force at all samples, (N, 6); memory advances from one to the next."""
     if type(effect).advance is DriveForce.advance:
         return effect.force(moment)
-    q, y, loads = moment.position, moment.velocity, moment.guide_load
+    q, y, carried = moment.position, moment.velocity, (moment.guide_load, moment.transmitted)
     time = np.broadcast_to(moment.time, q.shape)
     force = np.empty_like(q)
     steps = np.diff(time, axis=0).max(axis=1)
     # What is late shows the beginning first, where the robot stands, for as long as it is late.
     steps = np.where(steps > 0, steps, steps.max())
     for k in range(len(q)):
-        force[k] = effect.force(DriveMoment(time[k], q[k], y[k], loads[k]))
+        carries = [one[k] for one in carried]
+        force[k] = effect.force(DriveMoment(time[k], q[k], y[k], *carries))
         if k < len(steps):
             # Displacement, and not velocity, is what friction remembers.
             middle = (q[k + 1] - q[k]) / steps[k]
-            effect.advance(DriveMoment(time[k], q[k], middle, loads[k]), float(steps[k]))
+            effect.advance(DriveMoment(time[k], q[k], middle, *carries), float(steps[k]))
     return force

@@ -4,6 +4,7 @@
 """How often `diagnose` is right about physics hidden in recordings of a simulated arm.
 
     python -m benchmarks.scores.arms --model base.yaml --seeds 2 --nothing 10 --table arm_score.md
+    python -m benchmarks.scores.arms --model base.yaml --pairs --seeds 20 --nothing 0
 
 By the commands alone: `pprs simulate --model … --effect …`, then `pprs diagnose` of one recording.
 Outcomes are appended to FILE as they come, and what is there is not run again. Each seed has a
@@ -38,8 +39,24 @@ from pprs_dynamics import MechanismModel
 from pprs_dynamics.app.commands.pprs import main as pprs
 from pprs_dynamics.physics.effects.laws.coupled_drives import CoupledDrives
 from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
+from pprs_dynamics.physics.effects.laws.link_mass import LinkMass
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.simulation.arm_forms import NAMES
+from pprs_dynamics.simulation.arm_run import links_that_weigh
+
+# Effects of real machines, and what each was taken for before it was in the catalogue.
+PAIRS = {
+    'gear_efficiency': ('load_friction', 'payload_mass'),
+    'lost_motion': ('time_delay', 'hysteresis', 'external_wrench'),
+    'stribeck_friction': ('coulomb_friction',),
+    'friction_temperature': ('friction_drift',),
+    'effort_filter': ('time_delay', 'hysteresis'),
+    'elastic_joint': ('eccentric_encoder', 'counterbalance'),
+    'eccentric_encoder': ('force_ripple',),
+    'counterbalance': ('drive_spring', 'payload_mass'),
+    'coupled_drives': ('link_mass', 'payload_mass'),
+    'current_gain': ('effort_gain', 'force_ripple'),
+    'stop_contact': ('drive_spring', 'force_ripple')}
 
 
 def run_case(case: tuple[str, int], model: Path, duration: float, beside: Sequence[str] = (),
@@ -123,6 +140,27 @@ def by_effect(told: Sequence[tuple[Outcome, dict[str, bool]]]) -> list[str]:
     return lines
 
 
+def by_pair(found: Sequence[Outcome]) -> str:
+    """Return a table in Markdown of each pair: which was told right, and which as the other.
+
+    Right is first or in the named set; as the other, where the other is named and it is not.
+    """
+    told = [(one, judge(one)) for one in found if 'failed' not in one]
+
+    def counted(name: str, other: str) -> str:
+        own = [(one, judged) for one, judged in told if one['effect'] == name]
+        right = sum(judged['first_or_set'] for _, judged in own)
+        taken = sum(other in [each['name'] for each in one['effects']]
+                    and not judged['first_or_set'] for one, judged in own)
+        return f'{right} of {len(own)} | {taken}'
+
+    lines = ['| hidden | right | as the other | the other | right | as the first |',
+             '|---|---|---|---|---|---|']
+    lines += [f'| `{name}` | {counted(name, other)} | `{other}` | {counted(other, name)} |'
+              for name, others in PAIRS.items() for other in others]
+    return '\n'.join(lines) + '\n'
+
+
 def table(found: Sequence[Outcome]) -> str:
     """Return the table in Markdown, then each effect that was not found, or not alone."""
     told = [(one, judge(one)) for one in found if 'failed' not in one]
@@ -153,28 +191,29 @@ def table(found: Sequence[Outcome]) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def todo(model: Path, seeds: int, nothing: int, sets: int, only: Sequence[str] = (),
+def todo(model: Path, seeds: range, nothing: range, sets: range, only: Sequence[str] = (),
          ) -> Iterator[tuple[str, int]]:
     """Yield effects that a robot can have and seeds, every effect once before any twice."""
-    robot = MechanismModel.load(model).robot
-    structure = robot.structure
+    loaded = MechanismModel.load(model)
+    robot, structure = loaded.robot, loaded.robot.structure
     has_passive = any(row >= 0 and name not in structure.drives
                       for name, (row, _) in friction_rows(structure).items())
     names = [name for name in NAMES if (has_passive or name != JointFrictionEffect.name)
              and (robot.motors or name != CoupledDrives.name)
+             and (links_that_weigh(loaded) or name != LinkMass.name)
              and (not only or name in only)]
-    for seed in range(max(seeds, nothing)):
-        if seed < seeds:
+    for seed in max(seeds, nothing, key=len):
+        if seed in seeds:
             yield from ((name, seed) for name in names)
-        if seed < nothing:
+        if seed in nothing:
             yield '', seed
-    for seed in range(sets):
+    for seed in sets:
         rng = np.random.default_rng((seed, zlib.crc32(b'sets')))
         for size in (2, 3):
             yield '+'.join(rng.choice(sorted(names), size, replace=False)), seed
 
 
-def run(model: Path, seeds: int, nothing: int, sets: int, duration: float, file: Path,
+def run(model: Path, seeds: range, nothing: range, sets: range, duration: float, file: Path,
         each: Each, only: Sequence[str] = (), beside: Sequence[str] = ()) -> None:
     """Run the cases that are not in a file of outcomes yet; append and print theirs."""
     run_missing(each, partial(run_case, model=model.resolve(), duration=duration,
@@ -188,22 +227,31 @@ def main() -> int:
     parser = scoring_parser(__doc__, 'arm_score.jsonl')
     parser.add_argument('--model', type=Path, required=True, help='model file of an arm')
     parser.add_argument('--seeds', type=int, default=2, help='per effect (default 2)')
+    parser.add_argument('--first', type=int, default=0, help='first seed (default 0)')
     parser.add_argument('--nothing', type=int, default=10, help='recordings without (default 10)')
     parser.add_argument('--sets', type=int, default=0, metavar='N',
                         help='pairs, and triples, of effects drawn at random (default 0)')
     parser.add_argument('--only', metavar='NAME', nargs='+', default=(), choices=NAMES,
                         help='effects that are hidden (default: all): a new one beside what it '
                         'might be taken for')
+    parser.add_argument('--pairs', action='store_true', help='effects of real machines and what '
+                        'each was taken for, thermometers and links recorded whatever is hidden')
     for name, what in (('--thermometers', 'temperatures'), ('--link-encoders', 'links')):
         parser.add_argument(name, action='append_const', dest='beside', const=name, default=[],
                             help=f'record {what} whatever is hidden')
     parser.add_argument('--duration', type=float, default=40.0, help='[s] (default 40)')
     parser.add_argument('--table', type=Path, help='write the table of all outcomes in FILE')
     options = parser.parse_args()
+    if options.pairs:
+        options.only = sorted({*PAIRS, *(name for others in PAIRS.values() for name in others)})
+        options.beside = ['--thermometers', '--link-encoders']
+    seeds, nothing, sets = (range(options.first, options.first + count) for count in (
+        options.seeds, options.nothing, options.sets))
     with engine(options) as each:
-        run(options.model, options.seeds, options.nothing, options.sets,
-            options.duration, options.file, each, options.only, options.beside)
-    text = table(read_outcomes(options.file))
+        run(options.model, seeds, nothing, sets, options.duration, options.file, each,
+            options.only, options.beside)
+    found = read_outcomes(options.file)
+    text = table(found) + ('\n' + by_pair(found) if options.pairs else '')
     if options.table:
         options.table.write_text(text)
     else:

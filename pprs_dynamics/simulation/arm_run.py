@@ -412,9 +412,7 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
     if 'payload_mass' in chosen:
         hidden.append(engine.hide_payload(random, scale, 0.05))
     if 'link_mass' in chosen:
-        # What turns about an upright axis shows in no weight, and the last link is the payload's.
-        links = [j for j in range(len(model.robot.bodies)) if j != model.robot.carrier
-                 and (j or model.robot.structure.loops)]
+        links = links_that_weigh(model)
         if not links:
             raise HiddenEffectError('link_mass needs a link between the first and that of the tool')
         hidden.append(engine.hide_link_mass(random, scale, links))
@@ -670,6 +668,15 @@ def _own_friction(model: MechanismModel, engine: ArmEngine, motion: JointMotion)
             friction = friction + engine.joint_friction(
                 motion, effect.table(model.robot, model.reversal))
     return friction
+
+
+def links_that_weigh(model: MechanismModel) -> list[int]:
+    """Return the links whose mass can be hidden.
+
+    What turns about an upright axis shows in no weight, and the last link is the payload's.
+    """
+    return [j for j in range(len(model.robot.bodies)) if j != model.robot.carrier
+            and (j or model.robot.structure.loops)]
 
 
 def able_joints(name: str, model: MechanismModel, motion: JointMotion) -> list[int]:

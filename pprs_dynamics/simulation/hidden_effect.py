@@ -79,16 +79,21 @@ class Range:
 
 @dataclass(slots=True)
 class DriveMoment:
-    """State of the drives at one moment, in SI units; arrays (6,), or at many moments (N, 6)."""
+    """State of the drives at one moment, in SI units; arrays (6,), or at many moments (N, 6).
+
+    `transmitted` is what their screws pass on, without friction.
+    """
 
     time: float | Array
     position: Array
     velocity: Array
     guide_load: Array
+    transmitted: Array
 
     def at(self, velocity: Array) -> DriveMoment:
         """Return the state with other velocities."""
-        return DriveMoment(self.time, self.position, velocity, self.guide_load)
+        return DriveMoment(self.time, self.position, velocity, self.guide_load,
+                           self.transmitted)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ IN_CATALOGUE: dict[str, type[HiddenEffect]] = {effect.name: effect for effect in
     hidden_forces.viscous_friction, hidden_forces.coulomb_friction,
     hidden_forces.asymmetric_friction, hidden_forces.stribeck_friction,
     hidden_forces.quadratic_friction, hidden_forces.load_friction,
+    hidden_forces.gear_efficiency,
     hidden_forces.Hysteresis, hidden_forces.FrictionDrift, hidden_forces.FrictionTemperature,
     hidden_forces.effort_offset, sensors.EffortGain, sensors.HomingError,
     sensors.LostMotion,

@@ -30,6 +30,8 @@ from pprs_dynamics.simulation.temperatures import (
 
 PHASE = Range('rad', -np.pi, np.pi)
 PULLEY = 3.0  # [m], from the middle of the workspace
+USUAL_LOAD = 5.0  # [N], of screws
+TURNING = 0.005  # [W], within which a screw is driven and drives
 USUAL_SPEED = 0.08  # [m/s], at which drives get as warm as their climate says
 WIDTH = Range('m/s', 0.0005, 0.002, 'log', neutral=1.0)
 
@@ -84,6 +86,18 @@ def load_friction(m: DriveMoment, coefficient: Array, width: Array) -> Array:
     """A guide rougher than the model's, less so under load (Hertzian contact)."""
     load = np.cbrt(m.guide_load * m.guide_load * 10.0)
     return coefficient * load * algebraic_sign(m.velocity, width)
+
+
+@SteepDriveForce.by_law('share (|tau| / 5 N)^0.9 5 N v / sqrt(v^2 + w^2), driven_back in its place '
+                        'by (1 - tau v / sqrt((tau v)^2 + P^2)) / 2',
+                        driving=Range('1', 0.08, 0.25, 'log', scales=True),
+                        driven_back=Range('1', 0.0, 0.08, scales=True), width=WIDTH)
+def gear_efficiency(m: DriveMoment, driving: Array, driven_back: Array, width: Array) -> Array:
+    """A dry screw: friction by what it passes on, more while the motor drives the load."""
+    power = m.transmitted * m.velocity
+    share = driven_back + (driving - driven_back) * (1 + power / np.hypot(power, TURNING)) / 2
+    passed = np.abs(m.transmitted) ** 0.9 * USUAL_LOAD ** 0.1
+    return share * passed * algebraic_sign(m.velocity, width)
 
 
 class Hysteresis(DriveForce):

@@ -254,7 +254,8 @@ class Plant:
         passive = self._structure(self.time + h / 2)
         drive = (effort - equations.drive_bias + passive.dot(equations.T_d)
                  + self._stops(position, predicted))
-        moment = DriveMoment(self.time + h / 2, position, y, self._loads[:6])
+        moment = DriveMoment(self.time + h / 2, position, y, self._loads[:6],
+                             effort - drive + equations.mass.dot(guess))
         y_dot = self.resistance.solve(equations, drive, moment, self._loads, guess, h / 2)
         acceleration = equations.T.dot(y_dot) + equations.g
         middle = moment.at(y + h / 2 * y_dot)
@@ -293,16 +294,19 @@ class Plant:
         drive = (effort - equations.drive_bias + passive.dot(equations.T_d)
                  + self._stops(position, y))
         kept = self._loads
+        passed = effort - drive + equations.mass.dot(self._acceleration.take(DRIVE_DOFS))
         # Friction follows the loads, and these the acceleration: a fixed point, each round of
-        # which leaves about a twentieth (mu) of the error.
+        # which leaves about a twentieth (mu) of the error, or what a gear loses.
         for _ in range(LOAD_ROUNDS):
             before = self._loads
-            moment = DriveMoment(self.time, position, y, before[:6])
+            moment = DriveMoment(self.time, position, y, before[:6], passed)
             force = self.resistance.in_drives(equations, moment, before)
             _, y_dot, _ = dposv(equations.mass, drive - force)
             a = equations.T.dot(y_dot) + equations.g
             self._loads = self._joint_loads(equations, a, y, passive)
-            if np.abs(self._loads - before).max() < LOAD_TOLERANCE:
+            passed = effort - drive + equations.mass.dot(y_dot)
+            if max(np.abs(self._loads - before).max(),
+                   np.abs(passed - moment.transmitted).max()) < LOAD_TOLERANCE:
                 break
         v, rotation = equations.T.dot(y), chains.rotation
         truth = Truth(

@@ -93,7 +93,7 @@ def test_a_form_that_is_off_is_off_by_5_to_15_percent(name: str) -> None:
     assert off.parameters == plain.parameters
     sweep = np.linspace(-1, 1, 4001)[:, None] * np.ones(6)
     moment = DriveMoment(np.linspace(0, 10, 4001)[:, None], 0.3 * sweep, 0.4 * sweep[::-1] ** 3,
-                         np.full((4001, 6), 50.0))
+                         np.full((4001, 6), 50.0), np.full((4001, 6), 5.0))
     there = np.abs(plain.force(moment)) > 1e-9
     share = off.force(moment)[there] / plain.force(moment)[there] - 1
     assert 0.04 < share.std() < 0.2

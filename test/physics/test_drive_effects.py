@@ -154,6 +154,20 @@ def test_friction_has_fallen_to_its_eth_part_a_drift_time_after_the_start():
     assert_allclose(share[2000], math.exp(-1), rtol=1e-9)  # 2000 samples of 2 ms
 
 
+def test_work_warms_a_drive_and_a_rest_cools_it() -> None:
+    """10 s at 0.2 m/s, a rest of 10 s, back at 0.1 m/s, with heat that flows off in 5 s."""
+    time = np.arange(0.0, 25.0, 0.002)
+    v = np.where(time < 10, 0.2, np.where(time < 20, 0.0, -0.1))[:, None]
+    axes = Axes(time, np.cumsum(v, axis=0) * 0.002, v, np.zeros_like(v), np.zeros_like(v))
+    at = np.searchsorted(time, [4.997, 9.997, 19.997, 24.997])
+    worked, thinned = (FrictionDrift({'axis': {name: -3.0, 'time': 5.0}}).force(axes)[at, 0]
+                       for name in ('worked', 'thinned'))
+    warm = 0.2 * (1 - math.exp(-2))
+    again = warm * math.exp(-3) + 0.1 * (1 - math.exp(-1))
+    assert_allclose(worked, [-3 * 0.2 * (1 - math.exp(-1)), -3 * warm, 0, 3 * again], atol=1e-3)
+    assert_allclose(thinned, worked * [0.2, 0.2, 0, 0.1], atol=1e-3)
+
+
 def test_drift_without_times_is_friction_at_the_start():
     axes = excitation()
     axes.time = None
@@ -214,9 +228,13 @@ def test_presliding_friction_dissipates_over_every_closed_cycle():
 def test_friction_takes_power_from_the_motion_and_below_its_limit_gives_it(effect):
     axes = excitation()
     rng = np.random.default_rng(62)
+    # What comes with work, or goes, is a share of the drive's other friction.
+    limited = effect.linear[:1] if effect is FrictionDrift else effect.linear
     for variant in effect.variants:
         values = {c.name: c.scale * rng.uniform(0.3, 3) if c.name in variant else 0.0
-                  for c in effect.linear}
+                  for c in limited}
+        if not any(values.values()):
+            continue
         shape = {p.name: p.scale for p in effect.shape}
         assert set(values) == set(effect.unphysical_below)
         for name, limit in effect.unphysical_below.items():

@@ -39,7 +39,7 @@ MEMORY = ('hysteresis', 'friction_drift', 'friction_temperature')
 SENSORS = ('effort_filter', 'effort_gain', 'homing_error', 'lost_motion', 'time_delay')
 GROUPS = {
     'friction': ('viscous_friction', 'coulomb_friction', 'asymmetric_friction',
-                 'stribeck_friction', 'quadratic_friction', 'load_friction'),
+                 'stribeck_friction', 'quadratic_friction', 'load_friction', 'gear_efficiency'),
     'forces': ('effort_offset', 'drive_spring', 'stop_contact', 'force_ripple', 'local_bump',
                'vibration', 'drive_coupling'),
     'joints and platform': ('joint_friction', 'joint_spring', 'external_wrench', 'tool_drag'),

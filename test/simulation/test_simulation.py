@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import pprs_dynamics
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MissingLibraryError, MotionError
 from pprs_dynamics.physics.model.model_file import build_model
@@ -34,7 +34,7 @@ from pprs_dynamics.simulation.hidden_effects import (
     NOT_IN_CATALOGUE,
     draw_effect,
 )
-from pprs_dynamics.simulation.plant import Plant, PlantSettings
+from pprs_dynamics.simulation.plant import Plant, PlantSettings, Truth
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 from pprs_dynamics.simulation.virtual_robot import (
     DriveReference,
@@ -290,7 +290,8 @@ def drawn(name: str, seed: int = 5) -> object:
 def test_every_effect_of_the_interface_is_there() -> None:
     assert ' '.join(IN_CATALOGUE) == (
         'viscous_friction coulomb_friction asymmetric_friction stribeck_friction '
-        'quadratic_friction load_friction hysteresis friction_drift friction_temperature '
+        'quadratic_friction load_friction gear_efficiency hysteresis friction_drift '
+        'friction_temperature '
         'effort_offset effort_gain '
         'homing_error lost_motion drive_spring stop_contact force_ripple drive_inertia '
         'time_delay effort_filter joint_friction joint_spring payload_mass payload_offset '
@@ -312,6 +313,17 @@ def test_a_hidden_effect_changes_the_efforts_of_its_drives_alone(name: str) -> N
     assert np.all(error[~has] < AGREEMENT)
 
 
+def gear_loss(t: Truth) -> np.ndarray:
+    """Return the loss of screws that pass on what the bodies need."""
+    passed = MODEL.drive_forces(PlatformMotion(
+        t.platform_position, t.orientation, t.linear_velocity, t.angular_velocity,
+        t.linear_acceleration, t.angular_acceleration)).parts['rigid_body']
+    power = passed * t.velocity
+    driving = 0.5 + 0.5 * power / np.hypot(power, 0.005)
+    return (0.05 + 0.15 * driving) * 5.0 * (np.abs(passed) / 5.0) ** 0.9 * (
+        t.velocity / np.hypot(t.velocity, 0.002))
+
+
 CLOSED_FORMS = {
     'viscous_friction': ({'coefficient': 5.0, 'thinning_velocity': 0.3},
                          lambda t: 1.5 * np.arcsinh(t.velocity / 0.3)),
@@ -327,6 +339,7 @@ CLOSED_FORMS = {
     'load_friction': ({'coefficient': 0.03, 'width': 0.002},
                       lambda t: 0.03 * t.guide_load ** (2 / 3) * 10 ** (1 / 3)
                       * t.velocity / np.hypot(t.velocity, 0.002)),
+    'gear_efficiency': ({'driving': 0.2, 'driven_back': 0.05, 'width': 0.002}, gear_loss),
     'effort_offset': ({'force': -0.6}, lambda t: np.full_like(t.velocity, -0.6)),
     'drive_spring': ({'stiffness': 20.0, 'rest': 0.01, 'hardening': 0.2},
                      lambda t: 20.0 * (t.position - 0.01)

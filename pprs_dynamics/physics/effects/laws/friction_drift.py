@@ -1,7 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Dry friction that fades as the drive warms up: F exp(-t / tau) sgn(q_dot), t from the start."""
+"""Friction that changes as the drive works: by the clock, or by the heat of its own work.
+
+By the clock F exp(-t / tau) sgn(q_dot), t from the start. By its work (F_w w + c_w |q_dot| w)
+sgn(q_dot), tau w_dot = |q_dot| - w: friction makes heat in proportion to the speed, which flows
+off in tau. Where work is even both are one but for a constant.
+"""
 
 from __future__ import annotations
 
@@ -22,13 +27,22 @@ class FrictionDrift(DriveEffect):
     assumed_at_start: ClassVar[str] = 'the drive is cold, the time of fading begins'
     is_friction: ClassVar[bool] = True
     linear = (Parameter('force', 'F', 'N', 'friction at the start beyond the later one', -1e6, 1e6,
-                        scale=0.5),)
-    shape = (Parameter('time', 'tau', 's', 'time in which it fades', 1e-3, 1e7, scale=10.0),)
+                        0.0, scale=0.5),
+              Parameter('worked', 'F_w', 'N s/m', 'dry friction that comes with work, per mean '
+                        'speed of the last tau; less than 0 where the drive runs itself loose',
+                        -1e6, 1e6, 0.0, scale=5.0),
+              Parameter('thinned', 'c_w', 'N s^2/m^2', 'viscous friction that comes with work, '
+                        'the same', -1e6, 1e6, 0.0, scale=50.0))
+    shape = (Parameter('time', 'tau', 's', 'time in which it fades, and heat flows off', 1e-3, 1e7,
+                       scale=10.0),)
+    variants = (('force',), ('worked',), ('thinned',), ('force', 'worked', 'thinned'))
     unphysical_below: ClassVar[Mapping[str, float]] = {'force': 0.0}
     card = Card(
-        'F exp(-t / tau) sgn(q_dot), t since the start',
+        '(F exp(-t / tau) + F_w w) sgn(q_dot) + c_w w q_dot, t since the start, '
+        'tau w_dot = |q_dot| - w',
         'the step at each reversal shrinks from the beginning of a recording to its end (or '
-        'grows, where F is negative), whatever the motion',
+        'grows, where F is negative), whatever the motion; by work it shrinks, or the slope over '
+        'velocity, while the drive is fast, and comes back while it is slow',
         'grease that warms by the friction itself or after a cold start, seals that settle, a '
         'preload that changes as screw or guide expand',
         "repeat the same motion for an hour from cold, and after a night's rest: the friction "
@@ -39,13 +53,19 @@ class FrictionDrift(DriveEffect):
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
-        """Return (exp(-t / tau) sgn q_dot,); t is 0 where time is unknown."""
+        """Return (exp(-t / tau) sgn q_dot, w sgn q_dot, w q_dot).
+
+        t and w are 0 where time is unknown.
+        """
         if drive.time is None:
-            return (drive.direction,)
+            none = np.zeros_like(drive.velocity)
+            return (drive.direction, none, none)
         memory = cls.drive_memory() if drive.memory is None else drive.memory
         if memory['start'] is None:
             memory['start'] = float(drive.time[0])
-        return (np.exp(-(drive.time - memory['start']) / shape['time']) * drive.direction,)
+        faded = np.exp(-(drive.time - memory['start']) / shape['time'])
+        work = _worked(drive.time, np.abs(drive.velocity), shape['time'], memory)
+        return (faded * drive.direction, work * drive.direction, work * drive.velocity)
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
@@ -55,10 +75,26 @@ class FrictionDrift(DriveEffect):
 
     @classmethod
     def drive_memory(cls) -> Any:
-        """Return the time of the start, None before it is known."""
-        return {'start': None}
+        """Return the time of the start, None before it is known, and of no work since."""
+        return {'start': None, 'last': None, 'work': 0.0}
 
     @classmethod
     def begin(cls, memory: Any, time: float) -> None:
         """Start the clock."""
         memory['start'] = time
+
+
+def _worked(time: Array, speed: Array, tau: float, memory: Any) -> Array:
+    """Return w of tau w_dot = speed - w, (N,), and remember where it ends.
+
+    Speeds are those of the intervals that end at the samples.
+    """
+    last = memory['start'] if memory['last'] is None else memory['last']
+    elapsed = np.diff(time, prepend=min(last, time[0])) / tau
+    kept, gained = np.exp(-elapsed), -np.expm1(-elapsed) * speed
+    work, found = memory['work'], []
+    for keep, gain in zip(kept.tolist(), gained.tolist(), strict=True):
+        work = keep * work + gain
+        found.append(work)
+    memory['last'], memory['work'] = float(time[-1]), work
+    return np.array(found)
