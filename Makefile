@@ -29,7 +29,7 @@ help:
 	@echo 'make reliability   fuzz, soak, parameter storms and restarts of the node (15 minutes)'
 	@echo 'make reliability-full   the same at full size (an hour or two)'
 	@echo 'make naming     the naming benchmark: this package and its peers (an hour; NAMING=small: minutes)'
-	@echo 'make reference  how small a change since a reference run is told, on one path and on another (minutes)'
+	@echo 'make reference  how small a change since a reference run is told, on arms and robots with loops (an hour)'
 	@echo 'make experiments   how often a designed experiment settles what was ambiguous (long; it can be stopped)'
 	@echo 'make decisions  the score with each chosen number of the diagnosis halved and doubled (an hour)'
 	@echo 'make mutants    mistakes put into the modules that decide: which of them the tests see (two hours)'
@@ -88,6 +88,8 @@ adoption: $(VENV)/.test
 reference: $(VENV)/.test
 	$(BIN)/python -m benchmarks.scores.reference
 	$(BIN)/python -m benchmarks.scores.reference --path 1
+	$(BIN)/python -m benchmarks.scores.reference_robots --model config/hexapod.yaml --effects 30 --both 10
+	$(BIN)/python -m benchmarks.scores.reference_robots --model config/delta.yaml --effects 30 --both 10
 
 benchmark: $(VENV)/.test
 	$(BIN)/python -m benchmarks.speed.model

@@ -489,7 +489,7 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
             model.drives[joint]: {'zero': float(shift[joint])}}, 'positions shifted'))
     sigma = np.full(len(largest), noise) if noise is not None else 0.005 * largest
     beside = lead + shift
-    measured = efforts + _noise(random, efforts.shape) * sigma
+    measured = efforts + noise_like(random, efforts.shape) * sigma
     channels = {}
     if thermometers or {*chosen} & {'friction_temperature', 'current_gain'}:
         channels['temperature'] = read_thermometers(motion.time, temperature)
@@ -714,7 +714,7 @@ def _add(name: str, model: MechanismModel, motion: JointMotion, load: Array, lar
     return truth(name, [drives[j] for j in chosen], parameters, form.form)
 
 
-def _noise(random: np.random.Generator, shape: tuple[int, ...]) -> Array:
+def noise_like(random: np.random.Generator, shape: tuple[int, ...]) -> Array:
     """Return noise of unit variance, part of it correlated from sample to sample."""
     from scipy.signal import lfilter
 

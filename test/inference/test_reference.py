@@ -92,6 +92,35 @@ def test_a_change_of_friction_is_told_alone(machine: tuple[MechanismModel, Refer
     assert abs(value.value - 0.4) < 2 * value.std < 0.2
 
 
+def finer(moved: JointMotion) -> Array:
+    """Return ripple, and what friction that builds up by three springs lacks after reversals."""
+    q = moved.position
+    ripple = 0.5 * np.sin(120 * q + [0.3, 1.0, 2.0]) + 0.1 * np.sin(240 * q)
+    lost = np.zeros_like(q)
+    for share in (0.004, 0.012, 0.02):
+        stretched = np.zeros(3)
+        for k, step in enumerate(np.diff(q, axis=0, prepend=q[:1])):
+            stretched = np.clip(stretched + step / share, -1.0, 1.0)
+            lost[k] += stretched / 3
+    return ripple + 0.8 * (lost - np.tanh(moved.velocity / 0.01))
+
+
+@pytest.mark.parametrize('change', [0.0, 0.4])
+def test_ripple_and_reversals_of_the_reference_are_no_change(
+        machine: tuple[MechanismModel, Reference], change: float) -> None:
+    # Of both the noise of a single run hides a part from sample to sample: forms tell it.
+    model, _ = machine
+    moved = arm.motion(20.0, seed=0)
+
+    def worn(noise: int, change: float = 0.0) -> Recording:
+        plain = run(model, 0, noise, change)
+        return Recording.from_arrays(plain.name, plain.time, plain.position, plain.velocity,
+                                     plain.effort + finer(moved), plain.drives)
+
+    found = pprs.diagnose(model, worn(6, change), reference=worn(7))
+    assert [one.name for one in found.effects] == (['coulomb_friction'] if change else [])
+
+
 @pytest.mark.parametrize(('path', 'day'), [(0, 0.0), (0, 0.05), (5, 0.0), (5, 0.05)])
 def test_what_is_carried_over_is_as_uncertain_as_it_is_wrong(
         machine: tuple[MechanismModel, Reference], path: int, day: float) -> None:

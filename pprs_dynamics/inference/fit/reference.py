@@ -11,10 +11,11 @@ r"""What a reference run says of another recording: its forces known in part, an
 y are the errors of the model, theta the numbers of its base, and delta what no number of it
 explains but repeats: in each drive the sum of two Gaussian processes, one over the states of all
 drives, s = (q / l_q, tanh(v / v_0) / l_v), and one over its own, which other paths meet again, of
-standard deviations sigma of the drive's own. delta' is drawn anew for every run. Given y_r,
-X_l theta + delta(s_l) is Gaussian: its mean is carried over, and the principal directions of its
-covariance are columns of unit prior. Near the states of the reference the errors of the base
-cancel; far from them what is known is what the prior says.
+standard deviations sigma of the drive's own; and of waves over its own position, finer than any
+length, as gears and motors have them. delta' is drawn anew for every run. Given y_r, X_l theta +
+delta(s_l) is Gaussian: its mean is carried over, and the principal directions of its covariance
+are columns of unit prior. Near the states of the reference the errors of the base cancel; far from
+them what is known is what the prior says.
 
 The process is a finite sum, Phi(s) w, over states of the reference that a pivoted Cholesky factor
 of the kernel chooses. States of the recording that they do not reach get features of their own,
@@ -72,6 +73,10 @@ SLOW = 0.3  # of the rms speed of a drive: within it direction turns over
 LENGTHS = tuple((position, speed) for position in (0.5, 1.5) for speed in (0.7, 2.0))
 # The same of what is of one drive's own state.
 OWN_LENGTHS = tuple((position, speed) for position in (0.3, 1.0, 3.0) for speed in (0.5, 1.5))
+# Waves of a drive: at most; from and to how many over the whole stroke; and how often the variance
+# of what is left sine and cosine explain: by chance one in 25 000 that are tried does.
+MOST_WAVES, LONGEST_WAVE, FINEST_WAVE, LEAST_WAVE = 6, 10.0, 400.0, 20.0
+WAVE_STEP, FINE_STEP = 0.5, 0.02  # of a wave over the stroke, between those that are tried
 FIRST_SIZE = 0.4  # of a process, over the error: from which its size is fitted
 LEAST_SIZE = 1e-9  # [N, N m], of a process that does nothing
 ROUNDS = 3  # of the size of the process
@@ -187,6 +192,9 @@ class Process:
     chosen: Array
     root: Array
 
+    def __len__(self) -> int:
+        return len(self.chosen)
+
     @classmethod
     def of(cls, residuals: Residuals, states: States, drive: int | None = None,
            ) -> tuple[Process, Array]:
@@ -205,6 +213,62 @@ class Process:
 
 
 @dataclass(frozen=True)
+class Waves:
+    """Waves of a drive's force over its own position and their first overtones, of unit size.
+
+    Parameters
+    ----------
+    drive : int
+    numbers : (K,) array
+        Radians of a wave for each unit of the position [1, rad/m].
+    """
+
+    drive: int
+    numbers: Array
+
+    def __len__(self) -> int:
+        return 4 * len(self.numbers)
+
+    @classmethod
+    def of(cls, residuals: Residuals, drive: int, left: Array) -> Waves:
+        """Return those that what is left of a drive's error, (M,), shows.
+
+        The strongest first, each beside those before it.
+        """
+        q, known = _motion(residuals)[0][:, drive], np.isfinite(left)
+        found, stroke = cls(drive, np.empty(0)), float(np.ptp(q))
+        finest = max(float(np.median(np.abs(np.diff(q)))), stroke / FINEST_WAVE)
+        if not stroke or not np.any(left[known]):
+            return found
+        tried = 2 * np.pi / stroke * np.arange(LONGEST_WAVE, stroke / finest, WAVE_STEP)
+        turns = np.exp(1j * np.outer(tried, q[known]))
+        left = rest = left[known]
+        while len(found.numbers) < MOST_WAVES:
+            power = 2 * np.abs(turns @ rest) ** 2 / (rest @ rest)
+            if power.max(initial=0.0) < LEAST_WAVE:
+                break
+            near = tried[int(np.argmax(power))] + 2 * np.pi / stroke * np.arange(
+                -WAVE_STEP, WAVE_STEP, FINE_STEP)
+            at = near[int(np.argmax(np.abs(np.exp(1j * np.outer(near, q[known])) @ rest)))]
+            found = cls(drive, np.append(found.numbers, at))
+            features = found.features(residuals)[0][known]
+            rest = left - features @ np.linalg.lstsq(features, left)[0]
+        return found
+
+    def features(self, residuals: Residuals) -> tuple[Array, Array]:
+        """Return features of a recording, (M, 4 K), and none of new states.
+
+        Means over a sample, in which the wave turns on.
+        """
+        q, v = (one[:, self.drive, None] for one in _motion(residuals))
+        numbers = np.concatenate((self.numbers, 2 * self.numbers))
+        mean = np.sinc(numbers * v * residuals.period / (2 * np.pi))
+        phase = numbers * q
+        found = np.concatenate((mean * np.sin(phase), mean * np.cos(phase)), axis=1)
+        return found, np.zeros((len(found), 0))
+
+
+@dataclass(frozen=True)
 class Reference:
     """A reference run, fitted: the numbers of the base and the process, given its errors.
 
@@ -212,16 +276,16 @@ class Reference:
     ----------
     model : ForceModel
     recordings : tuple of Recording
-    processes : tuple of Process
-        That over all drives, then those of each.
-    size : (D, 2) array
-        Standard deviations of a drive's two [N].
+    processes : tuple of Process or Waves
+        That over all drives, then those over the state of each, waves of each.
+    size : (D, 3) array
+        Standard deviations of a drive's three [N].
     repeats : (D,) array
         Correlation of the process in two runs.
     base : (14 n, P) array
         Directions of unit variance of the base's numbers, those that the reference tells first.
     coefficients, root : (Q,) and (Q, Q) arrays
-        Of told directions, then of both processes of every drive; of their covariance.
+        Of told directions, then of the processes of every drive; of their covariance.
     regression, fit : Regression, JointFit
     names : tuple of str
         Of the recordings, as they were given.
@@ -230,7 +294,7 @@ class Reference:
 
     model: ForceModel
     recordings: tuple[Recording, ...]
-    processes: tuple[Process, ...]
+    processes: tuple[Process | Waves, ...]
     size: Array
     repeats: Array
     base: Array
@@ -294,34 +358,29 @@ class Reference:
                 f'{names}: too short for a reference, {len(residuals)} samples after treatment, '
                 f'must be at least {LEAST_LENGTH}: record a longer run')
         columns, base, told = _base(model, numbers, residuals, kept)
-        plain, drives = States.of(residuals), range(len(residuals.drives))
+        drives = range(len(residuals.drives))
         measured = Regression(residuals).drives
-        own = [min(
-            (Process.of(residuals, replace(plain, lengths=lengths), d) for lengths in OWN_LENGTHS),
-            key=lambda one, d=d: 0.0 if d not in measured else _sized(  # type: ignore[misc]
-                residuals, columns, d, [one[1]])[1].deviance) for d in drives]
-        shared, fits = min(
-            ((one, {d: _sized(residuals, columns, d, (one[1], own[d][1])) for d in measured})
-             for one in (Process.of(residuals, replace(plain, lengths=lengths))
-                         for lengths in LENGTHS)),
-            key=lambda one: sum(fit.deviance for _, fit in one[1].values()))
-        size = np.stack([fits[d][0] if d in fits else np.full(2, LEAST_SIZE) for d in drives])
+        processes = _processes(residuals, columns, measured)
+        shown = [one.features(residuals)[0] for one in processes]
+        features = [(shown[0], *shown[1 + d::len(drives)]) for d in drives]
+        fits = {d: _sized(residuals, columns, d, features[d]) for d in measured}
+        nothing = np.full(len(features[0]), LEAST_SIZE)
+        size = np.stack([fits[d][0] if d in fits else nothing for d in drives])
         regression = Regression(residuals, (*_base_columns(columns), *(
-            column for d in drives
-            for column in _columns_of(d, (shared[1], own[d][1]), size[d]))))
+            column for d in drives for column in _columns_of(d, features[d], size[d]))))
         fit = regression.at((), np.stack([one.amplitudes[0] for _, one in fits.values()]))
         _require_same_robot(model, residuals, columns, fit, names)
         values, axes = np.linalg.eigh(fit.covariance)
         parts = _parts(residuals)
-        return cls(model, recordings, (shared[0], *(one for one, _ in own)), size,
+        return cls(model, recordings, processes, size,
                    _repeats(regression, fit, told, parts), base, fit.coefficients,
                    axes * np.sqrt(np.maximum(values, 0.0)), regression, fit, named)
 
     @property
     def told(self) -> int:
         """How many directions of the base's numbers it tells."""
-        shared, *own = (len(one.chosen) for one in self.processes)
-        return len(self.coefficients) - len(own) * shared - sum(own)
+        shared, *own = (len(one) for one in self.processes)
+        return len(self.coefficients) - len(self.size) * shared - sum(own)
 
     @property
     def directions(self) -> str:
@@ -379,10 +438,11 @@ class Reference:
                    @ self.base if self.base.size else np.zeros((samples, len(drives), 0)))
         mean, together, apart, at = np.zeros((samples, len(drives))), [], [], told
         for d in drives:
-            known = np.concatenate((shared[0], own[d][0]), axis=1)
+            of_drive = shared, *own[d::len(drives)]
+            known = np.concatenate([one[0] for one in of_drive], axis=1)
             new = np.concatenate([size * one[1] for size, one in zip(
-                self.size[d], (shared, own[d]), strict=True)], axis=1)
-            sizes = _sizes(self.size[d], (shared[0], own[d][0]))
+                self.size[d], of_drive, strict=True)], axis=1)
+            sizes = _sizes(self.size[d], [one[0] for one in of_drive])
             place, repeats = slice(at, at + len(sizes)), self.repeats[d]
             at = place.stop
             rows = repeats * known
@@ -439,7 +499,7 @@ class Reference:
         path is the same, so are they: what the fit leaves at the state of the reference that is
         nearest is then in the recording as well, by a share that is not known. 0 elsewhere.
         """
-        reference, states = self.regression.residuals, self.processes[0].states
+        reference, states = self.regression.residuals, States.of(self.regression.residuals)
         left = np.zeros_like(reference.measured)
         for d in self.regression.drives:
             series = self.regression.series[d]
@@ -597,6 +657,35 @@ def _parts(residuals: Residuals) -> Integers:
     if residuals.record[-1]:
         return residuals.record
     return np.minimum(np.arange(len(residuals)) * BLOCKS // len(residuals), BLOCKS - 1)
+
+
+def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
+               ) -> tuple[Process | Waves, ...]:
+    """Return the process over all drives, those of each, and waves.
+
+    Lengths are those of the largest evidence, of one drive after another beside the base alone,
+    then of the shared process beside these; waves those in what they leave.
+    """
+    plain, drives = States.of(residuals), range(len(residuals.drives))
+
+    own = [min(
+        (Process.of(residuals, replace(plain, lengths=lengths), d) for lengths in OWN_LENGTHS),
+        key=lambda one, d=d: 0.0 if d not in measured else _sized(  # type: ignore[misc]
+            residuals, columns, d, [one[1]])[1].deviance) for d in drives]
+    shared, fits = min(
+        ((one, {d: _sized(residuals, columns, d, (one[1], own[d][1])) for d in measured})
+         for one in (Process.of(residuals, replace(plain, lengths=lengths))
+                     for lengths in LENGTHS)),
+        key=lambda one: sum(fit.deviance for _, fit in one[1].values()))
+    waves = []
+    for d in drives:
+        left = residuals.error[:, d]
+        if d in fits:
+            explained = np.concatenate((columns[:, d], shared[1], own[d][1]), axis=1)
+            left = left - explained @ fits[d][1].coefficients
+            left = left - np.nanmean(left)
+        waves.append(Waves.of(residuals, d, left))
+    return (shared[0], *(one for one, _ in own), *waves)
 
 
 def _repeats(regression: Regression, fit: JointFit, told: int, parts: Integers,
