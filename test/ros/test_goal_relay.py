@@ -79,7 +79,7 @@ class Relayed:
             [sys.executable, str(SERVER), *arguments], self._domain, self._log))
         assert self._running.spin_until(lambda: self._servers() > before, 20)
         assert self._running.spin_until(self.node.relay.server_is_there, 20)
-        self._running.spin_for(0.5)  # discovery is one-sided
+        self._running.spin_for(1.0)  # discovery is one-sided, and slow on a busy machine
         return process
 
     def _servers(self) -> int:
