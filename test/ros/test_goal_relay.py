@@ -30,7 +30,7 @@ fibonacci = pytest.importorskip('test_msgs.action').Fibonacci
 pytestmark = pytest.mark.nodes
 
 SERVER = Path(__file__).parents[1] / 'support' / 'counting_controller.py'
-PATIENCE = 1.0  # [s]
+PATIENCE = 2.0  # [s]; a process that goes on after a stop takes up to one on a busy machine
 PER_SECOND = 20  # counts of the controller
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 
@@ -153,7 +153,7 @@ def test_a_controller_that_goes_in_the_middle_ends_the_goal(
         process.wait()
         relayed.controller()
     relayed.feedback.clear()
-    assert relayed.answer(relayed.goal(3), 5) == (SUCCEEDED, [3])
+    assert relayed.answer(relayed.goal(3), 5) == (SUCCEEDED, [3]), relayed.node.said
     assert relayed.feedback == [1, 2, 3]
 
 
@@ -167,8 +167,8 @@ def test_without_feedback_the_end_of_the_motion_is_waited_for(relayed: Relayed) 
     assert relayed.answer(relayed.goal(1000), PATIENCE + 3)[0] == ABORTED
     assert time.monotonic() - began > PATIENCE
     assert relayed.node.said[-1] == (
-        'the server of /controller/count has been silent for 1 s in the middle of a goal; what '
-        'the drives do now is not known')
+        f'the server of /controller/count has been silent for {PATIENCE:g} s in the middle of a '
+        'goal; what the drives do now is not known')
 
 
 def test_without_a_limit_of_silence_a_killed_controller_is_still_noticed(relayed: Relayed) -> None:
