@@ -172,8 +172,9 @@ class TrajectoryProxyNode(ExplainsRefusals):
             Where the controller, which says that the goal is reached, has followed something else.
         """
         passed = (self.get_clock().now().nanoseconds - sent_at) / conversions.NANOSECONDS
-        left = _duration(goal, sent_at) - passed * self._speed_scaling
-        if left > LEFT_AT_MOST * _duration(goal, sent_at):
+        duration = _duration(goal, sent_at)
+        left = duration - passed * self._speed_scaling
+        if left > LEFT_AT_MOST * duration:
             topic = self._hold.topic_name
             raise ControllerError(
                 f'the controller says that the goal is reached {left:.2f} s before its last point: '

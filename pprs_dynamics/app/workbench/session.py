@@ -105,7 +105,7 @@ class Session:
         self.history = History()
         self._lock, self._settling, self._reading = RLock(), RLock(), Lock()
         self._listeners: list[Callable[[], None]] = []
-        self._use(TickFits(model, list(recordings.values()), reference))
+        self._use(_fits_of(model, self.inputs))
 
     @classmethod
     def open(cls, recordings: Sequence[str | PathLike[str]],
@@ -166,7 +166,7 @@ class Session:
             As `tick` and `choose`.
         """
         with self._lock:
-            self._use(self._fits_of(saved.model))
+            self._use(_fits_of(saved.model, self.inputs))
             for tick in saved.ticks:
                 self.tick(tick.effect, tick.drives)
                 for key, value in tick.values.items():
@@ -215,7 +215,7 @@ class Session:
         with self._reading:
             more = self.inputs.with_more(path, is_held_out)
             while not self._take(more, self.fits if is_held_out
-                                 else TickFits(self.model, more.fitted, more.reference)):
+                                 else _fits_of(self.model, more)):
                 pass  # the model was changed meanwhile
         self.notify()
 
@@ -230,7 +230,7 @@ class Session:
         with self._reading:
             fewer = self.inputs.without(name)
             while not self._take(fewer, self.fits if name in self.inputs.validation
-                                 else TickFits(self.model, fewer.fitted, fewer.reference)):
+                                 else _fits_of(self.model, fewer)):
                 pass  # the model was changed meanwhile
         self.notify()
 
@@ -486,7 +486,7 @@ class Session:
                 return self._linear(dict(moment.ticks))
             self.diagnosis = self.diagnosis if moment.model is self.model else None
             fits = (self.fits if moment.model is self.model
-                    else self._fits_of(moment.model))
+                    else _fits_of(moment.model, self.inputs))
             self._use(fits, moment.ticks)
             return self.view_state
 
@@ -571,8 +571,7 @@ class Session:
             request, fits.recordings,
             inputs.held_out, force, report=lambda share: report(0.9 * share))
         if answer.adopted:
-            after = TickFits(inputs.ledger.entered(answer), fits.recordings,
-                             inputs.reference)
+            after = _fits_of(inputs.ledger.entered(answer), inputs)
             report(0.95)
             with self._lock:
                 if fits is not self.fits:
@@ -637,12 +636,8 @@ class Session:
             values, step = without_last_step(self.model.values)
             model = replace(build_model(values), source=self.model.source)
             self.diagnosis = None
-            self._use(self._fits_of(model), self.view_state.ticks)
+            self._use(_fits_of(model, self.inputs), self.view_state.ticks)
             return step
-
-    def _fits_of(self, model: ForceModel) -> TickFits:
-        """Return the fits of another model to the same recordings."""
-        return TickFits(model, self.fits.recordings, self.inputs.reference)
 
     # What goes out
 
@@ -701,3 +696,8 @@ class Session:
                     self.inputs.recordings, self.fits, self.current_residual),
                 'held_out': [{'key': key, 'name': one.name}
                              for key, one in self.inputs.validation.items()]}
+
+
+def _fits_of(model: ForceModel, inputs: Inputs) -> TickFits:
+    """Return the fits of a model to recordings, since their reference where there is one."""
+    return TickFits(model, inputs.fitted, inputs.reference)

@@ -248,7 +248,7 @@ class ForceModel(ABC):
         """What the model is built from beside its values: a hash of further files."""
         return ''
 
-    @property
+    @cached_property
     def fingerprint(self) -> str:
         """SHA-256 of the values in force, which changes with every parameter."""
         values = dict(self.values)

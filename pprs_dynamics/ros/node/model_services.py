@@ -85,8 +85,9 @@ class ModelServices:
 
         What is being set is on one of them first.
         """
-        is_known = self._in_force and self._node.count_publishers(f'{self._other}/status')
-        return '' if self._is_busy or not is_known else self._different()
+        found = '' if self._is_busy or not self._in_force else self._different()
+        # Asked only then: it is looked at with every sample that is compared.
+        return found if found and self._node.count_publishers(f'{self._other}/status') else ''
 
     def _different(self) -> str:
         own = self._model()[0]
