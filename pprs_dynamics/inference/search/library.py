@@ -74,6 +74,7 @@ class DriveLibrary:
         self.design = design
         self.effects = [effect for effect in searched_in_drives(design)
                         if design.acts_on(effect, d) and not effect.shifts_positions()]
+        self._places: dict[type[DriveEffect], slice] = {}
 
     @lazy
     def score_test(self) -> ScoreTest[Component]:
@@ -82,18 +83,34 @@ class DriveLibrary:
         parts: list[Array] = [np.zeros((0, len(self.series)), dtype=np.float32)]
         first = 0
         for effect in self.effects:
-            terms = self.design.trial_terms(effect, self.d, shapes_of(self.design, effect, self.d))
-            rows: list[Array] = []
-            for term in terms:
-                known = self.design.known_change(term)
-                entries += self._entries(term, first + sum(map(len, rows)), len(known))
-                rows += ([term.rows[self.d] + known[self.d]] if known and not term.names
-                         else [term.rows[self.d], *(row[None] for row in known.values())])
-            first += sum(map(len, rows))
-            # In single precision and in frequency alone: there are hundreds of them.
-            parts.append(self.series.transform(np.concatenate(
-                rows, dtype=np.float32, casting='same_kind')))
+            found, rows = self._tried(effect)
+            for term, known, at in found:
+                entries += self._entries(term, first + at, known)
+            self._places[effect] = slice(first, first + len(rows))
+            first += len(rows)
+            parts.append(rows)
         return ScoreTest(self.regression, {self.d: np.concatenate(parts)}, entries)
+
+    def rows_of(self, effect: type[DriveEffect]) -> Array:
+        """Return what an effect does in all shapes tried, (k, n), transformed."""
+        if 'score_test' in vars(self):
+            return self.score_test.rows[self.d][self._places[effect]]
+        return self._tried(effect)[1]
+
+    def _tried(self, effect: type[DriveEffect]) -> tuple[list[tuple[Term, int, int]], Array]:
+        """Return an effect's terms, each with its rows known and its first row, and all rows."""
+        found, rows, count = list[tuple[Term, int, int]](), list[Array](), 0
+        for term in self.design.trial_terms(effect, self.d,
+                                            shapes_of(self.design, effect, self.d)):
+            known = self.design.known_change(term)
+            found.append((term, len(known), count))
+            more = ([term.rows[self.d] + known[self.d]] if known and not term.names
+                    else [term.rows[self.d], *(row[None] for row in known.values())])
+            rows += more
+            count += sum(map(len, more))
+        # In single precision and in frequency alone: there are hundreds of them.
+        return found, self.series.transform(np.concatenate(
+            rows, dtype=np.float32, casting='same_kind'))
 
     def _entries(self, term: Term, first: int, known: int) -> list[Entry[Component]]:
         """Return the variants of a term whose rows begin at a place; what is known of it last."""

@@ -122,13 +122,12 @@ def catalogue_blocks(fits: FittedSets) -> list[Block]:
 
 def _directions(fits: FittedSets, effect: type[DriveEffect], d: int) -> Array:
     """Return rows (k, n) that span what an effect may do on a drive, in all its shapes nearly."""
-    trials = list(effect.trials(fits.design.covered[d]))
+    trials = effect.trials(fits.design.covered[d])
     if len(trials) > MOST_SHAPES:
         return np.zeros((0, 0))
-    rows = fits.regression.series[d].transform(np.concatenate(
-        [term.rows[d] for term in fits.design.trial_terms(effect, d, trials)]))
+    rows: Array = fits.library.local[d].rows_of(effect).astype(float)
     if len(trials) == 1:
-        return rows[np.any(rows, axis=1)]
+        return np.compress(np.any(rows, axis=1), rows, axis=0)
     values, axes = np.linalg.eigh(rows @ rows.T)
     order = np.argsort(-values)[:MOST_DIRECTIONS]
     kept = order[values[order] > LEAST_DIRECTION ** 2 * max(float(values[-1]), 1e-300)]

@@ -79,6 +79,11 @@ class ScoreTest(Generic[Label]):
             sizes.setdefault(len(entry.rows), []).append(entry)
         self._groups = [self._group(listed) for listed in sizes.values()]
 
+    @property
+    def rows(self) -> Mapping[int, Array]:
+        """As given."""
+        return self._columns.rows
+
     def _group(self, entries: list[Entry[Label]]) -> _Group[Label]:
         places = np.array([entry.rows for entry in entries])
         size = places.shape[1]

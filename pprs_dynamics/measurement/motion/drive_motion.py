@@ -183,6 +183,9 @@ def smoothed_as(motion: DriveMotion, recording: Recording,
         kept = slice(int(motion.index[span.start]) - part.start,
                      int(motion.index[span.stop - 1]) + 1 - part.start)
         values = made(grid.at_steps(recording.position[part]))
+        if not np.any(values):
+            parts.append([np.zeros((kept.stop - kept.start, *values.shape[1:]))] * 3)
+            continue
         parts.append([grid.at_samples(one, filter_.half, kept)
                       for one in filter_.differentiated(values)])
     q, q_dot, q_ddot = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))

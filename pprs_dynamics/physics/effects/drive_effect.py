@@ -8,6 +8,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -290,6 +291,7 @@ class MeasurementEffect(DriveEffect):
         return {}
 
     @classmethod
+    @cache
     def shifts_positions(cls) -> bool:
         """Return whether measured positions are not the true ones: all drives feel that."""
         unit = cls({ALONE: {p.name: p.scale for p in cls.parameters}})

@@ -89,12 +89,16 @@ def _worked(time: Array, speed: Array, tau: float, memory: Any) -> Array:
 
     Speeds are those of the intervals that end at the samples.
     """
+    # Here, as in effort_filter: few models have it.
+    from scipy.linalg.blas import dtbsv
+
     last = memory['start'] if memory['last'] is None else memory['last']
     elapsed = np.diff(time, prepend=min(last, time[0])) / tau
     kept, gained = np.exp(-elapsed), -np.expm1(-elapsed) * speed
-    work, found = memory['work'], []
-    for keep, gain in zip(kept.tolist(), gained.tolist(), strict=True):
-        work = keep * work + gain
-        found.append(work)
-    memory['last'], memory['work'] = float(time[-1]), work
-    return np.array(found)
+    gained[0] += kept[0] * memory['work']
+    # w_k - kept_k w_{k-1} = gained_k: a triangular system with one band below its diagonal.
+    bands = np.zeros((2, len(time)), order='F')
+    bands[1, :-1] = -kept[1:]
+    work: Array = dtbsv(1, bands, gained, lower=1, diag=1)
+    memory['last'], memory['work'] = float(time[-1]), float(work[-1])
+    return work
