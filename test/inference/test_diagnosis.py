@@ -310,6 +310,14 @@ def test_a_search_goes_on_from_a_set_that_holds_around_itself() -> None:
     assert sorted(one.name for one in found.effects) == sorted(names)
 
 
+def test_what_might_have_been_left_out_as_well_is_a_rival() -> None:
+    """A stop of rubber, at 20 times the noise, within the lack of fit of a spring and a ripple."""
+    found, _ = case('effects', 'stop_contact', seed=108, snr=10.0)
+    named = {one.name for one in found.effects} | {
+        name for names in found.indistinguishable for name in names}
+    assert 'stop_contact' in named
+
+
 def test_what_reversals_leave_of_another_form_is_no_delay() -> None:
     """The recording of the README: exponential Stribeck friction, sampled at 500 Hz."""
     found = diagnose(MODEL, [simulate(MODEL, 'stribeck_friction', seed=2).recording])

@@ -61,8 +61,11 @@ def axis() -> MechanismModel:
     return model
 
 
-def lifting(acceleration: float) -> Diagnosis:
-    """Diagnose the axis with screw friction of 8 % of its load, at about some acceleration."""
+def lifting(acceleration: float, losses: tuple[float, float] = (0.08, 0.08)) -> Diagnosis:
+    """Diagnose the axis whose screw loses shares of its load, upwards and downwards.
+
+    At about some acceleration; by default 8 % both ways.
+    """
     model, w = axis(), 2 * np.pi * 0.4
     size = acceleration / w ** 2
     q, v, a = (f[:, None] * size for f in (
@@ -70,7 +73,9 @@ def lifting(acceleration: float) -> Diagnosis:
             0.37 * w * TIME)),
         -w ** 2 * (np.sin(w * TIME) + 0.37 ** 2 * np.sin(0.37 * w * TIME))))
     force = model.drive_forces(JointMotion(q, v, a, TIME)).total
-    force = force + 0.08 * np.abs(MASS * (a - GRAVITY)) * np.tanh(v / 0.001)
+    turned, (up, down) = np.tanh(v / 0.001), losses
+    share = (up + down + (up - down) * turned) / 2
+    force = force + share * np.abs(MASS * (a - GRAVITY)) * turned
     noise = 0.3 * np.random.default_rng(5).normal(size=force.shape)
     return diagnose(model, [Recording.from_arrays('run', TIME, q, v, force + noise, ('axis',))])
 
@@ -89,3 +94,14 @@ def test_a_load_that_varies_tells_them_apart() -> None:
     assert (found.verdict, [one.name for one in found.effects]) == ('effect', ['load_friction'])
     value = found.effects[0].parameters['axis.coefficient']
     assert abs(value.value - 0.08) < 3 * value.std
+
+
+@pytest.mark.parametrize(('acceleration', 'verdict'), [(0.3, 'ambiguous'), (3.0, 'effect')])
+def test_at_one_load_a_gear_is_friction_that_differs_by_direction(acceleration: float,
+                                                                  verdict: str) -> None:
+    found = lifting(acceleration, (0.25, 0.10))
+    assert found.verdict == verdict
+    if verdict == 'effect':
+        assert [one.name for one in found.effects] == ['gear_efficiency']
+    else:
+        assert {'gear_efficiency', 'asymmetric_friction'} <= set(found.indistinguishable[0])

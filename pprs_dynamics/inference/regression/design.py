@@ -348,13 +348,6 @@ class Design:
         """Return whether a drive is in motion for a noteworthy share of the time."""
         return bool(np.mean(self.moving(drive)) >= LEAST_MOVING)
 
-    def load_variation(self, drive: int) -> float:
-        """Return the standard deviation of a drive's load in motion over its mean."""
-        width = TURNED * self.given.reversal.widths(len(self.drives))[drive]
-        load = np.concatenate([one.friction_load[np.abs(one.velocity[:, drive]) > width, drive]
-                               for one in self.recordings])
-        return float(load.std() / load.mean()) if len(load) and load.mean() else 0.0
-
     @cached_property
     def covered(self) -> tuple[DriveRange, ...]:
         """What each drive did."""

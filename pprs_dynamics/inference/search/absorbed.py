@@ -33,11 +33,14 @@ class Absorbed:
         In which it was.
     of : tuple of str
         Whose lack of fit it may be.
+    instead : tuple of (EffectCandidate, CandidateSet)
+        Others of which the same holds, and the set without each of these in its place.
     """
 
     candidate: Candidate
     beside: CandidateSet
     of: tuple[str, ...]
+    instead: tuple[tuple[EffectCandidate, CandidateSet], ...] = ()
 
 
 def without_absorbed(search: Search, map_set: CandidateSet,
@@ -78,7 +81,10 @@ def beyond_discrepancy(fits: FittedSets, map_set: CandidateSet,
         if not less:
             break
         gone = min(less, key=lambda candidate: less[candidate].total)
-        absorbed.append(Absorbed(gone, rest, absorbable[gone]))
+        absorbed.append(Absorbed(gone, rest, absorbable[gone], tuple(
+            (other, fits.evaluate(rest.without(other))) for other in absorbable
+            if other is not gone and isinstance(other, EffectCandidate))
+            if isinstance(gone, EffectCandidate) else ()))
         rest = less[gone]
     return rest, tuple(absorbed)
 

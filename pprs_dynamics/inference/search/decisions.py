@@ -67,8 +67,8 @@ class Decisions:
         1.5, '1', 'ratio of variances in a range and elsewhere that is told as scatter',
         'less does not show in a plot')
     one_load: float = _number(
-        0.05, '1', 'standard deviation of the load of a drive in motion over its mean, up to which '
-        'friction by load and friction that no load changes are told as one',
+        0.05, '1', 'share of a friction by load that friction which no load changes leaves, up to '
+        'which both are told as one',
         'dry friction varies by as much along a guide')
     stick_slip: float = _number(
         0.2, '1', 'share of the time in stick-slip, from which no other effect is claimed',

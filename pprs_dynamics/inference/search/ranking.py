@@ -267,7 +267,18 @@ class Ranking:
             if (missing and instead and not self._is_freer(other, missing, instead)
                     and not self._is_beaten(other, margin)):
                 rivals.append(Rival(other, tuple(missing), tuple(instead)))
-        return [*rivals, *self._at_one_load()]
+        return [*rivals, *self._within_each_other(), *self._at_one_load()]
+
+    def _within_each_other(self) -> Iterator[Rival]:
+        """Yield what was left out where as well the effect that stayed could have been.
+
+        Each is within the lack of fit of the other, however much more one of them costs.
+        """
+        names = {one.name for one in self.reported.effects}
+        for one in self.absorbed:
+            for other, found in one.instead:
+                if other.name in names and found.is_admissible:
+                    yield Rival(found, (other.name,), (one.candidate.name,))
 
     def _is_beaten(self, other: CandidateSet, margin: float) -> bool:
         """Return whether a set is no rival by the exact forces of its own model."""
@@ -284,16 +295,28 @@ class Ranking:
         for one in self.reported.effects:
             other = catalogue().get(one.effect.at_one_load)
             if (other is None or other.name in names or not issubclass(other, DriveEffect)
-                    or not one.drives or any(
-                        not design.acts_on(other, d)
-                        or design.load_variation(d) > self.last.decisions.one_load
-                        for d in one.drives)):
+                    or not one.drives or not all(design.acts_on(other, d) for d in one.drives)):
                 continue
-            instead = EffectCandidate.of(
-                Component.of(other, d, {}, other.variants[0]) for d in one.drives)
-            found = self.last.evaluate((*self.reported.without(one), instead))
-            if found.is_admissible:
-                yield Rival(found, (one.name,), (other.name,))
+            force = self.last.library.force(self.reported, one, design.residuals.measured.shape)
+            for coefficients in sorted(other.variants, key=len):
+                instead = [Component.of(other, d, {}, coefficients) for d in one.drives]
+                if not all(self._does_nearly(two, force) for two in instead):
+                    continue
+                found = self.last.evaluate((*self.reported.without(one),
+                                            EffectCandidate.of(instead)))
+                if found.is_admissible:
+                    yield Rival(found, (one.name,), (other.name,))
+                    break
+
+    def _does_nearly(self, component: Component, force: Array) -> bool:
+        """Return whether an effect on a drive does what a force (M, D) does, while it moves."""
+        term, d = self.last.library.term(component), component.drive
+        assert d is not None
+        moving = self.last.design.moving(d)
+        rows = term.rows[d][[term.names.index(name) for name in component.names]][:, moving]
+        wanted = force[moving, d]
+        left = wanted - np.linalg.lstsq(rows.T, wanted, rcond=None)[0] @ rows
+        return root_mean_square(left) <= self.last.decisions.one_load * root_mean_square(wanted)
 
     def _is_freer(self, other: CandidateSet, missing: Sequence[str], instead: Sequence[str],
                   ) -> bool:

@@ -30,6 +30,7 @@ class AsymmetricFriction(DriveEffect):
 
     name: ClassVar[str] = 'asymmetric_friction'
     is_friction: ClassVar[bool] = True
+    at_one_load: ClassVar[str] = 'gear_efficiency'
     linear = (
         Parameter('force_forward', 'F_f', 'N', 'dry friction forwards', -1e6, 1e6, 0.0, 0.5),
         Parameter('force_backward', 'F_b', 'N', 'dry friction backwards', -1e6, 1e6, 0.0, 0.5),

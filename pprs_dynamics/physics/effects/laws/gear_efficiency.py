@@ -19,6 +19,7 @@ class GearEfficiency(DriveEffect):
 
     name: ClassVar[str] = 'gear_efficiency'
     is_friction: ClassVar[bool] = True
+    at_one_load: ClassVar[str] = 'asymmetric_friction'
     linear = (Parameter('driving', 'mu_d', '1', 'share that is lost where the motor drives the '
                         'load: 1 / efficiency - 1', -100.0, 100.0, scale=0.05),
               Parameter('driven_back', 'mu_b', '1', 'share that is lost where the load drives the '
