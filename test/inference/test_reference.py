@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 import pprs_dynamics as pprs
+from benchmarks.scores.reference_robots import Change, Robot
 from pprs_dynamics import JointMotion, MechanismModel
 from pprs_dynamics.app.commands.pprs import main
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import MisreadError, ModelError, UnreadableFileError
 from pprs_dynamics.inference.fit.reference import Reference, ReferenceRunError
 from pprs_dynamics.inference.fit.reference_runs import read_reference
@@ -235,6 +236,21 @@ def test_a_model_file_that_keeps_the_residual_stands_alone(
     error = design.residuals.error
     left = error - read_reference(load_model(path)).carried_over(design).mean
     assert np.all(np.nanstd(left, axis=0) < 0.35 * np.nanstd(error, axis=0))
+
+
+def test_dry_friction_of_passive_joints_is_carried_over_and_no_change() -> None:
+    model = load_model(Path(__file__).parents[2] / 'config' / 'delta.yaml')
+    assert isinstance(model, MechanismModel)
+    robot = Robot(model, 20.0)
+    nothing = Change('nothing', '', value=0.0)
+    robot.forms.clear()  # dry friction of all twelve passive joints is left, twelve times the noise
+    reference = Reference.of(model, [robot.record(nothing, 1, 0)[0]])
+    again, _ = robot.record(nothing, 2, 0)
+    left = measure_residuals(model, [again])[0].error - reference.shown_by([again])
+    # By states of the drives alone four to six times the noise was left.
+    assert np.all(root_mean_square(left) < 2.0 * robot.noise())
+    assert pprs.diagnose(model, again, reference=[robot.record(nothing, 1, 0)[0]]
+                         ).verdict == 'adequate'
 
 
 def test_what_is_no_reference_is_refused(machine: tuple[MechanismModel, Reference]) -> None:

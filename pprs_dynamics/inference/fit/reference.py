@@ -41,13 +41,7 @@ from scipy.spatial import cKDTree
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.fit.arm_fit import (
-    OF_JOINT,
-    ArmColumns,
-    base_prior,
-    numbers_at,
-    own_spread,
-)
+from pprs_dynamics.inference.fit.arm_fit import ArmColumns, base_prior, numbers_at
 from pprs_dynamics.inference.regression.base_columns import BaseColumn, ReferenceDirection
 from pprs_dynamics.inference.regression.design import CarriedOver, Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
@@ -58,6 +52,7 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.reference_keys import DIRECTIONS, RESIDUAL
@@ -282,7 +277,7 @@ class Reference:
         Standard deviations of a drive's three [N].
     repeats : (D,) array
         Correlation of the process in two runs.
-    base : (14 n, P) array
+    base : (N, P) array
         Directions of unit variance of the base's numbers, those that the reference tells first.
     coefficients, root : (Q,) and (Q, Q) arrays
         Of told directions, then of the processes of every drive; of their covariance.
@@ -343,10 +338,8 @@ class Reference:
         error, measured = np.split(content[:, 2 + 3 * count:], 2, axis=1)
         residuals = Residuals(model.drives, time, record, measured, measured - error, {}, motion,
                               float(np.median(content[1:, 0])), model.units)
-        numbers = numbers_at(
-            model, motion['position'], motion['velocity'], motion['acceleration'],
-            model.reversal.widths(count)) if (
-                isinstance(model, MechanismModel) and model.is_described) else None
+        numbers = numbers_at(model, JointMotion(*(motion[name] for name in MOTION))) if (
+            isinstance(model, MechanismModel) and model.is_described) else None
         return cls._fitted(model, residuals, numbers, kept, (displayed(model.source),), ())
 
     @classmethod
@@ -386,7 +379,7 @@ class Reference:
     def directions(self) -> str:
         """The principal directions of the base's numbers that the recordings told, as a text.
 
-        Each of unit variance, half a precision a number: (14 n, P); '' for none.
+        Each of unit variance, half a precision a number: (N, P); '' for none.
         """
         told = self.told
         if not told:
@@ -571,10 +564,7 @@ def _base(model: ForceModel, numbers: Array | None, residuals: Residuals, kept: 
     if numbers is None:
         return np.zeros((len(residuals), len(residuals.drives), 0)), np.zeros((0, 0)), 0
     assert isinstance(model, MechanismModel)
-    count = len(model.drives)
-    joints = numbers[..., -OF_JOINT * count:].reshape(len(numbers), count, count, OF_JOINT)
-    prior = base_prior(model, own_spread(
-        residuals.measured, joints[:, np.arange(count), np.arange(count)]))
+    prior = base_prior(model, residuals.measured, numbers)
     if kept:
         told_before = _as_array(kept, DIRECTIONS)
         if len(told_before) != len(prior):
@@ -599,9 +589,9 @@ def _measured(model: ForceModel, recordings: Sequence[Recording],
 
 
 def _numbers(model: ForceModel, found: Reconstruction) -> Array:
-    """Return the columns of a base's numbers on a recording, (M, n, 14 n)."""
+    """Return the columns of a base's numbers on a recording, (M, n, P)."""
     assert isinstance(model, MechanismModel)
-    return ArmColumns.of_motion(model, found).numbers(model.reversal.widths(len(model.drives)))
+    return ArmColumns.of_motion(model, found).numbers(model)
 
 
 def _base_columns(columns: Array, drives: Sequence[int] | None = None) -> list[BaseColumn]:
