@@ -128,7 +128,7 @@ def test_what_is_carried_over_is_as_uncertain_as_it_is_wrong(
     model, reference = machine
     design = Design.of(model, [run(model, path, 4, day=day)])
     carried = reference.carried_over(design)
-    left = design.residuals.error - carried.mean
+    left = design.residuals.error - carried.shown(design.residuals)
     noise = NOISE ** 2 * len(left) / len(design.reconstructions[0])  # of means over blocks
     for d in range(3):
         # A single run allows for 14 % that differ; none do, or 5 %, on one path of it or another.
@@ -170,7 +170,8 @@ def test_a_drive_that_stood_in_the_reference_is_told_of_by_nothing(
         'two', whole.time, whole.position, whole.velocity, effort, whole.drives)])
     design = Design.of(model, [run(model, 0, 4)])
     error = design.residuals.error
-    left = np.nanstd(error - reference.carried_over(design).mean, axis=0) / np.nanstd(error, axis=0)
+    carried = reference.carried_over(design).shown(design.residuals)
+    left = np.nanstd(error - carried, axis=0) / np.nanstd(error, axis=0)
     assert max(left[:2]) < 0.35
     assert 0.8 < left[2] < 1.2
 
@@ -181,7 +182,7 @@ def test_on_another_path_a_reference_does_no_harm(
     model, reference = machine
     design = Design.of(model, [run(model, 5, 4)])
     before = design.residuals.error
-    after = before - reference.carried_over(design).mean
+    after = before - reference.carried_over(design).shown(design.residuals)
     ratio = np.sqrt(np.nanmean(after ** 2, axis=0) / np.nanmean(before ** 2, axis=0))
     assert np.sqrt(np.mean(ratio ** 2)) < 0.9
 
@@ -234,7 +235,8 @@ def test_a_model_file_that_keeps_the_residual_stands_alone(
     assert path.stat().st_size < 50_000
     design = Design.of(model, [run(model, 0, 4)])
     error = design.residuals.error
-    left = error - read_reference(load_model(path)).carried_over(design).mean
+    carried = read_reference(load_model(path)).carried_over(design)
+    left = error - carried.shown(design.residuals)
     assert np.all(np.nanstd(left, axis=0) < 0.35 * np.nanstd(error, axis=0))
 
 
