@@ -453,6 +453,7 @@ class Reference:
                 numbers[:, d, told:]), axis=1))
             apart.append(np.concatenate((
                 np.sqrt(1 - repeats ** 2) * sizes * known, new), axis=1))
+
         def shown(read: Residuals) -> Array:
             return of_base + self._repeating(read)
 
