@@ -78,10 +78,8 @@ class Session:
         What somebody did, for `back` and `forward`.
     revision : int
         Counts what somebody changed.
-    generation : int
-        Counts the fits; ticks belong to one of them.
-    version : int
-        Counts every change of what is shown.
+    fitted_since : int
+        Revision at which the fits began that ticks belong to.
 
     Raises
     ------
@@ -101,7 +99,7 @@ class Session:
         self.last_adoption: Adoption | None = None
         self.experiment: DesignedMotion | None = None
         self.jobs: dict[str, Job[Any]] = {}
-        self.revision = self.version = self.generation = 0
+        self.revision = 0
         self.history = History()
         self._lock, self._settling, self._reading = RLock(), RLock(), Lock()
         self._listeners: list[Callable[[], None]] = []
@@ -195,7 +193,7 @@ class Session:
             self.fits = fits
             self.noise_floors: dict[str, float] | None = None
             self.revision += 1
-            self.generation += 1
+            self.fitted_since = self.revision
             self.view_state = view_state.without_ticks(fits, self.revision)
             for name, tick in (ticks or {}).items():
                 with suppress(PprsError):  # what cannot act under this model is ticked no more
@@ -274,7 +272,6 @@ class Session:
     def notify(self) -> None:
         """Tell everybody who subscribed that something changed."""
         with self._lock:
-            self.version += 1
             listeners = list(self._listeners)
         for listener in listeners:
             listener()
@@ -457,7 +454,7 @@ class Session:
                              'was changed elsewhere')
 
     def _moment(self) -> Moment:
-        return Moment(self.model, self.view_state.ticks, self.generation)
+        return Moment(self.model, self.view_state.ticks, self.fitted_since)
 
     def back(self, revision: int | None = None) -> ViewState:
         """Take back what was done last: a tick, a value, an adoption, a step of the ledger.
@@ -482,7 +479,7 @@ class Session:
             moment = to(self._moment())
             if moment is None:
                 raise SessionError(none)
-            if moment.generation == self.generation:
+            if moment.fitted_since == self.fitted_since:
                 return self._linear(dict(moment.ticks))
             self.diagnosis = self.diagnosis if moment.model is self.model else None
             fits = (self.fits if moment.model is self.model
@@ -675,7 +672,7 @@ class Session:
             view, diagnosis, adoption = self.view_state, self.diagnosis, self.last_adoption
             called_for = {one.name for one in diagnosis.effects} if diagnosis else None
             return {
-                'revision': self.revision, 'version': self.version, 'stage': view.stage,
+                'revision': self.revision, 'fitted_since': self.fitted_since, 'stage': view.stage,
                 'is_settled': view.is_settled, 'is_approximate': view.is_approximate,
                 'departure': finite(view.departure), 'notice': view.notice,
                 'drives': list(self.drives), 'noise_is_guess': self.noise_floors is None,
