@@ -9,6 +9,7 @@ from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
+
 from pprs_dynamics.app.workbench.server.change_log import ChangeLog
 
 EFFECTS: list[dict[str, Any]] = [{'name': 'payload_mass'}]
