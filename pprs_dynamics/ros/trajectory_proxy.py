@@ -29,7 +29,6 @@ from rclpy.serialization import serialize_message
 from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.preparation import prepare
 from pprs_dynamics.ros.force_command import Feedforward, parameters_for
 from pprs_dynamics.ros.messages import conversions
@@ -215,7 +214,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
         missing = self._settings.own['missing_derivatives']
         if missing == SPLINE:
             _end_at_rest(goal)
-        if not isinstance(model, DriveModel):
+        if model.moves_joints:
             return reader_for(model).read(serialize_message(goal.trajectory), now, missing)
         if not goal.trajectory.points:
             return reader_for(model).read(

@@ -37,10 +37,8 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.ledger import Step, read_steps, without_last_step
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.system.numbers import finite
@@ -597,7 +595,6 @@ class Session:
             For a model of another mechanism, or a duration that no design is made for.
         """
         model = self.model
-        assert isinstance(model, (DriveModel, MechanismModel))
         check_duration(duration)
 
         def work(report: Callable[[float], None]) -> DesignedMotion:
