@@ -338,9 +338,8 @@ class _Answer:
         for d, series in self.fits.regression.series.items():
             self.remaining[:, d] -= series.open_forces(self.remaining[:, d])
         # Before a constant form is believed.
-        self.dated_fits, self.dated = with_courses(
-            self.fits, self.reported, ranking.alone.values()) if claims else (
-                self.fits, self.reported)
+        self.dated_fits, self.dated = self._with_courses() if claims else (
+            self.fits, self.reported)
         self.is_dated, self.adopted = self.dated is not self.reported, self.final.model
         if self.is_dated:
             self.remaining = linear_residual(self.dated_fits, self.dated)
@@ -382,6 +381,21 @@ class _Answer:
             tuple(name for name in floors if name not in seen),
             'validation' if self.validate else 'blocks', selection=self.ranking,
             decisions=self.decisions)
+
+    def _with_courses(self) -> tuple[FittedSets, CandidateSet]:
+        """Return the best set in which effects may begin, end or grow, as `with_courses` does.
+
+        Where what was found bends the columns, around the model as given, too: an effect that is
+        there all the time may be none, and does not show what is there for a part of it.
+        """
+        ranking, alone = self.ranking, list(self.ranking.alone.values())
+        fits, found = with_courses(self.fits, self.reported, alone)
+        if found is self.reported and ranking.first is not self.fits:
+            kept = ranking.first.evaluate(self.reported.candidates)
+            other, there = with_courses(ranking.first, kept, alone)
+            if there is not kept and there.cost < self.map_set.cost - self.decisions.rival_margin:
+                return other, there
+        return fits, found
 
     def _effects(self) -> list[FoundEffect]:
         """Return what is adopted, with the errors as one after the other is added."""

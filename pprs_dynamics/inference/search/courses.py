@@ -10,7 +10,7 @@ tried with a step in time, as a stretch, and as a drift.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,15 +32,17 @@ from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 STRETCHES, STRETCH_LENGTHS = 40, (1, 2, 4, 8)
 COURSE_HALVINGS = 6  # of the step between them, around the best
 COURSE_TRIALS = 3  # candidates of a scan that are fitted
+FIRST_TIMES = 5  # parts of the recordings, between which effects that are not kept are tried first
 MOST_COURSES = 3  # effects of one set that change within the recordings
 
 
 @dataclass(frozen=True)
 class _Offer:
-    """A candidate with a course, and by how much it would lower the deviance at least."""
+    """A candidate with a course, by how much it would lower the deviance at least, and where."""
 
     gain: float
     candidate: EffectCandidate
+    drives: frozenset[int]
 
     def is_worth_a_fit(self, fits: FittedSets) -> bool:
         """Return whether it may pay for itself, beyond the margin of rivals."""
@@ -64,26 +66,31 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
         Of one effect each, that may be the right one with a step in time.
     """
     own = [(kept, one) for one in kept.effects if _is_new(one)]
-    if not kept.unknowns and not any(
-            offer.is_worth_a_fit(fits) for offer in _offers(fits, kept, own)):
+    alone = [(one, one.effects[0]) for one in others if _is_new(one.effects[0])]
+    begun = [*_offers(fits, kept, own, _courses(fits)),
+             *_offers_for(fits, kept, alone, _few_courses(fits))]
+    drives = {d for one in kept.unknowns for d in one.drives} | {
+        d for offer in begun if offer.is_worth_a_fit(fits) for d in offer.drives}
+    if not drives:
         return fits, kept
     # Sets of their own: those of the search are of constant forms, and so are its rivals.
     dated = FittedSets(fits.design, fits.decisions, fits.regression.error_scale)
     best = dated.evaluate(kept.candidates)
-    names = {one.name for one in kept.effects}
-    more = [(one, one.effects[0]) for one in (*others, *_alone_on_drives(fits, kept))
-            if one.effects[0].name not in names and _is_new(one.effects[0])]
+    more = [(one, candidate) for one, candidate in (*alone, *_alone_on_drives(fits, drives))
+            if _is_new(candidate)]
     likely: list[EffectCandidate] = []
     for _ in range(MOST_COURSES):
         held = [(best, one) for one in best.effects if not one.course and _is_new(one)]
         # Patterns of no catalogue imitate what changes: offers are beside effects alone.
         plain = dated.at_noise_of(best, best.effects) if best.unknowns else best
-        offers = sorted(_offers(dated, plain, [*held, *more]), key=lambda one: -one.gain)
+        offers = sorted(_offers_for(dated, plain, [*held, *more], _courses(dated)),
+                        key=lambda one: -one.gain)
         found, offered = best, _best_of_each(offers)
         likely += [one.candidate for one in offered]
         for offer in offered:
             for rest in _rests(best, offer.candidate):
-                tried = dated.pruned(dated.evaluate((*rest, offer.candidate)))
+                # Its shape was that of an effect that is there all the time.
+                tried = dated.pruned(dated.refined(dated.evaluate((*rest, offer.candidate))))
                 found = min(found, tried, key=lambda one: one.cost)
         if not found.cost < best.cost - fits.decisions.rival_margin:
             break
@@ -94,21 +101,30 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
     return (dated, best) if any(one.course for one in best.effects) else (fits, kept)
 
 
-def _alone_on_drives(fits: FittedSets, kept: CandidateSet) -> Iterator[CandidateSet]:
-    """Yield all effects, each alone, on the drives on which a pattern of no catalogue is left.
+def _alone_on_drives(fits: FittedSets, drives: Iterable[int],
+                     ) -> Iterator[tuple[CandidateSet, EffectCandidate]]:
+    """Yield all effects, each alone, on drives on which something changes or a pattern is left.
 
     What is there for a stretch is hardly seen by a fit of all the time, which need not have been
     the search's to propose.
     """
     base = fits.evaluate(()).fit
-    for d in sorted({d for one in kept.unknowns for d in one.drives}):
+    for d in sorted(drives):
         for component, _ in fits.library.local[d].offers(base).values():
-            yield fits.evaluate((EffectCandidate.of([component]),))
+            candidate = EffectCandidate.of([component])
+            yield fits.evaluate((candidate,)), candidate
 
 
 def _is_new(candidate: EffectCandidate) -> bool:
     """Return whether the given model lacks an effect: what it has is there all the time."""
     return not any(one.given for one in candidate.components)
+
+
+def _few_courses(fits: FittedSets) -> Iterator[Course]:
+    """Yield a few beginnings, one of which shows most of what begins at any time."""
+    first, last = fits.design.residuals.time[[0, -1]].tolist()
+    for at in np.linspace(first, last, FIRST_TIMES + 1)[1:-1].tolist():
+        yield Course(SINCE, at, last)
 
 
 def _courses(fits: FittedSets) -> Iterator[Course]:
@@ -122,11 +138,27 @@ def _courses(fits: FittedSets) -> Iterator[Course]:
             yield Course(DURING, begin, end)
 
 
+def _offers_for(fits: FittedSets, best: CandidateSet,
+                effects: Sequence[tuple[CandidateSet, EffectCandidate]],
+                courses: Iterable[Course]) -> Iterator[_Offer]:
+    """Yield offers beside a set, and instead of it, where one may make good all that it does.
+
+    What a set of constant forms imitates is hardly seen beside it.
+    """
+    courses = list(courses)
+    yield from _offers(fits, best, effects, courses)
+    if best.candidates:
+        nothing = fits.at_noise_of(best, ())
+        for one in _offers(fits, nothing, effects, courses):
+            yield replace(one, gain=one.gain - (nothing.total - best.total))
+
+
 def _offers(fits: FittedSets, base: CandidateSet,
-            effects: Iterable[tuple[CandidateSet, EffectCandidate]]) -> Iterator[_Offer]:
+            effects: Iterable[tuple[CandidateSet, EffectCandidate]],
+            courses: Iterable[Course]) -> Iterator[_Offer]:
     """Yield effects with the course that lowers the deviance most, by the force that they had."""
     residuals, shape = fits.design.residuals, fits.design.residuals.measured.shape
-    courses = list(_courses(fits))
+    courses = list(courses)
     weights = np.array([one.weight(residuals.time, residuals.period) for one in courses])
     lengths = weights.sum(axis=1)
     for found, candidate in effects:
@@ -145,9 +177,10 @@ def _offers(fits: FittedSets, base: CandidateSet,
         for labels, gains in test.gains(base.fit):
             gains = np.where(told, gains, -np.inf)
             ranked = np.argsort(-gains)
-            for kind in (DRIFT, SINCE, DURING):
+            for kind in dict.fromkeys(one.kind for one in labels):
                 at = next(k for k in ranked if labels[k].kind == kind)
-                yield _Offer(float(gains[at]), _with_course(candidate, labels[at]))
+                yield _Offer(float(gains[at]), _with_course(candidate, labels[at]),
+                             frozenset(rows))
 
 
 def _best_of_each(offers: list[_Offer]) -> list[_Offer]:
