@@ -65,7 +65,7 @@ def _wound_up(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]
     """Look for second encoders that tell of a wind-up which efforts do not."""
     design = fits.design
     told = {name for one in effects if one.name == ElasticJoint.name for name in one.drives or ()}
-    for d, windup in fits.library.windups.items():
+    for d, windup in fits.components.windups.items():
         name, units = design.drives[d], design.given.units[d]
         if name not in told:
             yield (f'the link of {name} is not where its motor is: by its second encoder it winds '

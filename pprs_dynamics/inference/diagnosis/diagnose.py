@@ -286,7 +286,7 @@ def diagnose(
         if one.share > decisions.stick_slip}
     if other or sticking:
         bare = _Answer(without_search(model, recordings, decisions, report), validate, decisions,
-                       claims=False).diagnosis(())
+                       try_courses=False).diagnosis(())
         return replace(bare, verdict='unknown', warnings=(), effort_looks_like=other,
                        stick_slip=sticking, depends_on=tuple(
                            word_stick_slip(drive, one, bare.residuals)
@@ -300,8 +300,8 @@ def diagnose(
     if any(one.is_impossible for one in answer.effects):
         # Whatever stands for what cannot be, or beside it, would be as wrong.
         found = _all_objected(answer.effects)
-        answer = _Answer(answer.ranking.claiming_nothing(), validate, decisions,
-                         claims=False)
+        answer = _Answer(answer.ranking.reporting_nothing(), validate, decisions,
+                         try_courses=False)
         report(1.0)
         return replace(answer.diagnosis(found), verdict='unknown', since=since)
     while weak := [one for one in answer.effects
@@ -326,7 +326,7 @@ class _Answer:
     """What is to be said of a ranking."""
 
     def __init__(self, ranking: Ranking, validate: Sequence[Recording],
-                 decisions: Decisions, claims: bool = True) -> None:
+                 decisions: Decisions, try_courses: bool = True) -> None:
         self.ranking, self.validate, self.decisions = ranking, validate, decisions
         self.fits, self.map_set, self.reported = ranking.last, ranking.map_set, ranking.reported
         self.design = self.fits.design
@@ -339,7 +339,7 @@ class _Answer:
             self.remaining[:, d] -= series.open_forces(self.remaining[:, d])
         # Before a constant form is believed.
         self.dated_fits, self.dated = with_courses(
-            self.fits, self.reported, ranking.alone.values()) if claims else (
+            self.fits, self.reported, ranking.alone.values()) if try_courses else (
                 self.fits, self.reported)
         self.is_dated, self.adopted = self.dated is not self.reported, self.final.model
         if self.is_dated:
@@ -422,7 +422,7 @@ class _Answer:
             candidate.effect, parameters, in_model)
         return FoundEffect(
             candidate.effect, self.design.named(candidate.drives), parameters,
-            final.fits.library.force(final.found, last, self.remaining.shape), without.cost,
+            final.fits.components.force(final.found, last, self.remaining.shape), without.cost,
             errors[0], errors[1], held_out[0], held_out[1], estimates.at_bound, share,
             self._certainty(candidate), impossible or nothing, bool(impossible), without,
             in_model, moments=estimates.moments)
@@ -451,7 +451,7 @@ class _Answer:
             estimates = estimate(fits, found, candidate, are_drives_known=True)
             effects.append(FoundEffect(
                 candidate.effect, self.design.named(candidate.drives), estimates.parameters,
-                fits.library.force(found, candidate, self.remaining.shape),
+                fits.components.force(found, candidate, self.remaining.shape),
                 fits.evaluate(found.without(candidate)).total - found.total, errors[k],
                 errors[k + 1], held_out[k], held_out[k + 1], estimates.at_bound,
                 (errors[k] - errors[k + 1]) / errors[0],
@@ -471,7 +471,7 @@ class _Answer:
             course = candidate.course
             if course is None or course.kind != DURING:
                 continue
-            force = fits.library.force(found, candidate, self.remaining.shape)
+            force = fits.components.force(found, candidate, self.remaining.shape)
             span = (course.begin - begun, course.end - begun)
             inside = (residuals.time >= course.begin) & (residuals.time < course.end)
             evidence = fits.evaluate(found.without(candidate)).total - found.total
@@ -565,13 +565,13 @@ class _Answer:
 
     def _depends_on(self, noise: dict[str, NoiseSpectrum]) -> tuple[Statement, ...]:
         statements = []
-        libraries = {library.d: library for library in self.ranking.patterns}
+        by_drive = {one.d: one for one in self.ranking.patterns}
         for candidate in self.dated.unknowns:
             evidence = (self.dated_fits.evaluate(self.dated.without(candidate)).total
                         - self.dated.total if self.is_dated else self._evidence(candidate))
             for d, block in candidate.parts.items():
                 statements.append(word_statement(
-                    libraries[d], candidate, self.dated.fit.of(block), evidence))
+                    by_drive[d], candidate, self.dated.fit.of(block), evidence))
         drifting = levels(self.fits.regression.residuals, dict(noise), self.decisions)
         statements += [one for name, one in drifting.items()
                        if one.amplitude > self._lack_of_fit[self.drives.index(name)]]
@@ -586,7 +586,7 @@ class _Answer:
         force = np.zeros(self.remaining.shape)
         for one in self.dated.effects:
             if one.effect.idealised:
-                force += self.dated_fits.library.force(self.dated, one, self.remaining.shape)
+                force += self.dated_fits.components.force(self.dated, one, self.remaining.shape)
         return [self.decisions.form_share * root_mean_square(of_drive) for of_drive in force.T]
 
     def _candidates(self) -> tuple[RankedEffect, ...]:
@@ -634,7 +634,7 @@ class _Answer:
         return RankedSet(names, self.ranking.difference(found, best), found.barred)
 
     def _within_model_error(self, absorbed: Absorbed) -> WithinModelError:
-        force = self.fits.library.force(absorbed.beside, absorbed.candidate,
+        force = self.fits.components.force(absorbed.beside, absorbed.candidate,
                                         self.design.residuals.measured.shape)
         return WithinModelError(
             absorbed.candidate.name, self.design.named(absorbed.candidate.drives),
@@ -659,21 +659,21 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
     if selection is None:
         return ()
     found = []
-    adopted = {c.name: c.claim for c in selection.reported.effects}
+    adopted = {c.name: c.placed_name for c in selection.reported.effects}
     for of, name in ((names[0], name) for names in diagnosis.indistinguishable
                      for name in names[1:]):
         best = next((one for one in selection.sets
-                     if any(name in (c.name, c.claim) for c in one.effects)
-                     and adopted[of] not in {c.claim for c in one.effects}), None)
+                     if any(name in (c.name, c.placed_name) for c in one.effects)
+                     and adopted[of] not in {c.placed_name for c in one.effects}), None)
         if best is None:
             continue
         fits = selection.fits_of(best)
-        candidate = next(c for c in best.effects if name in (c.name, c.claim))
+        candidate = next(c for c in best.effects if name in (c.name, c.placed_name))
         remaining = linear_residual(fits, best)
         found.append(RivalEffect(
             candidate.effect, fits.design.named(candidate.drives),
             estimate(fits, best, candidate).parameters,
-            fits.library.force(best, candidate, remaining.shape), of, linear_error(fits, best),
+            fits.components.force(best, candidate, remaining.shape), of, linear_error(fits, best),
             _held_out(fits, best, validate), best.cost - selection.map_set.cost, remaining))
     return tuple(found)
 

@@ -263,7 +263,7 @@ def _headline(diagnosis: Diagnosis) -> str:
     noise = in_unit(diagnosis.noise_floor, unit)
     if diagnosis.little:
         little = word_little(diagnosis.little, ' with what was found' if held else '')
-        beside = f' What was found: {_claims(diagnosis)}.{fall}.' if held else ''
+        beside = f' What was found: {_lacking(diagnosis)}.{fall}.' if held else ''
         return (f'{little[:1].upper()}{little[1:]}, and no effect of the catalogue the rest.'
                 f'{beside}{doubt}')
     if not held and not diagnosis.depends_on and diagnosis.unconfirmed:
@@ -273,7 +273,7 @@ def _headline(diagnosis: Diagnosis) -> str:
                  if left > AT_NOISE * diagnosis.noise_floor else '')
         return f'{lacks}Nothing that was found holds{above}.{doubt}'
     if any(one.course is not None and one.course.kind != SINCE for one in held):
-        return (f'Something changes within the recording, as if {_claims(diagnosis)}.{fall}. No '
+        return (f'Something changes within the recording, as if {_lacking(diagnosis)}.{fall}. No '
                 f'constant effect does that.{doubt}')
     if diagnosis.verdict == 'unknown':
         groups = unexplained_groups(diagnosis)
@@ -282,7 +282,7 @@ def _headline(diagnosis: Diagnosis) -> str:
             for drive, ratio in diagnosis.above_noise.items()])
         more = len(groups) - 2
         places += f' and in {more} more place{"s" * (more > 1)}' if more > 0 else ''
-        beside = f' Beside it, {_claims(diagnosis)}.{fall}, not to the noise.' if held else ''
+        beside = f' Beside it, {_lacking(diagnosis)}.{fall}, not to the noise.' if held else ''
         return ('Something is missing that no effect of the catalogue explains: '
                 f'{places}.{beside}{doubt}')
     unseen = (f'How much of the error of {listed(diagnosis.unseen_noise)} is noise cannot be told '
@@ -304,12 +304,12 @@ def _headline(diagnosis: Diagnosis) -> str:
              else f'. The noise is {noise}; the rest lies near reversals, where friction turns '
              'over in another width than the model\'s.')
     which = ': this data cannot tell which' if any(_rivals(diagnosis, one) for one in held) else ''
-    claims = _claims(diagnosis)
-    begin = 'T' if claims.startswith('the model') else claims[:1]
-    return f'{begin}{claims[1:]}{which}.{fall}{level}{doubt}'
+    missing = _lacking(diagnosis)
+    begin = 'T' if missing.startswith('the model') else missing[:1]
+    return f'{begin}{missing[1:]}{which}.{fall}{level}{doubt}'
 
 
-def _claims(diagnosis: Diagnosis) -> str:
+def _lacking(diagnosis: Diagnosis) -> str:
     """Return what the model lacks, and what it has that is not as the recordings say."""
     new = [_or_rivals(diagnosis, one) for one in diagnosis.effects if not one.in_model]
     told = [f'the model lacks {listed(new)}'] if new else []

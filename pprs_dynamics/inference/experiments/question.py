@@ -37,7 +37,7 @@ from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.search.candidates import (
     CandidateSet,
     EffectCandidate,
-    Prices,
+    PriorCosts,
     names_of,
 )
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
@@ -174,12 +174,12 @@ def _separation(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
                for k, j in permutations(range(len(sets)), 2)}
     plan = ColumnPlan.of_design(fits.design, terms.all)
     # By name, and two of the same name by link or joint.
-    claims = [{c.claim: c.name for c in one.effects} for one in placed]
-    moved = {name for one in claims[1:] for claim, name in one.items()
-             if name in claims[0].values() and claim not in claims[0]}
-    explanations = [_explanation([claim if name in moved else name
-                                  for claim, name in mine.items()], own, plan, 0.0)
-                    for mine, own in zip(claims, parts, strict=True)]
+    names = [{c.placed_name: c.name for c in placed_set.effects} for placed_set in placed]
+    moved = {name for others in names[1:] for placed_name, name in others.items()
+             if name in names[0].values() and placed_name not in names[0]}
+    explanations = [_explanation([placed_name if name in moved else name
+                                  for placed_name, name in mine.items()], terms_of_set, plan, 0.0)
+                    for mine, terms_of_set in zip(names, parts, strict=True)]
     contests = []
     for (k, j), more in further.items():
         free = explanations[k].free + tuple(
@@ -203,8 +203,8 @@ def _estimation(fits: FittedSets, adopted: CandidateSet) -> Question:
     terms = _Terms()
     parts = [terms.of_candidate(adopted, c) for c in adopted.effects]
     plan = ColumnPlan.of_design(fits.design, terms.all)
-    samples = fits.library.prices.samples
-    subjects = [_explanation([c.name], own, plan, fits.library.price(c).total + sum(
+    samples = fits.components.prior_costs.samples
+    subjects = [_explanation([c.name], own, plan, fits.components.prior_cost(c).total + sum(
         len(term.names) for term, _ in own) * log(samples))
         for c, own in zip(adopted.effects, parts, strict=True)]
     return _asked('estimate', fits, adopted, plan, precision_of(plan, subjects), (), subjects)
@@ -224,19 +224,19 @@ def _excitation(fits: FittedSets, nothing: CandidateSet) -> Question:
         if np.any(gain[here] * found.scales ** 2 < fits.decisions.unexcited):
             weak.append(found)
     plan = ColumnPlan.of_design(fits.design, weak)
-    subjects = subjects_of(plan, fits.library.prices)
+    subjects = subjects_of(plan, fits.components.prior_costs)
     return _asked('excite', fits, nothing, plan, precision_of(plan, subjects), (), subjects)
 
 
-def subjects_of(plan: ColumnPlan, prices: Prices) -> list[Explanation]:
+def subjects_of(plan: ColumnPlan, prior_costs: PriorCosts) -> list[Explanation]:
     """Return each term of a plan as an effect that may be there."""
     subjects = []
     for term in plan.terms:
-        price = (prices.of_name() + prices.of_component(term.effect, 1)
-                 + len(term.names) * log(prices.samples))
+        prior_cost = (prior_costs.of_name() + prior_costs.of_component(term.effect, 1)
+                 + len(term.names) * log(prior_costs.samples))
         if term.drive is not None:
-            price += prices.of_drives(1)
-        subjects.append(_explanation([term.effect.name], [(term, term.values)], plan, price))
+            prior_cost += prior_costs.of_drives(1)
+        subjects.append(_explanation([term.effect.name], [(term, term.values)], plan, prior_cost))
     return subjects
 
 
@@ -304,7 +304,7 @@ class _Terms:
         return self._found.setdefault(key, term)
 
 
-def _explanation(names: Sequence[str], parts: Sequence[Part], plan: ColumnPlan, price: float,
+def _explanation(names: Sequence[str], parts: Sequence[Part], plan: ColumnPlan, prior_cost: float,
                  ) -> Explanation:
     places = [_places(plan, term) for term, _ in parts]
     return Explanation(
@@ -312,7 +312,7 @@ def _explanation(names: Sequence[str], parts: Sequence[Part], plan: ColumnPlan, 
         tuple(k for place, (term, _) in zip(places, parts, strict=True) for k in place[term.free]),
         tuple(k for place, (_, values) in zip(places, parts, strict=True)
               for k in place[:len(values)]),
-        np.concatenate([values for _, values in parts]), price)
+        np.concatenate([values for _, values in parts]), prior_cost)
 
 
 def _places(plan: ColumnPlan, term: FittedTerm) -> range:
@@ -380,7 +380,7 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: flo
         plan = ColumnPlan(model, model, base_without_recordings(model), tuple(terms))
         spectra = dict.fromkeys(range(len(DRIVES)), white)
         known = Information(plan, spectra).prior()
-    subjects = subjects_of(plan, Prices(names_of(model), len(DRIVES), samples, decisions))
+    subjects = subjects_of(plan, PriorCosts(names_of(model), len(DRIVES), samples, decisions))
     scales = np.concatenate([np.ones(len(plan.numbers)), *(term.scales for term in terms)])
     criterion = Precision((*plan.numbers, *free_of(subjects)), plan.others, scales)
     return Question('commission', plan, spectra, known, criterion, (), tuple(subjects), noise,

@@ -90,7 +90,7 @@ def _is_of_loads(fits: FittedSets, found: CandidateSet, candidate: Candidate) ->
     """
     return (isinstance(candidate, EffectCandidate) and candidate.effect.is_friction
             and issubclass(candidate.effect, DriveEffect)
-            and any(fits.library.term(one).bare for other in found.effects
+            and any(fits.components.term(one).bare for other in found.effects
                     if other is not candidate for one in other.components))
 
 

@@ -46,7 +46,7 @@ class _Offer:
         """Return whether it may pay for itself, beyond the margin of rivals."""
         course = self.candidate.course
         return course is not None and (
-            self.gain > fits.prices.of_course(course) + fits.decisions.rival_margin)
+            self.gain > fits.prior_costs.of_course(course) + fits.decisions.rival_margin)
 
 
 def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[CandidateSet],
@@ -102,7 +102,7 @@ def _alone_on_drives(fits: FittedSets, kept: CandidateSet) -> Iterator[Candidate
     """
     base = fits.evaluate(()).fit
     for d in sorted({d for one in kept.unknowns for d in one.drives}):
-        for component, _ in fits.library.local[d].offers(base).values():
+        for component, _ in fits.components.local[d].offers(base).values():
             yield fits.evaluate((EffectCandidate.of([component]),))
 
 
@@ -130,7 +130,7 @@ def _offers(fits: FittedSets, base: CandidateSet,
     weights = np.array([one.weight(residuals.time, residuals.period) for one in courses])
     lengths = weights.sum(axis=1)
     for found, candidate in effects:
-        force = fits.library.force(found, candidate, shape)
+        force = fits.components.force(found, candidate, shape)
         rows = {d: fits.regression.series[d].transform(
             (weights * force[:, d]).astype(np.float32)) for d in fits.regression.drives
             if np.any(force[:, d])}

@@ -24,8 +24,8 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
+from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.library import placed
 from pprs_dynamics.inference.search.reversal_widths import place_of
 from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -157,7 +157,7 @@ def _told_elsewhere(fits: FittedSets, found: CandidateSet, candidate: EffectCand
     if drives is None or effect.shape or found.blocks[candidate.components[0]].mean is not None:
         return []
     names = candidate.components[0].names
-    blocks = [fits.library.block(placed(fits.design, effect, d, {}, names))
+    blocks = [fits.components.block(placed(fits.design, effect, d, {}, names))
               for d in fits.regression.drives
               if d not in drives and fits.design.acts_on(effect, d)]
     fit = fits.regression.at((*found.fit.blocks, *blocks), found.fit.amplitudes)
@@ -180,7 +180,7 @@ def _left_out(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
         rest = tuple(name for name in every if name not in component.names)
         if not component.names or not rest:
             continue
-        block = fits.library.block(replace(component, names=rest))
+        block = fits.components.block(replace(component, names=rest))
         fit = fits.regression.stated(found.fit, [block])
         others = replace(component, names=rest, given=())
         index = _places(fits, fit, replace(component, names=rest))
@@ -200,7 +200,8 @@ def _left_out(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
 def _places(fits: FittedSets, fit: JointFit, component: Component, slopes: Block | None = None,
             ) -> list[int]:
     """Return the places of a component's coefficients in a fit, then of its shape."""
-    places = fit.index_of([fits.library.block(component)])[:max(len(component.names), 1)].tolist()
+    index = fit.index_of([fits.components.block(component)])
+    places = index[:max(len(component.names), 1)].tolist()
     return places if slopes is None else [*places, *fit.index_of([slopes]).tolist()]
 
 
@@ -291,7 +292,7 @@ def _of_component(
         found[prefix + parameter.name] = Estimate(
             within(parameter, value, units), parameter.spread(amount, value),
             unit_of(parameter.unit))
-    return found, [prefix + name for name in fits.library.at_edge(
+    return found, [prefix + name for name in fits.components.at_edge(
         component, fits.decisions.edge_share)]
 
 

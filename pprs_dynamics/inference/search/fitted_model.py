@@ -106,7 +106,7 @@ def linear_prediction(fits: FittedSets, found: CandidateSet) -> Array:
             for d, row in column.rows.items():
                 prediction[:, d] += c * row
     for candidate in found.effects:
-        prediction += fits.library.force(found, candidate, prediction.shape)
+        prediction += fits.components.force(found, candidate, prediction.shape)
     return prediction
 
 

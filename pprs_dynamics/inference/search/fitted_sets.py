@@ -24,13 +24,13 @@ from pprs_dynamics.inference.search.candidates import (
     CandidateSet,
     Component,
     EffectCandidate,
-    Prices,
+    PriorCosts,
     UnknownCandidate,
     set_key,
 )
+from pprs_dynamics.inference.search.components import Components
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
-from pprs_dynamics.inference.search.library import Library
 from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
 from pprs_dynamics.inference.search.possible_bodies import with_possible_bodies
 from pprs_dynamics.inference.search.possible_totals import with_possible_totals
@@ -71,8 +71,8 @@ class FittedSets:
         self.regression = Regression(
             design.residuals, design.base, error_scale=error_scale,
             open_forces={} if design.carried is None else design.carried.open_forces)
-        self.prices = Prices.of(self.regression, decisions, design.given)
-        self.library = Library(design, self.regression, self.prices)
+        self.prior_costs = PriorCosts.of(self.regression, decisions, design.given)
+        self.components = Components(design, self.regression, self.prior_costs)
         self.settled: dict[Hashable, Any] = {}
         self._evaluated: dict[Hashable, CandidateSet] = {}
         self._nuisance: dict[Hashable, tuple[Block, ...]] = {}
@@ -108,13 +108,13 @@ class FittedSets:
             return CandidateSet((), fit, self._terms(fit))
         start = self.evaluate(()).fit.amplitudes
         nuisance: Nuisance = {}
-        if any(self.library.leaves_open(one) for c in candidates for one in c.components):
+        if any(self.components.leaves_open(one) for c in candidates for one in c.components):
             # The size of its forces, in proportion to which friction is in doubt, need not be
             # exact: the noise of the empty set does, and steps of it, whose columns are kept.
             nuisance = self._nuisance_blocks(candidates, self.regression.at(
                 self.blocks(candidates), start))
         fit = self.regression.fit(self.blocks(candidates, nuisance), start)
-        bodies = {one: self.library.block(one) for c in candidates for one in c.components
+        bodies = {one: self.components.block(one) for c in candidates for one in c.components
                   if issubclass(one.effect, AddedBody) and one.effect.has_extent}
         possible = with_possible_bodies(self.design.given, self.regression, fit, bodies)
         found = self._set(candidates, fit, nuisance)
@@ -142,20 +142,20 @@ class FittedSets:
 
     def release(self) -> None:
         """Let go of what only further scans and fits would need."""
-        self.library.release()
+        self.components.release()
         self.regression.release()
 
     def blocks(self, candidates: Candidates, nuisance: Nuisance = MappingProxyType({}),
                ) -> list[Block]:
         """Return the columns of candidates, then those of what they leave open."""
         return [*(block for c in candidates for block in (
-            c.blocks if isinstance(c, UnknownCandidate) else map(self.library.block, c.components)
-        )), *chain(*nuisance.values())]
+            c.blocks if isinstance(c, UnknownCandidate)
+            else map(self.components.block, c.components))), *chain(*nuisance.values())]
 
     def _set(self, candidates: Candidates, fit: JointFit, nuisance: Nuisance) -> CandidateSet:
-        blocks = {one: self.library.block(one) for c in candidates for one in c.components}
+        blocks = {one: self.components.block(one) for c in candidates for one in c.components}
         found = CandidateSet(candidates, fit, self._terms(fit), blocks, nuisance)
-        return replace(found, terms=found.terms + self.price(found))
+        return replace(found, terms=found.terms + self.prior_cost(found))
 
     def _terms(self, fit: JointFit) -> CostTerms:
         left = self.regression.misfit(fit)
@@ -186,7 +186,7 @@ class FittedSets:
         """
         found = {}
         for one in (one for c in candidates for one in c.components):
-            size = _stepped(fit.of(self.library.block(one))[:max(len(one.names), 1)])
+            size = _stepped(fit.of(self.components.block(one))[:max(len(one.names), 1)])
             key = (one, tuple(size.tolist()))
             if key not in self._nuisance:
                 self._nuisance[key] = self._nuisance_of(one, size)
@@ -197,11 +197,11 @@ class FittedSets:
     def _nuisance_of(self, component: Component, c: Array) -> tuple[Block, ...]:
         """Return the columns of one component, for its coefficients (k,)."""
         blocks = []
-        unloaded = self.library.unloaded(component)
+        unloaded = self.components.unloaded(component)
         if unloaded is not None:
             blocks.append(Block({d: (c @ rows)[None] for d, rows in unloaded.items()}, np.eye(1)))
         left_open = {d: np.tensordot(c, rows, 1)
-                     for d, rows in self.library.nuisance_rows(component).items()}
+                     for d, rows in self.components.nuisance_rows(component).items()}
         if left_open:
             blocks.append(Block(left_open, np.eye(len(next(iter(left_open.values()))))))
         return tuple(blocks)
@@ -213,12 +213,12 @@ class FittedSets:
         fit = self.regression.at(self.blocks(candidates, nuisance), found.fit.amplitudes)
         return self._set(candidates, fit, nuisance)
 
-    def price(self, found: CandidateSet) -> CostTerms:
-        """Return the price of all that was chosen, and of signs that are unphysical."""
+    def prior_cost(self, found: CandidateSet) -> CostTerms:
+        """Return the prior cost of all that was chosen, and of signs that are unphysical."""
         wrong = CostTerms(signs=sum(
-            self.prices.of_wrong_signs(one, one.values(found.coefficients(one)))
+            self.prior_costs.of_wrong_signs(one, one.values(found.coefficients(one)))
             for one in found.blocks))
-        return sum(map(self.library.price, found.candidates), wrong)
+        return sum(map(self.components.prior_cost, found.candidates), wrong)
 
     def drop_cost(self, found: CandidateSet, component: Component) -> float:
         """Return by how much the deviance rises without a component, at the noise of a fit.
@@ -287,7 +287,7 @@ class FittedSets:
         """Return derivatives by the shapes of a set, of unit prior, for the components with any."""
         slopes = []
         for one in (one for one in found.blocks if one.effect.shape):
-            rows = self.design.slope_rows(self.library.term(one),
+            rows = self.design.slope_rows(self.components.term(one),
                                           one.total(found.coefficients(one)))
             slopes.append((one, self.regression.block(rows, np.eye(len(one.effect.shape)))))
         return slopes
@@ -297,7 +297,7 @@ class FittedSets:
         reach = {}
         for parameter in component.effect.shape:
             value = component.parameters[parameter.name]
-            known = self.library.tried(component, parameter.name)
+            known = self.components.tried(component, parameter.name)
             if len(known) < 2:
                 reach[parameter.name] = 0.5
                 continue

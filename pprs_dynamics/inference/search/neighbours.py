@@ -13,8 +13,8 @@ from pprs_dynamics.inference.search.candidates import (
     Component,
     EffectCandidate,
 )
+from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
-from pprs_dynamics.inference.search.library import placed
 
 
 def with_instead(candidate: EffectCandidate, gone: Component, *instead: Component,
@@ -34,8 +34,8 @@ def simplified(fits: FittedSets, found: CandidateSet) -> CandidateSet:
     return _descended(fits, found, lambda one: [*_with_fewer(one), *_otherwise(fits, one)])
 
 
-def of_same_claims(fits: FittedSets, found: CandidateSet) -> CandidateSet:
-    """Return the set of least cost that claims the same: on other drives, in other variants.
+def of_same_names(fits: FittedSets, found: CandidateSet) -> CandidateSet:
+    """Return the set of least cost of the same effects: on other drives, in other variants.
 
     Where it is barred, also without its patterns of no catalogue: around their own model its
     effects may explain what these stood for. A pattern that may be there is not dropped here,
@@ -88,9 +88,9 @@ def _otherwise(fits: FittedSets, best: CandidateSet) -> Iterator[Candidates]:
         if len({one.names for one in candidate.components}) > 1:
             for names in effect.variants:
                 yield exchanged(best, candidate, EffectCandidate.of(
-                    fits.library.variant(one, names) for one in candidate.components))
+                    fits.components.variant(one, names) for one in candidate.components))
         for component in candidate.components:
-            for other in fits.library.variants(component):
+            for other in fits.components.variants(component):
                 # The others take part in every scan.
                 if other.names != component.names and not set(other.names) <= set(effect.scanned):
                     yield exchanged(best, candidate, with_instead(candidate, component, other))

@@ -19,9 +19,9 @@ from pprs_dynamics.inference.search.absorbed import Absorbed, without_absorbed
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
-    Claims,
     Component,
     EffectCandidate,
+    PlacedNames,
 )
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
@@ -30,7 +30,7 @@ from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.relinearisation import search_around_fitted
 from pprs_dynamics.inference.search.scan import Place
 from pprs_dynamics.inference.search.search import Search, patterns_of
-from pprs_dynamics.inference.search.unknown import PatternLibrary
+from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -64,7 +64,7 @@ class Ranking:
     ----------
     first, last : FittedSets
         Around the model as given, and around the last operating point: for looking closer.
-    patterns : tuple of PatternLibrary
+    patterns : tuple of DrivePatterns
         Of no catalogue, around the last.
     of_first, of_last : tuple of CandidateSet
         Their sets, by cost.
@@ -80,13 +80,13 @@ class Ranking:
         From the patterns of the reported set to all of it, an effect more in each in that order.
     refuted : frozenset of Place
         What took no part in the search, as held-out data did not confirm it.
-    exact : mapping of claims to float
+    exact : mapping of PlacedNames to float
         What the sets of the shortlist cost by the exact forces of their own fitted models.
     """
 
     first: FittedSets = field(repr=False)
     last: FittedSets = field(repr=False)
-    patterns: tuple[PatternLibrary, ...] = field(repr=False)
+    patterns: tuple[DrivePatterns, ...] = field(repr=False)
     of_first: tuple[CandidateSet, ...] = field(repr=False)
     of_last: tuple[CandidateSet, ...] = field(repr=False)
     map_set: CandidateSet
@@ -96,7 +96,7 @@ class Ranking:
     order: tuple[EffectCandidate, ...] = field(repr=False)
     path: tuple[CandidateSet, ...] = field(repr=False)
     refuted: frozenset[Place]
-    exact: Mapping[Claims, float] = field(
+    exact: Mapping[PlacedNames, float] = field(
         default_factory=lambda: MappingProxyType({}), repr=False)
 
     @classmethod
@@ -108,7 +108,7 @@ class Ranking:
                               refuted)
 
     @classmethod
-    def _reporting(cls, first: FittedSets, last: FittedSets, patterns: tuple[PatternLibrary, ...],
+    def _reporting(cls, first: FittedSets, last: FittedSets, patterns: tuple[DrivePatterns, ...],
                    map_set: CandidateSet, reported: CandidateSet, absorbed: tuple[Absorbed, ...],
                    refuted: frozenset[Place]) -> Ranking:
         without = {gone: last.evaluate(reported.without(gone)) for gone in reported.candidates}
@@ -130,7 +130,7 @@ class Ranking:
         return replace(self._reporting(self.first, self.last, self.patterns, self.map_set, reported,
                                        self.absorbed, refuted), exact=self.exact)
 
-    def claiming_nothing(self) -> Ranking:
+    def reporting_nothing(self) -> Ranking:
         """Return the ranking with nothing reported, under the noise that the best set leaves."""
         return self._reporting(self.first, self.last, self.patterns, self.map_set,
                                self.last.evaluate(()), (), self.refuted)
@@ -198,9 +198,9 @@ class Ranking:
         An effect on other drives or in another shape is the same one; a body on another link is
         another.
         """
-        # Of one claim that was ranked by exact forces, these stand for all its sets.
+        # Of one choice of effects that was ranked by exact forces, these stand for all its sets.
         others = [one for one in self._judged if not _has(one, candidate)
-                  and (one.claims not in self.exact or one in self._exact_costs)]
+                  and (one.placed_names not in self.exact or one in self._exact_costs)]
         return min((self.without[candidate], *others),
                    key=lambda one: self.difference(one, self.map_set).total)
 
@@ -214,11 +214,11 @@ class Ranking:
 
     @cached_property
     def _exact_costs(self) -> Mapping[CandidateSet, float]:
-        """What the sets of the shortlist cost: of each claim the first."""
-        first: dict[Claims, CandidateSet] = {}
+        """What the sets of the shortlist cost: of each choice of effects the first."""
+        first: dict[PlacedNames, CandidateSet] = {}
         for one in self.sets:
-            first.setdefault(one.claims, one)
-        return {first[claims]: cost for claims, cost in self.exact.items() if claims in first}
+            first.setdefault(one.placed_names, one)
+        return {first[names]: cost for names, cost in self.exact.items() if names in first}
 
     @property
     def _judged(self) -> list[CandidateSet]:
@@ -234,14 +234,14 @@ class Ranking:
     def nearly(self, margin: float) -> list[tuple[float, CandidateSet]]:
         """Return other sets of the last search within a margin, and what they cost more.
 
-        What exact forces cost more than linear ones is that of the first set of the same claims,
+        What exact forces cost more than linear ones is that of the first set of the same effects,
         and as much as of the reported set where it is not known.
         """
-        departs = {one.claims: cost - one.total for one, cost in self._exact_costs.items()}
-        mine = departs.get(self.reported.claims, 0.0)
+        departs = {one.placed_names: cost - one.total for one, cost in self._exact_costs.items()}
+        mine = departs.get(self.reported.placed_names, 0.0)
 
         def more(one: CandidateSet) -> float:
-            return one.cost - self.reported.cost + departs.get(one.claims, mine) - mine
+            return one.cost - self.reported.cost + departs.get(one.placed_names, mine) - mine
 
         costs = [(more(one), one) for one in self.of_last if one is not self.reported]
         least = more(self.map_set) + margin
@@ -253,17 +253,19 @@ class Ranking:
 
         To have what is within the model error of others makes no rival.
         """
-        mine = {candidate.claim: candidate.name for candidate in self.reported.effects}
+        mine = {candidate.placed_name: candidate.name for candidate in self.reported.effects}
         ignored = {one.candidate.name for one in self.absorbed}
         rivals = []
         for other in self.sets:
             if other.cost > self.map_set.cost + margin:
                 break
-            theirs = {candidate.claim: candidate.name for candidate in other.effects
+            theirs = {candidate.placed_name: candidate.name for candidate in other.effects
                       if candidate.name not in ignored}
-            missing = sorted(name for claim, name in mine.items() if claim not in theirs)
-            instead = sorted(claim if name in mine.values() else name
-                             for claim, name in theirs.items() if claim not in mine)
+            missing = sorted(name for placed_name, name in mine.items()
+                             if placed_name not in theirs)
+            instead = sorted(placed_name if name in mine.values() else name
+                             for placed_name, name in theirs.items()
+                             if placed_name not in mine)
             if (missing and instead and not self._is_freer(other, missing, instead)
                     and not self._is_beaten(other, margin)):
                 rivals.append(Rival(other, tuple(missing), tuple(instead)))
@@ -271,7 +273,7 @@ class Ranking:
 
     def _is_beaten(self, other: CandidateSet, margin: float) -> bool:
         """Return whether a set is no rival by the exact forces of its own model."""
-        mine, theirs = (self.exact.get(one.claims) for one in (self.map_set, other))
+        mine, theirs = (self.exact.get(one.placed_names) for one in (self.map_set, other))
         return mine is not None and theirs is not None and theirs > mine + margin
 
     def _at_one_load(self) -> Iterator[Rival]:
@@ -373,7 +375,7 @@ def _searched(first: FittedSets, refuted: frozenset[Place],
 
 
 def _has(found: CandidateSet, candidate: EffectCandidate) -> bool:
-    return any(one.claim == candidate.claim for one in found.effects)
+    return any(one.placed_name == candidate.placed_name for one in found.effects)
 
 
 def _by_cost(sets: Sequence[CandidateSet]) -> tuple[CandidateSet, ...]:

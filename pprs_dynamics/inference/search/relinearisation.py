@@ -18,7 +18,7 @@ import numpy as np
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.regression.terms import OperatingPoint, PlacedEffect
-from pprs_dynamics.inference.search.candidates import CandidateSet, Claims
+from pprs_dynamics.inference.search.candidates import CandidateSet, PlacedNames
 from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,
@@ -28,7 +28,7 @@ from pprs_dynamics.inference.search.fitted_model import (
     squared,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.neighbours import of_same_claims
+from pprs_dynamics.inference.search.neighbours import of_same_names
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -37,7 +37,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 # after it was relinearised around, from before: less changes no cost by more than a rival's margin.
 LEAST_DIFFERENCE, LEAST_CHANGE = 4.0, 2.0
 MOST_SEARCHES, MOST_STEPS, MOST_HALVINGS = 5, 6, 4  # how often all of this is repeated
-SHORTLIST = 4  # sets of different claims of a search that are ranked by exact forces
+SHORTLIST = 4  # sets of different effects of a search that are ranked by exact forces
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class ExactSet:
         try:
             for _ in range(MOST_STEPS):
                 around, moved = linearised(around, moved, alone=True)
-                before, moved = moved, of_same_claims(around, moved)
+                before, moved = moved, of_same_names(around, moved)
                 if moved is before:
                     break
             turning = settled(around, moved)
@@ -83,21 +83,22 @@ class ExactSet:
 
 
 def search_around_fitted(first: Search, report: Callable[[float], None],
-                         ) -> tuple[Search, CandidateSet, Mapping[Claims, float]]:
+                         ) -> tuple[Search, CandidateSet, Mapping[PlacedNames, float]]:
     """Return the search around the best set's own model, that set, and costs by exact forces.
 
     Gauss-Newton over sets: what is cheapest around the point of a search is relinearised, each set
     by itself; the next search is around the one that costs least so, until none costs less. Only
     exact costs, which do not depend on where a search was, decide between sets.
     """
-    search, exact_sets, reached = first, dict[Claims, ExactSet](), None
+    search, exact_sets, reached = first, dict[PlacedNames, ExactSet](), None
     search.run(until_nonlinear=True)
     for number in range(MOST_SEARCHES):
         for listed in _shortlist(search.fits, first.fits.decisions.rival_margin):
-            known = exact_sets.get(listed.claims)
+            known = exact_sets.get(listed.placed_names)
             if known is None or listed.cost < known.cost - LEAST_CHANGE:
                 new = ExactSet.of(search.fits if listed.is_nonlinear else first.fits, listed)
-                exact_sets[listed.claims] = new if known is None else min(known, new, key=_cost)
+                exact_sets[listed.placed_names] = (
+                    new if known is None else min(known, new, key=_cost))
         best = min(exact_sets.values(), key=_cost)
         if best is reached or _is_where(search, best):
             break
@@ -113,7 +114,7 @@ def search_around_fitted(first: Search, report: Callable[[float], None],
                                                      0.4 / MOST_SEARCHES))
         search.run(best.found.candidates)
     return (search, search.fits.evaluate(best.found.candidates),
-            {claims: one.cost for claims, one in exact_sets.items()})
+            {names: one.cost for names, one in exact_sets.items()})
 
 
 def _cost(one: CandidateSet | ExactSet) -> float:
@@ -121,17 +122,17 @@ def _cost(one: CandidateSet | ExactSet) -> float:
 
 
 def _shortlist(fits: FittedSets, margin: float) -> list[CandidateSet]:
-    """Return the cheapest set of each claim that may be the best once costs are exact.
+    """Return the cheapest set of each choice of effects that may be the best once costs are exact.
 
     Within a margin; where the best set is nonlinear and the point is not its own, any nonlinear
     one: tilts, wrenches and offsets of a payload look nearly alike there.
     """
-    best, near = fits.best, dict[Claims, CandidateSet]()
+    best, near = fits.best, dict[PlacedNames, CandidateSet]()
     is_beyond = not _has_nonlinear(fits.design.point, parts_of(fits, best)[1])
     for one in sorted(fits.sets, key=_cost):
         if one.cost <= best.cost + margin or (
                 is_beyond and one.is_nonlinear and one.is_admissible):
-            near.setdefault(one.claims, one)
+            near.setdefault(one.placed_names, one)
     return list(near.values())[:SHORTLIST]
 
 

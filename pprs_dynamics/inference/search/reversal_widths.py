@@ -96,7 +96,7 @@ def estimate_widths(fits: FittedSets, found: CandidateSet) -> dict[int, float]:
 
         refined = minimize_scalar(loss, bounds=(low, high), method='bounded',
                                   options={'maxiter': 15})
-        if -float(refined.fun) > fits.prices.of_width(TRIALS):
+        if -float(refined.fun) > fits.prior_costs.of_width(TRIALS):
             widths[d] = rounded(width * float(np.exp(refined.x)))
     return widths
 

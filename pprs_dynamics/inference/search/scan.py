@@ -25,7 +25,7 @@ SLOW_LEFT = 1e-3  # of the power of slow noise, where fast noise alone proposes
 
 
 Place = tuple[type[CatalogueEffect], int | None]  # an effect, and the drive that it acts on alone
-Scored = tuple[float, Component]  # its gain less its price
+Scored = tuple[float, Component]  # its gain less its prior cost
 
 
 class Scan:
@@ -77,24 +77,24 @@ class Scan:
 
     def offers(self, base: CandidateSet, drive: int | None = None,
                ) -> dict[type[CatalogueEffect], list[Scored]]:
-        """Return gains less prices of components, by effect; one for each drive or place."""
-        library, fit = self.fits.library, base.fit
+        """Return gains less prior costs of components, by effect; one for each drive or place."""
+        components, fit = self.fits.components, base.fit
         taken = {(one.effect, one.drive) for one in base.blocks}
-        drives = tuple(library.local) if drive is None else (drive,)
+        drives = tuple(components.local) if drive is None else (drive,)
 
         def of_drive(d: int) -> list[tuple[Component, float]]:
-            found = list(library.local[d].offers(fit).values())
+            found = list(components.local[d].offers(fit).values())
             self.fits.stepped()
             return found
 
         offered = each(of_drive, drives)
         offers = [offer for found_there in offered for offer in found_there]
-        offers += library.shared_offers(fit) if drive is None else []
+        offers += components.shared_offers(fit) if drive is None else []
         best: dict[Hashable, Scored] = {}
         for one, gain in offers:
             place = (one.effect, one.drive)
             key = (*place, one.effect.places_of(one.names))
-            net = gain - library.component_price(one).total
+            net = gain - components.component_prior_cost(one).total
             if place not in taken and place not in self.refuted and (
                     key not in best or net > best[key][0]):
                 best[key] = (net, one)
@@ -108,14 +108,15 @@ class Scan:
         old: EffectCandidate | None,
     ) -> tuple[float, list[Component]]:
         """Return the drives on which an effect pays, and the score of all together."""
-        prices = self.fits.prices
+        prior_costs = self.fits.prior_costs
         found = sorted(found, key=lambda one: -one[0])
         if not issubclass(effect, DriveEffect):
-            return found[0][0] - prices.of_name(), [found[0][1]]
+            return found[0][0] - prior_costs.of_name(), [found[0][1]]
         there = len(old.components) if old else 0
-        before = prices.of_drives(there) if there else -prices.of_name()
+        before = prior_costs.of_drives(there) if there else -prior_costs.of_name()
         nets = np.cumsum([net for net, _ in found])
-        scores = [nets[m] + before - prices.of_drives(there + m + 1) for m in range(len(found))]
+        scores = [nets[m] + before - prior_costs.of_drives(there + m + 1)
+                  for m in range(len(found))]
         best = int(np.argmax(scores))
         return float(scores[best]), [one for _, one in found[:best + 1]]
 

@@ -3,10 +3,10 @@
 
 """Search for the set of effects with the lowest cost.
 
-The cost of a set is its penalised deviance (`regression.joint_fit`) plus the prices of what was
-chosen (`Prices`). From the best set, effects are added, placed on other drives, dropped, replaced
-and merged, until no neighbour is better. A scan at the noise of a fit proposes, a fit with its own
-noise decides.
+The cost of a set is its penalised deviance (`regression.joint_fit`) plus the prior costs of what
+was chosen (`PriorCosts`). From the best set, effects are added, placed on other drives, dropped,
+replaced and merged, until no neighbour is better. A scan at the noise of a fit proposes, a fit
+with its own noise decides.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from pprs_dynamics.inference.search.candidates import (
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
 from pprs_dynamics.inference.search.neighbours import exchanged, simplified, with_instead
 from pprs_dynamics.inference.search.scan import Place, Scan, with_fast_noise
-from pprs_dynamics.inference.search.unknown import PatternLibrary, Shared, best_patterns
+from pprs_dynamics.inference.search.unknown import DrivePatterns, Shared, best_patterns
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
@@ -45,7 +45,7 @@ class Search:
     Parameters
     ----------
     fits : FittedSets
-    patterns : sequence of PatternLibrary, optional
+    patterns : sequence of DrivePatterns, optional
         Patterns of no catalogue that take part, see `patterns_of`; by default none do.
     refuted : frozenset of Place
         See `Scan`.
@@ -53,7 +53,7 @@ class Search:
         Called with the share of the work that is done.
     """
 
-    def __init__(self, fits: FittedSets, patterns: Sequence[PatternLibrary] = (),
+    def __init__(self, fits: FittedSets, patterns: Sequence[DrivePatterns] = (),
                  refuted: frozenset[Place] = frozenset(),
                  progress: Callable[[float], None] | None = None) -> None:
         self.fits, self.patterns = fits, tuple(patterns)
@@ -205,7 +205,7 @@ class Search:
             others = [one for one in candidate.components if one.drive != d]
             rest = found.without(candidate)
             less = (*rest, EffectCandidate.of(others)) if others else rest
-            offers = self.fits.library.local[d].offers(self.fits.at_noise_of(found, less).fit)
+            offers = self.fits.components.local[d].offers(self.fits.at_noise_of(found, less).fit)
             if effect.name in offers:
                 found = min(found, self.fits.evaluate((*rest, EffectCandidate.of(
                     [*others, offers[effect.name][0]]))), key=lambda one: one.cost)
@@ -214,7 +214,7 @@ class Search:
     def _variants(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
         """Yield the candidate with other coefficients of one component."""
         for component in candidate.components:
-            for other in self.fits.library.variants(component):
+            for other in self.fits.components.variants(component):
                 if other.names != component.names:
                     yield with_instead(candidate, component, other)
 
@@ -253,7 +253,7 @@ class Search:
         There it, or some of its coefficients, may stand for the other one.
         """
         for component in candidate.components if len(candidate.components) > 1 else ():
-            fewer = [(other,) for other in self.fits.library.variants(component)
+            fewer = [(other,) for other in self.fits.components.variants(component)
                      if set(other.names) < set(component.names)]
             for kept in ((), *fewer):
                 rest = exchanged(best, candidate, with_instead(candidate, component, *kept))
@@ -267,7 +267,7 @@ class Search:
                                    RECOVERED * (base.total - best.total) - REPLACED)
 
     def _two_for(self, best: CandidateSet, gone: EffectCandidate) -> Iterable[Candidates]:
-        """Yield sets in which two other effects stand for one that claims more than one thing."""
+        """Yield sets in which two other effects stand for one that is more than one hypothesis."""
         def with_another(candidates: Candidates) -> list[Candidates]:
             found = self.scan.proposals(self.fits.at_noise_of(best, candidates), REPLACEMENTS + 1)
             return [more for more in found if all(
@@ -287,8 +287,8 @@ class Search:
                 for one, others in zip(candidate.components, shapes, strict=True))
 
 
-def patterns_of(fits: FittedSets) -> list[PatternLibrary]:
+def patterns_of(fits: FittedSets) -> list[DrivePatterns]:
     """Return the patterns of no catalogue of all drives."""
     shared = Shared()
-    return [PatternLibrary(fits.regression, fits.prices, d, shared=shared)
+    return [DrivePatterns(fits.regression, fits.prior_costs, d, shared=shared)
             for d in fits.regression.drives]
