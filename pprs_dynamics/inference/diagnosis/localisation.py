@@ -149,7 +149,8 @@ def _search(residuals: Residuals, drive: int) -> DriveFindings:
     blocks: list[Block] = []
     patterns: list[Array] = []
     while len(statements) < MOST_STATEMENTS:
-        winner = _best(drive_patterns, fit, blocks, {one.variable for one in statements})
+        winner = _best(drive_patterns, fit, blocks,
+                       {statement.variable for statement in statements})
         if winner is None:
             break
         candidate, found, evidence, other_variables = winner
@@ -158,7 +159,7 @@ def _search(residuals: Residuals, drive: int) -> DriveFindings:
         patterns.append(candidate.rows[drive])
         blocks += [*candidate.blocks, *_carried(drive_patterns, candidate)]
         fit = regression.fit(blocks, found.amplitudes)
-    scatter = _scatter(drive_patterns, fit, {one.variable for one in statements})
+    scatter = _scatter(drive_patterns, fit, {statement.variable for statement in statements})
     if scatter is not None:
         statements.append(scatter)
     return DriveFindings(tuple(statements), regression.noise(fit)[drive], tuple(patterns))
@@ -183,7 +184,7 @@ def _best(drive_patterns: DrivePatterns, fit: JointFit, blocks: list[Block], sta
             continue
         found = regression.fit([*blocks, *refined.blocks], near.amplitudes)
         scored.append((fit.deviance - found.deviance - refined.prior_cost, refined, found))
-    scored.sort(key=lambda one: -one[0])
+    scored.sort(key=lambda scored: -scored[0])
     if not scored or scored[0][0] <= 0:
         return None
     evidence, winner, found = scored[0]

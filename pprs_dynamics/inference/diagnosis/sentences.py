@@ -150,15 +150,15 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
     following, command = next_step(diagnosis, files)
     return Sentences(
         _since(diagnosis) + _headline(diagnosis),
-        tuple(_effect(diagnosis, one, k == 0) for k, one in enumerate(diagnosis.effects)),
-        tuple(_rival(diagnosis, one) for one in rivals),
+        tuple(_effect(diagnosis, effect, k == 0) for k, effect in enumerate(diagnosis.effects)),
+        tuple(_rival(diagnosis, rival) for rival in rivals),
         tuple(Finding(*describe_unexplained(group, bool(diagnosis.effects)))
               for group in unexplained_groups(diagnosis)),
-        tuple(_suspect(diagnosis, one) for one in diagnosis.suspects),
+        tuple(_suspect(diagnosis, suspect) for suspect in diagnosis.suspects),
         tuple(_within_model_error(diagnosis, one) for one in diagnosis.within_model_error),
         tuple(f'{_set(diagnosis, one)} may not be, whatever it costs: {one.barred}. It '
               f'{_cost(one)}' for one in diagnosis.barred),
-        tuple(_calibrated(diagnosis, one) for one in diagnosis.calibrated),
+        tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated),
         diagnosis.warnings, following, command, _reference(diagnosis))
 
 
@@ -177,8 +177,8 @@ def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
 
 def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     """Return the best sets of effects in words, each with its cost above the best, and of what."""
-    return [(_set(diagnosis, one), f'{one.cost:+.1f}' if number else 'the best',
-             word_terms(one.terms)) for number, one in enumerate(diagnosis.sets)]
+    return [(_set(diagnosis, fitted), f'{fitted.cost:+.1f}' if number else 'the best',
+             word_terms(fitted.terms)) for number, fitted in enumerate(diagnosis.sets)]
 
 
 def _set(diagnosis: Diagnosis, found: RankedSet) -> str:
@@ -205,9 +205,10 @@ def runner_up(diagnosis: Diagnosis) -> str:
     By what is told: what is within the model error of others was never named as missing.
     """
     within = {one.name for one in diagnosis.within_model_error} - {
-        one.name for one in diagnosis.effects}
-    untold = within & {name for one in diagnosis.sets[:1] for name, _ in one.names}
-    sets = [(one, {pair for pair in one.names if pair[0] not in untold}) for one in diagnosis.sets]
+        effect.name for effect in diagnosis.effects}
+    untold = within & {name for fitted in diagnosis.sets[:1] for name, _ in fitted.names}
+    sets = [(fitted, {pair for pair in fitted.names if pair[0] not in untold})
+            for fitted in diagnosis.sets]
     following = next(((one, names) for one, names in sets[1:] if names != sets[0][1]), None)
     if following is None:
         return ''
@@ -311,10 +312,10 @@ def _headline(diagnosis: Diagnosis) -> str:
 
 def _lacking(diagnosis: Diagnosis) -> str:
     """Return what the model lacks, and what it has that is not as the recordings say."""
-    new = [_or_rivals(diagnosis, one) for one in diagnosis.effects if not one.in_model]
+    new = [_or_rivals(diagnosis, effect) for effect in diagnosis.effects if not effect.in_model]
     told = [f'the model lacks {listed(new)}'] if new else []
-    return '; '.join([*told, *(_otherwise(diagnosis, one)
-                               for one in diagnosis.effects if one.in_model)])
+    return '; '.join([*told, *(_otherwise(diagnosis, effect)
+                               for effect in diagnosis.effects if effect.in_model)])
 
 
 def _otherwise(diagnosis: Diagnosis, found: FoundEffect) -> str:
@@ -442,7 +443,7 @@ def sure_moments(effect: type[CatalogueEffect], parameters: Mapping[str, Estimat
     def is_vague(one: Estimate) -> bool:
         return INTERVAL * one.std > VAGUE * abs(one.value)
 
-    known = {one.name: one for one in effect.coefficients}
+    known = {coefficient.name: coefficient for coefficient in effect.coefficients}
     masses = {key: parameters.get(f'{key.rpartition("moment_")[0]}mass') for key in moments}
     return [known[key] for key, mass in masses.items()
             if mass is not None and is_vague(mass) and not is_vague(moments[key])]

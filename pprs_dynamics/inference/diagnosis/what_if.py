@@ -168,7 +168,7 @@ class _System:
         self.blocks: dict[Component, tuple[Block, ...]] = {}
         for candidates, found in self._tried(selection):
             for candidate in candidates:
-                drives = {one.drive for one in candidate.components}
+                drives = {component.drive for component in candidate.components}
                 self.first_choice.setdefault(candidate.name, drives)
                 for placement in candidate.components:
                     key = (candidate.name, placement.drive)
@@ -200,11 +200,11 @@ class _System:
     def _tried(self, selection: Ranking,
                ) -> Iterable[tuple[tuple[EffectCandidate, ...], CandidateSet]]:
         """Yield the effects of sets, and the sets, those that matter most first."""
-        alone = [one for one in selection.of_first if len(one.candidates) == 1]
+        alone = [fitted for fitted in selection.of_first if len(fitted.candidates) == 1]
         yield selection.order, self.kept
         for sets in (alone, selection.of_last):
-            for one in sorted(sets, key=lambda one: one.total):
-                yield one.effects, one
+            for fitted in sorted(sets, key=lambda fitted: fitted.total):
+                yield fitted.effects, fitted
         # Where no set has an effect, a scan beside what was found says in which shape and where.
         for proposal in Scan(self.fits).proposals(self.kept, least=-inf):
             yield tuple(one for one in proposal if isinstance(one, EffectCandidate)), self.kept
@@ -233,7 +233,7 @@ class _System:
         free = [block for block in own if block.mean is None]
         return OptionalPlacement(
             None if d is None else self.fits.design.drives[d],
-            any(placement in one.components for one in self.kept.effects),
+            any(placement in candidate.components for candidate in self.kept.effects),
             d in self.first_choice[effect.name],
             tuple(column for block in free for column in self.columns[block]),
             tuple(column for block in own if block.mean is not None

@@ -98,7 +98,7 @@ class Component:
         """Return whether all linear parameters are within their bounds in a drive of such units."""
         values = self.values(coefficients)
         return all(p.lower <= values[p.name] <= p.upper
-                   for p in (one.of(units.turns) for one in self.effect.linear))
+                   for p in (parameter.of(units.turns) for parameter in self.effect.linear))
 
     @property
     def signed(self) -> tuple[str, ...]:
@@ -190,8 +190,8 @@ class EffectCandidate:
         With other coefficients, on other drives or on one, it may be more than one hypothesis:
         asymmetric friction that is dry and viscous is two.
         """
-        return frozenset[Hashable]().union(*(self.effect.hypotheses(one.names)
-                                             for one in self.components))
+        return frozenset[Hashable]().union(*(self.effect.hypotheses(component.names)
+                                             for component in self.components))
 
 
 @dataclass(frozen=True, eq=False)
@@ -321,7 +321,7 @@ class CandidateSet:
 
     def without(self, *gone: Candidate) -> tuple[Candidate, ...]:
         """Return the candidates but some."""
-        return tuple(c for c in self.candidates if not any(c is one for one in gone))
+        return tuple(c for c in self.candidates if not any(c is left_out for left_out in gone))
 
     def coefficients(self, component: Component) -> Array:
         """Return the coefficients of a component; not that of what is known of it."""
@@ -396,7 +396,7 @@ class PriorCosts:
             names=len(candidate.hypotheses) * self.of_name(),
             drives=0.0 if candidate.drives is None else self.of_drives(len(candidate.components)),
             shapes=0.0 if candidate.course is None else self.of_course(candidate.course))
-        return sum((of_component(one) for one in candidate.components), terms)
+        return sum((of_component(component) for component in candidate.components), terms)
 
     def of_component(self, effect: type[CatalogueEffect], tried: int) -> float:
         """Return the prior cost of a variant and of a shape among those tried.

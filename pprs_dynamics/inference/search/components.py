@@ -178,10 +178,10 @@ class Components:
         """All that more than one drive feels; computed when asked for."""
         series = self.regression.series
         entries, parts, first = [], [], 0
-        for one in (*self.structure, *self.spanning):
-            block = self.block(one)
-            entries.append(Entry(one, tuple(range(first, first + block.size)), block.precision,
-                                 block.mean))
+        for component in (*self.structure, *self.spanning):
+            block = self.block(component)
+            entries.append(Entry(component, tuple(range(first, first + block.size)),
+                                 block.precision, block.mean))
             parts.append({d: block.rows[d] if d in block.rows
                           else np.zeros((block.size, len(series[d]))) for d in series})
             first += block.size
@@ -193,8 +193,8 @@ class Components:
         """Return what more than one drive feels, with its gains at the noise of a fit."""
         if not self.structure and not self.spanning:
             return []
-        return [(one, float(gain)) for components, gains in self.score_test.gains(fit)
-                for one, gain in zip(components, gains, strict=True)]
+        return [(component, float(gain)) for components, gains in self.score_test.gains(fit)
+                for component, gain in zip(components, gains, strict=True)]
 
     def term(self, component: Component) -> Term:
         """Return the rows in time of a component, of all of its effect's coefficients."""
@@ -343,16 +343,16 @@ class Components:
                 signs=self.prior_costs.of_right_signs(component))
         return self._prior_costs[component]
 
-    def force(self, found: CandidateSet, candidate: Candidate, shape: tuple[int, ...]) -> Array:
+    def force(self, fitted: CandidateSet, candidate: Candidate, shape: tuple[int, ...]) -> Array:
         """Return what a candidate of a set contributes, in the shape (M, D) [N]."""
         force = np.zeros(shape)
         if isinstance(candidate, UnknownCandidate):
             for d, block in candidate.parts.items():
-                force[:, d] = found.fit.of(block) @ candidate.rows[d]
+                force[:, d] = fitted.fit.of(block) @ candidate.rows[d]
             return force
-        for one in candidate.components:
-            c = one.every(found.coefficients(one))
-            term = self.term(one)
+        for component in candidate.components:
+            c = component.every(fitted.coefficients(component))
+            term = self.term(component)
             for d, rows in term.rows.items():
                 force[:, d] += c @ rows
             for d, row in self.design.known_change(term).items():

@@ -112,7 +112,7 @@ def catalogue_blocks(fits: FittedSets) -> list[Block]:
     regression, components = fits.regression, fits.components
     blocks = [regression.block(dict(term.rows)) for term in fits.design.structure
               if any(np.any(rows) for rows in term.rows.values())]
-    blocks += [components.block(one) for one in components.spanning]
+    blocks += [components.block(component) for component in components.spanning]
     for d, local in components.local.items():
         blocks += [regression.transformed_block({d: rows})
                    for rows in (_directions(fits, effect, d) for effect in local.effects)

@@ -72,14 +72,14 @@ class Scan:
                     kept = tuple(c for c in base.candidates if c is not old)
                     scored.append((score, (*kept, EffectCandidate.of(
                         [*(old.components if old else ()), *chosen]))))
-        scored.sort(key=lambda one: -one[0])
+        scored.sort(key=lambda scored: -scored[0])
         return [candidates for _, candidates in scored[:count]]
 
     def offers(self, base: CandidateSet, drive: int | None = None,
                ) -> dict[type[CatalogueEffect], list[Scored]]:
         """Return gains less prior costs of components, by effect; one for each drive or place."""
         components, fit = self.fits.components, base.fit
-        taken = {(one.effect, one.drive) for one in base.blocks}
+        taken = {(component.effect, component.drive) for component in base.blocks}
         drives = tuple(components.local) if drive is None else (drive,)
 
         def of_drive(d: int) -> list[tuple[Component, float]]:
@@ -91,13 +91,13 @@ class Scan:
         offers = [offer for found_there in offered for offer in found_there]
         offers += components.shared_offers(fit) if drive is None else []
         best: dict[Hashable, Scored] = {}
-        for one, gain in offers:
-            place = (one.effect, one.drive)
-            key = (*place, one.effect.places_of(one.names))
-            net = gain - components.component_prior_cost(one).total
+        for component, gain in offers:
+            place = (component.effect, component.drive)
+            key = (*place, component.effect.places_of(component.names))
+            net = gain - components.component_prior_cost(component).total
             if place not in taken and place not in self.refuted and (
                     key not in best or net > best[key][0]):
-                best[key] = (net, one)
+                best[key] = (net, component)
         found: dict[type[CatalogueEffect], list[Scored]] = {}
         for scored in best.values():
             found.setdefault(scored[1].effect, []).append(scored)
@@ -109,7 +109,7 @@ class Scan:
     ) -> tuple[float, list[Component]]:
         """Return the drives on which an effect pays, and the score of all together."""
         prior_costs = self.fits.prior_costs
-        found = sorted(found, key=lambda one: -one[0])
+        found = sorted(found, key=lambda scored: -scored[0])
         if not issubclass(effect, DriveEffect):
             return found[0][0] - prior_costs.of_name(), [found[0][1]]
         there = len(old.components) if old else 0
@@ -118,12 +118,12 @@ class Scan:
         scores = [nets[m] + before - prior_costs.of_drives(there + m + 1)
                   for m in range(len(found))]
         best = int(np.argmax(scores))
-        return float(scores[best]), [one for _, one in found[:best + 1]]
+        return float(scores[best]), [component for _, component in found[:best + 1]]
 
 
 def _by_place(effect: type[CatalogueEffect], found: Sequence[Scored]) -> list[Sequence[Scored]]:
     """Return one list for each link or joint of an effect that is on one, else one of all."""
-    return [[one] for one in found] if effect.is_of_one_place else [found]
+    return [[scored] for scored in found] if effect.is_of_one_place else [found]
 
 
 def with_fast_noise(regression: Regression, fit: JointFit) -> JointFit:

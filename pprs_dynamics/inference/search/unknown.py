@@ -175,9 +175,10 @@ class DrivePatterns:
     @lazy
     def _scanned(self) -> list[_Scanned]:
         scale = len(self.series) * max(self.regression.error_scale[self.d], 1e-12) ** 2
-        return [_Scanned(one.family, Columns(self.regression, {self.d: one.rows}), one.gram,
-                         _Scanned.of_patterns(one.family, one.gram.sum(axis=0)) / scale)
-                for one in self._transformed]
+        return [_Scanned(scanned.family, Columns(self.regression, {self.d: scanned.rows}),
+                         scanned.gram,
+                         _Scanned.of_patterns(scanned.family, scanned.gram.sum(axis=0)) / scale)
+                for scanned in self._transformed]
 
     def release(self) -> None:
         """Let go of products that only further scans would need."""
@@ -248,7 +249,7 @@ class DrivePatterns:
             best = int(np.argmax(gains))
             net = float(gains[best]) - self.prior_cost(scanned.family).total
             scored.append((net, scanned, best))
-        scored.sort(key=lambda one: -one[0])
+        scored.sort(key=lambda scored: -scored[0])
         found = []
         for rank, (score, scanned, best) in enumerate(scored):
             family = scanned.family
@@ -259,7 +260,7 @@ class DrivePatterns:
         line = self.line(fit)
         if line is not None:
             found.append((line, self.regression.gain(fit, line.blocks[0]) - line.prior_cost))
-        return sorted(found, key=lambda one: -one[1])
+        return sorted(found, key=lambda scored: -scored[1])
 
     def line(self, fit: JointFit) -> UnknownCandidate | None:
         """Return the strongest spectral line of what a fit leaves."""
@@ -367,6 +368,6 @@ def best_patterns(libraries: Sequence[DrivePatterns], fit: JointFit, count: int,
     proposed = each(lambda components: components.proposals(fit, count), libraries)
     found = [(candidate, gain, components) for components, offers in zip(
         libraries, proposed, strict=True) for candidate, gain in offers]
-    found.sort(key=lambda one: -one[1])
+    found.sort(key=lambda scored: -scored[1])
     return [components.on_more_drives(components.refined(candidate, fit), fit)
             for candidate, gain, components in found[:count] if gain > 0]
