@@ -322,7 +322,7 @@ def _all_objected(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
     beside = listed([one.name for one in impossible])
     return (*impossible,
             *(replace(effect, objection=f'it was found beside {beside}, which cannot be')
-                           for effect in effects if not effect.is_impossible))
+              for effect in effects if not effect.is_impossible))
 
 
 class _Answer:
@@ -642,7 +642,7 @@ class _Answer:
 
     def _within_model_error(self, absorbed: Absorbed) -> WithinModelError:
         force = self.fits.components.force(absorbed.beside, absorbed.candidate,
-                                        self.design.residuals.measured.shape)
+                                           self.design.residuals.measured.shape)
         return WithinModelError(
             absorbed.candidate.name, self.design.named(absorbed.candidate.drives),
             float(np.sqrt(np.mean(force ** 2, axis=0)).max()), absorbed.of)

@@ -195,7 +195,7 @@ def _best(drive_patterns: DrivePatterns, fit: JointFit, blocks: list[Block], sta
     margin = drive_patterns.prior_costs.decisions.rival_margin
     kin = {winner.family.variable, 'velocity' if winner.family.variable == 'direction' else ''}
     other_variables = [one.family.variable for score, one, _ in scored
-              if score > evidence - margin and one.family.variable not in kin]
+                       if score > evidence - margin and one.family.variable not in kin]
     return winner, found, evidence, tuple(dict.fromkeys(other_variables))
 
 

@@ -245,7 +245,7 @@ def subjects_of(plan: ColumnPlan, prior_costs: PriorCosts) -> list[Explanation]:
     subjects = []
     for term in plan.terms:
         prior_cost = (prior_costs.of_name() + prior_costs.of_component(term.effect, 1)
-                 + len(term.names) * log(prior_costs.samples))
+                      + len(term.names) * log(prior_costs.samples))
         if term.drive is not None:
             prior_cost += prior_costs.of_drives(1)
         subjects.append(_explanation([term.effect.name], [(term, term.values)], plan, prior_cost))

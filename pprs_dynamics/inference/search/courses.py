@@ -201,7 +201,7 @@ def _refined(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
                     if total < best:
                         best, course = total, tried
         fitted = min(fitted, fits.evaluate((*rest, _with_course(candidate, course))),
-                    key=lambda fitted: fitted.cost)
+                     key=lambda fitted: fitted.cost)
     return fitted
 
 
@@ -237,7 +237,7 @@ def _simplest(fits: FittedSets, fitted: CandidateSet, effects: Iterable[EffectCa
         best.setdefault((changing.name, changing.course.kind), other)
     # A change that is a hundredth of a second off costs more than patterns that make it good.
     return _lasting(fits, min([fitted, *(fits.pruned(_refined(fits, offer))
-                                        for offer in list(best.values())[:2 * COURSE_TRIALS])],
+                                         for offer in list(best.values())[:2 * COURSE_TRIALS])],
                               key=lambda fitted: fitted.cost))
 
 
@@ -249,5 +249,5 @@ def _lasting(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
         if course is not None and course.kind == DURING:
             stays = _with_course(candidate, Course(SINCE, course.begin, last))
             fitted = min(fitted, _refined(fits, fits.evaluate((*fitted.without(candidate), stays))),
-                        key=lambda fitted: fitted.cost)
+                         key=lambda fitted: fitted.cost)
     return fitted

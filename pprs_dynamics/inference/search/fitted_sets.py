@@ -171,7 +171,7 @@ class FittedSets:
         """
         beyond = sorted({component.effect.name for component in fitted.blocks
                          if not component.is_within(fitted.coefficients(component),
-                                              units_of(self.design.given, component.drive))})
+                                                    units_of(self.design.given, component.drive))})
         if beyond:
             return f'a value of {", ".join(beyond)} is beyond its bounds'
         for candidate in fitted.unknowns:

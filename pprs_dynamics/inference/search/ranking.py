@@ -307,7 +307,7 @@ class Ranking:
         recording (a spring and a mass along one sine) is one thing on no other motion.
         """
         for component in (component for c in self.reported.effects if c.name in missing
-                    for component in c.components):
+                          for component in c.components):
             theirs = [other.blocks[two].rows[component.drive] for c in other.effects
                       if c.name in instead and c.effect.is_friction for two in c.components
                       if component.drive is not None and two.drive == component.drive]

@@ -120,7 +120,7 @@ class Search:
         new += self._with_constants(new)
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
         shaped = [fitted for fitted in new if any(component.effect.shape or component.centre
-                                                for component in fitted.blocks)]
+                                                  for component in fitted.blocks)]
         for number, fitted in enumerate(sorted(shaped, key=lambda shaped: shaped.cost)):
             # The first effect decides which way the search goes.
             if number < REFINED or len(fitted.candidates) == 1:

@@ -197,7 +197,7 @@ class DrivePatterns:
     def prior_cost(self, family: Family, drives: int = 1) -> CostTerms:
         """Return the prior cost of a pattern of a family: that it is unknown, where, and which."""
         return self.prior_costs.of_pattern(max(len(self._scanned), 1) * family.alike,
-                                      max(len(family.patterns), 1), drives)
+                                           max(len(family.patterns), 1), drives)
 
     def candidate(self, family: Family, pattern: Pattern, rows: Array) -> UnknownCandidate:
         """Return a pattern with its columns (1 or 2, M at the series' samples)."""
