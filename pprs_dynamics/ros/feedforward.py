@@ -75,17 +75,18 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._watchdog: CommandWatchdog | None = None
         parameters = parameters_for(drive_count(self))
         self._settings = ModelParameters(self, parameters, self._use_settings)
-        own = self._settings.own
+        node_values = self._settings.node_values
         for name, assumed in self._settings.model.assumed_at_start.items():
             self.get_logger().info(f'{name} begins anew: {assumed}')
         self._preparation = prepare_beside(self, self._settings.model)
         # Which drives there are, and by which message they are asked for, stays.
-        names = RobotNames.of(self._settings.model, own['frame_id'])
+        names = RobotNames.of(self._settings.model, node_values['frame_id'])
         self._readers = readers_for(self._settings.model, names)
         self._written = command_writer(names)
         self._controller = ControllerWatch(names.joints)
-        self._feedforward = Feedforward(self._settings.model, own)
-        self._timing = Timing(own['max_age'], own['max_ahead'], own['max_duration'])
+        self._feedforward = Feedforward(self._settings.model, node_values)
+        self._timing = Timing(*(node_values[name] for name in (
+            'max_age', 'max_ahead', 'max_duration')))
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0, PASSED_OVER: 0,
                           **dict.fromkeys(REJECTIONS, 0)}
         self._senders = Senders()
@@ -98,7 +99,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             self, {'taken_from_paper': self._settings.taken_from_paper}, self._counters,
             hardware_of(self._settings.model), self._refresh)
         self._refresh()
-        self.begin(own[AUTOSTART.name])
+        self.begin(node_values[AUTOSTART.name])
 
     # --- life -----------------------------------------------------------------------------------
 
@@ -111,12 +112,12 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
 
     def _create_topics(self) -> None:
         # Its memory begins anew.
-        self._feedforward = Feedforward(self._settings.model, self._settings.own)
+        self._feedforward = Feedforward(self._settings.model, self._settings.node_values)
         self._commands = self._publisher(Float64MultiArray, '~/commands')
         self._joint_command = self._publisher(JointState, '~/joint_command')
         self._joint_trajectory = self._publisher(JointTrajectory, '~/joint_trajectory')
         self._watchdog = CommandWatchdog(
-            self, lambda: self._settings.own['command_timeout'], self._on_stale)
+            self, lambda: self._settings.node_values['command_timeout'], self._on_stale)
         self._create_parts()
         # Raw: message objects of a long trajectory would take longer than the model.
         self._inputs = [
@@ -157,9 +158,10 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._inputs, self._publishers_made, self._parts = [], [], {}
 
     def _use_settings(self) -> None:
-        own = self._settings.own
-        self._feedforward.use(self._settings.model, own)
-        self._timing = Timing(own['max_age'], own['max_ahead'], own['max_duration'])
+        node_values = self._settings.node_values
+        self._feedforward.use(self._settings.model, node_values)
+        self._timing = Timing(*(node_values[name] for name in (
+            'max_age', 'max_ahead', 'max_duration')))
         if self._watchdog is not None:
             self._create_parts()
             self._watchdog.rearm()
@@ -173,9 +175,9 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             return
         self._counters['received'] += 1
         self._counters[PASSED_OVER] += passed_over
-        own, now = self._settings.own, self.get_clock().now().nanoseconds
+        node_values, now = self._settings.node_values, self.get_clock().now().nanoseconds
         try:
-            request = reader.read(data, now, own['missing_derivatives'])
+            request = reader.read(data, now, node_values['missing_derivatives'])
             self._timing.check(request, now, _since(info['source_timestamp']))
             answer = self._feedforward.answer(request)
         except PprsError as error:
@@ -208,7 +210,8 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             self._joint_command.publish(self._written.joint_state(
                 request.first_stamp, answer.effort[0], position[0], velocity[0]))
         if self._joint_trajectory.get_subscription_count():
-            drives = self._feedforward.ending_at_rest(answer, self._settings.own['stop_time'])
+            drives = self._feedforward.ending_at_rest(
+                answer, self._settings.node_values['stop_time'])
             self._joint_trajectory.publish(self._written.joint_trajectory(
                 request.start, drives.offsets, drives, drives.effort))
             left = request.start + int(drives.offsets[-1]) - self.get_clock().now().nanoseconds
@@ -220,7 +223,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
                     request.first_stamp, self._feedforward.part(answer, name)))
 
     def _report_condition(self, answer: ForceCommand) -> None:
-        own, report, now = self._settings.own, self._status.report, time.monotonic()
+        node_values, report, now = self._settings.node_values, self._status.report, time.monotonic()
         self._last_unchecked = None if now > self._margins_due else answer
         if self._last_unchecked is None:
             self._margins_due = now + MARGINS_PERIOD
@@ -241,12 +244,12 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
                    f'{self.resolve_topic_name(TRAJECTORY)}: {publishers_of(self, TRAJECTORY)}')
         elif answer.clamped:
             report('WARN', 'CLAMPED', f'{answer.clamp_reason}; the effort was clamped')
-        elif left.singularity is not None and left.singularity < own['warning_margin']:
+        elif left.singularity is not None and left.singularity < node_values['warning_margin']:
             report('WARN', 'NEAR_SINGULAR', f'{left.singularity:.3f} of the way to the limits of '
-                   f'conditioning is left, warning_margin is {own["warning_margin"]:g}')
-        elif left.workspace < own['warning_margin']:
+                   f'conditioning is left, warning_margin is {node_values["warning_margin"]:g}')
+        elif left.workspace < node_values['warning_margin']:
             report('WARN', 'NEAR_WORKSPACE', f'{left.drive} has {left.workspace:.3f} of half its '
-                   f'range left, warning_margin is {own["warning_margin"]:g}')
+                   f'range left, warning_margin is {node_values["warning_margin"]:g}')
         elif self._beyond_curve:
             report('WARN', 'CURVE', self._beyond_curve)
         elif self._lagging:
@@ -275,7 +278,8 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         """Hold a controller that becomes active: by itself it holds a pose without any effort."""
         reference = self._controller.heard(state)
         if (reference is None or self._watchdog is None or self.state != 'active'
-                or self._watchdog.fresh or self._settings.own['timeout_action'] != HOLD_GRAVITY):
+                or self._watchdog.fresh
+                or self._settings.node_values['timeout_action'] != HOLD_GRAVITY):
             return
         try:
             self._hold_trajectory(self._feedforward.hold_at(reference), 0)
@@ -305,7 +309,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
     # --- stale commands -------------------------------------------------------------------------
 
     def _on_stale(self) -> None:
-        own, complaint = self._settings.own, self._complaint
+        node_values, complaint = self._settings.node_values, self._complaint
         done = self._do_timeout_action()
         if complaint:
             self._status.report('ERROR', 'CONTROLLER', f'{complaint}; sent: {done}')
@@ -315,7 +319,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             self._status.report('OK', 'DONE', f'the trajectory has ended at rest: {done}')
             return
         self._counters['stale'] += 1
-        text = f'no valid trajectory for {own["command_timeout"]:g} s: {done}'
+        text = f'no valid trajectory for {node_values["command_timeout"]:g} s: {done}'
         self._status.report('STALE', 'STALE', text)
         self.get_logger().warning(text, throttle_duration_sec=1.0)
 
@@ -338,7 +342,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         left : int
             Until the end of the last trajectory, whose last pose is held [ns].
         """
-        action = self._settings.own['timeout_action']
+        action = self._settings.node_values['timeout_action']
         if action == SILENT:
             return 'nothing goes out, the last command stays in force'
         try:
@@ -371,7 +375,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
                                  time.monotonic())
         before, passed_before, then = self._counted
         self._counted = (accepted, passed, now)
-        threshold = self._settings.own['lag_warning']
+        threshold = self._settings.node_values['lag_warning']
         waits = self._lag.median > threshold or passed - passed_before > accepted - before
         self._status.facts.update(
             state=self.state, assumed=self._settings.model.assumed_at_start,

@@ -167,17 +167,17 @@ class Feedforward:
     Parameters
     ----------
     model : DriveModel or MechanismModel
-    own : mapping
+    node_values : mapping
         The node's parameters, see `parameters_for`.
     clock : callable, optional
         Returns a time that only goes on [s].
     """
 
-    def __init__(self, model: NodeModel, own: Mapping[str, Any],
+    def __init__(self, model: NodeModel, node_values: Mapping[str, Any],
                  clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._leaving: _Leaving | None = None
-        self._scale: float = own['feedforward_scale']
+        self._scale: float = node_values['feedforward_scale']
         self._model: Any = model
         self._memory: ModelState | None = None
         self._remembers = False
@@ -185,14 +185,14 @@ class Feedforward:
         self._before: tuple[NodeModel, ModelState] | None = None
         self._epoch: int | None = None
         self._last: ForceCommand | None = None
-        self.use(model, own)
+        self.use(model, node_values)
 
-    def use(self, model: NodeModel, own: Mapping[str, Any]) -> None:
+    def use(self, model: NodeModel, node_values: Mapping[str, Any]) -> None:
         """Go on with another model; effects that both have keep their memory.
 
         Efforts go over to those of the other one in `ramp_time`.
         """
-        ramp_time, scale = own.get('ramp_time', 0.0), own['feedforward_scale']
+        ramp_time, scale = node_values.get('ramp_time', 0.0), node_values['feedforward_scale']
         if self._last is not None and self._memory is not None and (
                 scale != self._scale or model.fingerprint != self._model.fingerprint):
             self._leaving = _Leaving(
@@ -202,14 +202,14 @@ class Feedforward:
             self._before = self._model, self._memory
         # Made with the next answer, which is refused where an effect fails at it.
         self._memory = None
-        self._model, self._scale = model, own['feedforward_scale']
+        self._model, self._scale = model, node_values['feedforward_scale']
         self._scales = self._scale != 1
-        if own['missing_derivatives'] == SPLINE:
+        if node_values['missing_derivatives'] == SPLINE:
             load_splines()
-        self._clamps = own['limit_policy'] == CLAMP
+        self._clamps = node_values['limit_policy'] == CLAMP
         self._limits: DriveLimits = model.limits
-        if own['effort_limits']:
-            self._limits = model.limits.with_efforts(own['effort_limits'])
+        if node_values['effort_limits']:
+            self._limits = model.limits.with_efforts(node_values['effort_limits'])
 
     @property
     def parts(self) -> list[str]:

@@ -99,9 +99,9 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
             parameters = tuple(replace(one, default=ARM_WINDOW) if one.name == 'window' else one
                                for one in PARAMETERS)
         self._settings = ModelParameters(self, parameters, self._use)
-        own = self._settings.own
+        node_values = self._settings.node_values
         prepare_beside(self, self._settings.model)
-        self._names = RobotNames.of(self._settings.model, own['frame_id'])
+        self._names = RobotNames.of(self._settings.model, node_values['frame_id'])
         self._counters = {'received': 0, 'samples': 0, 'compared': 0, 'gaps': 0, 'bridged': 0,
                           **dict.fromkeys(REJECTIONS, 0)}
         self._share, self._counted = 1.0, (0, 0)
@@ -111,22 +111,22 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._diagnosed = self._settings.model  # the latest window against it
         self._begin_stream()
         self._model_services = ModelServices(
-            self, own['feedforward'],
+            self, node_values['feedforward'],
             lambda: (self._settings.model.fingerprint, self._settings.model.values),
             self._to_adopt, self._forget)
         self._status = StatusReporter(
             self, {}, self._counters, hardware_of(self._settings.model), self._refresh)
         self._refresh()
-        self.begin(own[AUTOSTART.name])
+        self.begin(node_values[AUTOSTART.name])
 
     # --- life -----------------------------------------------------------------------------------
 
     def _begin_stream(self) -> None:
-        own = self._settings.own
+        node_values = self._settings.node_values
         self._comparison = LiveComparison(
-            self._settings.model, own['window'], own['error_span'])
+            self._settings.model, node_values['window'], node_values['error_span'])
         self._states = MeasuredStates(self._names.joints)
-        self._windows = StreamWindows(own['diagnose_every'], own['diagnose_span'])
+        self._windows = StreamWindows(node_values['diagnose_every'], node_values['diagnose_span'])
         self._begins_anew, self._cannot_begin, self._changed = False, False, ''
         self._origin: int | None = None
         self._latest: tuple[int, Array] | None = None
@@ -135,7 +135,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         """Compare what comes from now on."""
         self._begin_stream()
         self.get_logger().info(
-            f'answers lag by half the window of {self._settings.own["window"]:g} s; ready')
+            f'answers lag by half the window of {self._settings.node_values["window"]:g} s; ready')
         return super().on_activate(state)
 
     def _last_word(self) -> None:
@@ -143,7 +143,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._worker.close()
 
     def _create_topics(self) -> None:
-        own = self._settings.own
+        node_values = self._settings.node_values
         self._model_effort = self._publisher(JointState, '~/model_effort')
         self._residual = self._publisher(JointState, '~/residual')
         self._error = self._publisher(Float64MultiArray, '~/error')
@@ -151,8 +151,8 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._tf = self._publisher(TFMessage, '/tf') if TFMessage else None
         self._input = subscription(self, JointState, 'joint_states', self._on_state, raw=True,
                                    profile=MEASURED)
-        self._clocks = [steady_timer(self, 1.0 / own['update_rate'], self._compare)]
-        if own['diagnose_every']:
+        self._clocks = [steady_timer(self, 1.0 / node_values['update_rate'], self._compare)]
+        if node_values['diagnose_every']:
             self._diagnosis = self._publisher(String, '~/diagnosis', LATCHED)
             self._clocks.append(steady_timer(self, LOOK, self._diagnose))
 
@@ -289,7 +289,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         if not self._worker.busy and (samples := self._windows.take()) is not None:
             self._diagnosed = model = self._settings.model
             self._worker.submit(model.values, model.source, samples,
-                                tuple(self._settings.own['diagnose_since']))
+                                tuple(self._settings.node_values['diagnose_since']))
 
     def _to_adopt(self) -> dict[str, Any]:
         """Return what a person may adopt now, or raise PprsError."""

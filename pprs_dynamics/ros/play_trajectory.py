@@ -29,7 +29,7 @@ from pprs_dynamics.ros.node.clocks import MISSING_CLOCK, clock_is_missing, stead
 from pprs_dynamics.ros.node.parameters import (
     current_values,
     declare_model,
-    declare_own,
+    declare_node_parameters,
     node_parameter,
     overrides,
     refuse_unknown,
@@ -79,7 +79,7 @@ class PlayTrajectoryNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__('play_trajectory', **options)
         joints = is_mechanism(overrides(self))
-        values = declare_own(self, OF_JOINTS if joints else PARAMETERS)
+        values = declare_node_parameters(self, OF_JOINTS if joints else PARAMETERS)
         self._rate, self._points, self._repeat = values['rate'], values['points'], values['repeat']
         self._ahead = round(values['ahead'] * conversions.NANOSECONDS)
         self._beats = Beats(conversions.NANOSECONDS / self._rate)

@@ -30,7 +30,7 @@ from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
     current_values,
     declare_model,
-    declare_own,
+    declare_node_parameters,
     node_parameter,
     overrides,
 )
@@ -94,17 +94,19 @@ class SimulatedRobotNode(ExplainsRefusals):
     def __init__(self, **options: Any) -> None:
         super().__init__('simulated_robot', allow_undeclared_parameters=True, **options)
         of_joints = is_mechanism(overrides(self))
-        own = declare_own(self, OF_JOINTS if of_joints else PARAMETERS)
+        node_values = declare_node_parameters(self, OF_JOINTS if of_joints else PARAMETERS)
         declare_model(self)
-        values = {name: value for name, value in current_values(self).items() if name not in own}
+        values = {name: value for name, value in current_values(self).items()
+                  if name not in node_values}
         self._model = build_model(values)
         self._names = RobotNames.of(self._model)
-        self._use_effort = own['use_effort']
-        hidden = Hidden.of(own) if not of_joints else None
-        self._robot = (_mechanism(self._model, own) if isinstance(self._model, MechanismModel)
-                       else _platform(self._model, own, hidden.effects if hidden else ()))
+        self._use_effort = node_values['use_effort']
+        hidden = Hidden.of(node_values) if not of_joints else None
+        self._robot = (_mechanism(self._model, node_values)
+                       if isinstance(self._model, MechanismModel) else
+                       _platform(self._model, node_values, hidden.effects if hidden else ()))
         self._queue = SetpointQueue(self._robot.control)
-        self._period = round(conversions.NANOSECONDS / own['rate'])
+        self._period = round(conversions.NANOSECONDS / node_values['rate'])
         self._counters = {'cycles': 0, 'late': 0, 'commands': 0, 'refused': 0}
         self._late_before, self._cycles_before = 0, 0
         # What is hidden is told to nobody who only listens: the log is the robot's own.
@@ -115,7 +117,7 @@ class SimulatedRobotNode(ExplainsRefusals):
                                   (Float64MultiArray, '~/commands', self._take_efforts)):
             subscription(self, kind, topic, partial(self._on_command, take), raw=True)
         self.get_logger().info(
-            f'{self._model.title}, {own["rate"]:g} Hz, {_loop_in_words(own)}, '
+            f'{self._model.title}, {node_values["rate"]:g} Hz, {_loop_in_words(node_values)}, '
             f'hidden effects: {in_words(self._robot.hidden)}; holding at home')
         self._robot.tick()
         self._start = self.get_clock().now().nanoseconds
@@ -202,35 +204,43 @@ class SimulatedRobotNode(ExplainsRefusals):
         return (self.get_clock().now().nanoseconds - self._start) / conversions.NANOSECONDS
 
 
-def _loop_in_words(own: dict[str, Any]) -> str:
-    if 'bandwidth' in own:
-        return f'PD loop of {own["bandwidth"]:g} Hz and a damping ratio of {own["damping_ratio"]:g}'
-    return f'PD gains {own["stiffness"]:g} N/m and {own["damping"]:g} N s/m'
+def _loop_in_words(node_values: dict[str, Any]) -> str:
+    if 'bandwidth' in node_values:
+        return (f'PD loop of {node_values["bandwidth"]:g} Hz and a damping ratio of '
+                f'{node_values["damping_ratio"]:g}')
+    return f'PD gains {node_values["stiffness"]:g} N/m and {node_values["damping"]:g} N s/m'
 
 
-def _platform(model: ForceModel, own: dict[str, Any], effects: Sequence[HiddenEffect],
+def _platform(model: ForceModel, node_values: dict[str, Any], effects: Sequence[HiddenEffect],
               ) -> SimulatedRobot:
-    if 2000 % own['rate']:
-        raise ModelError('rate', own['rate'], PARAMETERS[0].rule)
-    return SimulatedRobot(
-        model.values, effects, seed=own['seed'], rate=own['rate'],
-        control=ControlSettings(own['stiffness'], own['damping'], **_behaviour(own)),
-        sensors=SensorSettings.with_effort_noise(own['effort_noise'], own['encoder_resolution']))
+    rate = node_values['rate']
+    if 2000 % rate:
+        raise ModelError('rate', rate, PARAMETERS[0].rule)
+    control = ControlSettings(node_values['stiffness'], node_values['damping'],
+                              **_behaviour(node_values))
+    return SimulatedRobot(model.values, effects, seed=node_values['seed'], rate=rate,
+                          control=control, sensors=_sensors(node_values))
 
 
-def _mechanism(model: MechanismModel, own: dict[str, Any]) -> SimulatedRobot:
-    plant = MechanismPlant(model, own['hidden_effects'], own['seed'], own['hidden_scale'],
-                           own['rate'])
-    return SimulatedRobot(
-        plant, seed=own['seed'], rate=own['rate'],
-        control=plant.gains(own['bandwidth'], own['damping_ratio'], **_behaviour(own)),
-        sensors=SensorSettings.with_effort_noise(own['effort_noise'], own['encoder_resolution']))
+def _mechanism(model: MechanismModel, node_values: dict[str, Any]) -> SimulatedRobot:
+    seed, rate = node_values['seed'], node_values['rate']
+    plant = MechanismPlant(model, node_values['hidden_effects'], seed, node_values['hidden_scale'],
+                           rate)
+    control = plant.gains(node_values['bandwidth'], node_values['damping_ratio'],
+                          **_behaviour(node_values))
+    return SimulatedRobot(plant, seed=seed, rate=rate, control=control,
+                          sensors=_sensors(node_values))
 
 
-def _behaviour(own: dict[str, Any]) -> dict[str, Any]:
-    return {'gravity_compensation': not own['use_effort'],
-            'command_timeout': own['command_timeout'] or np.inf,
-            'actuation_delay': own['actuation_delay']}
+def _sensors(node_values: dict[str, Any]) -> SensorSettings:
+    return SensorSettings.with_effort_noise(
+        node_values['effort_noise'], node_values['encoder_resolution'])
+
+
+def _behaviour(node_values: dict[str, Any]) -> dict[str, Any]:
+    return {'gravity_compensation': not node_values['use_effort'],
+            'command_timeout': node_values['command_timeout'] or np.inf,
+            'actuation_delay': node_values['actuation_delay']}
 
 
 @dataclass(frozen=True)
@@ -293,8 +303,8 @@ class HiddenParameters(Followed[tuple[dict[str, Any], Hidden | None]]):
             if name not in (*changeable, *OF_ROS) and before.get(name) != after.get(name):
                 raise ModelError(name, after.get(name), 'stay as it was at the start: of a running '
                                  f'robot only {", ".join(changeable) or "the clock"} change')
-        own = {one.name: one.check(after.get(one.name)) for one in self._declared}
-        return own, None if self._hidden is None else Hidden.of(own, self._hidden)
+        node_values = {one.name: one.check(after.get(one.name)) for one in self._declared}
+        return node_values, None if self._hidden is None else Hidden.of(node_values, self._hidden)
 
     def _apply(self, checked: tuple[dict[str, Any], Hidden | None],
                changes: Iterable[Parameter]) -> None:

@@ -29,7 +29,6 @@ from rclpy.serialization import serialize_message
 from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.preparation import prepare
 from pprs_dynamics.ros.force_command import Feedforward, parameters_for
 from pprs_dynamics.ros.messages import conversions
@@ -79,24 +78,24 @@ class TrajectoryProxyNode(ExplainsRefusals):
             replace(one, default=SPLINE) if one.name == 'missing_derivatives' else one
             for one in parameters_for(drive_count(self)) if one.name in SHARED))
         self._settings = ModelParameters(self, parameters, lambda: None)
-        own = self._settings.own
+        node_values = self._settings.node_values
         prepare(self._settings.model)
         self._counters = {'received': 0, 'passed_on': 0, 'refused': 0}
-        self._status = StatusReporter(self, {'action': own['action']}, self._counters,
+        self._status = StatusReporter(self, {'action': node_values['action']}, self._counters,
                                       hardware_of(self._settings.model))
-        self._relay = GoalRelay(self, FollowJointTrajectory, own['action'],
-                                lambda: self._settings.own['controller_timeout'])
+        self._relay = GoalRelay(self, FollowJointTrajectory, node_values['action'],
+                                lambda: self._settings.node_values['controller_timeout'])
         self._server = ActionServer(
             self, FollowJointTrajectory, '~/follow_joint_trajectory', self._execute,
             cancel_callback=self._cancel)
         self._joints = RobotNames.of(self._settings.model).joints
         self._controller, self._hold_is_due = ControllerWatch(self._joints), False
-        where = own['action'].rpartition('/')[0]
+        where = node_values['action'].rpartition('/')[0]
         self._speed_scaling = 1.0  # the largest that the controller has told
         self._hold = publisher(self, JointTrajectory, f'{where}/joint_trajectory')
         subscription(self, JointTrajectoryControllerState, f'{where}/{STATE_TOPIC}',
                      self._on_controller)
-        self._status.report('OK', 'WAITING', f'goals go to {own["action"]}')
+        self._status.report('OK', 'WAITING', f'goals go to {node_values["action"]}')
 
     async def _execute(self, handle: Any) -> Any:
         self._counters['received'] += 1
@@ -154,7 +153,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
         self._hold_is_due = False
         model = self._settings.model
         try:
-            held = Feedforward(model, self._settings.own).hold_at(
+            held = Feedforward(model, self._settings.node_values).hold_at(
                 np.array([values[joint] for joint in self._joints]))
         except (PprsError, KeyError) as error:
             self.get_logger().warning(f'the controller holds without gravity: {error}')
@@ -196,8 +195,8 @@ class TrajectoryProxyNode(ExplainsRefusals):
         PprsError
             Where it breaks a rule.
         """
-        model, own = self._settings.model, self._settings.own
-        feedforward = Feedforward(model, own)
+        model, node_values = self._settings.model, self._settings.node_values
+        feedforward = Feedforward(model, node_values)
         answer = feedforward.answer(self._request(model, goal))
         velocity = answer.forces.drive_motion[1]
         is_still = np.abs(velocity[-1]).max() <= STILL  # else it is refused
@@ -212,10 +211,10 @@ class TrajectoryProxyNode(ExplainsRefusals):
 
     def _request(self, model: Any, goal: Any) -> TrajectoryRequest:
         now = self.get_clock().now().nanoseconds
-        missing = self._settings.own['missing_derivatives']
+        missing = self._settings.node_values['missing_derivatives']
         if missing == SPLINE:
             _end_at_rest(goal)
-        if not isinstance(model, DriveModel):
+        if model.moves_joints:
             return reader_for(model).read(serialize_message(goal.trajectory), now, missing)
         if not goal.trajectory.points:
             return reader_for(model).read(

@@ -142,6 +142,10 @@ class MechanismPlant:
         self._pushes.append((j, name, drawn, moment))
         return truth(name, [model.drives[j]], drawn, FORMS[name].form)
 
+    def use_effects(self, effects: Sequence[Any]) -> None:
+        """Refuse: what is hidden in a mechanism stays."""
+        raise TypeError('what is hidden in a mechanism stays')
+
     def gains(self, frequency: float, damping: float, **settings: Any) -> ControlSettings:
         """Return a PD loop of a frequency [Hz] and a damping ratio for what the drives move."""
         rate = 2 * np.pi * frequency

@@ -184,6 +184,11 @@ class Plant:
         self.effects = tuple(effects)
         return chains
 
+    @property
+    def largest(self) -> None:
+        """Largest efforts of its motion: not known, sensors go by their own."""
+        return None
+
     def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
         """Have other hidden effects from now on; the motion goes on, and what stays remembers."""
         before = self.chains.qpos.copy()

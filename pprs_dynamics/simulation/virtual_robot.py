@@ -69,7 +69,7 @@ class SimulatedRobot:
             raise ValueError(f'{rate} Hz is no whole number of time steps of {step} s')
         self.sensors = Sensors(
             sensors or SensorSettings(), step, np.random.default_rng(seed), effects,
-            values.largest if isinstance(values, MechanismPlant) else None)
+            self.plant.largest)
         self.control = DriveControl(self.plant.limits, self.plant.holding,
                                     control or ControlSettings(), step, self.sensors.smoothing)
         self._ticks = 0
@@ -109,8 +109,6 @@ class SimulatedRobot:
 
     def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
         """Have other hidden effects from now on; the motion goes on, and what stays remembers."""
-        if isinstance(self.plant, MechanismPlant):
-            raise TypeError('what is hidden in a mechanism stays')
         self.plant.use_effects(effects)
         self.sensors.use_effects(effects)
 

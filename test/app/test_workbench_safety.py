@@ -316,7 +316,7 @@ def test_changes_are_pushed(bench: Workbench) -> None:
         read = b''
         while b'data: 0' not in read:
             read += connection.recv(4096)
-        count = bench.settled()['count']
+        count = bench.settled()['version']
         bench.post('/api/tick', effect='payload_mass', revision=bench.screen()['revision'])
         while not any(int(number) > count for number in re.findall(rb'data: (\d+)\n', read)):
             read += connection.recv(4096)

@@ -111,3 +111,11 @@ def test_the_reference_is_told_when_a_controller_appears_and_only_then() -> None
     told = [k for k, each in enumerate(found) if each is not None]
     assert told == [0, 100]
     assert found[0].tolist() == [0.3, 0.4]
+
+
+@pytest.mark.parametrize(('scale', 'is_told'), [(1.1, False), (1.6, True)])
+def test_one_that_goes_another_way_is_told_by_how_far_it_is_off_over_the_way(
+    scale: float, is_told: bool,
+) -> None:
+    cell = Cell()
+    assert bool(cell.run(3.0, lambda t: scale * cell.path(t))[-1]) == is_told

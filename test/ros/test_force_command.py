@@ -19,6 +19,11 @@ from pprs_dynamics.ros.messages.trajectory_request import TrajectoryRequest
 OWN = {'feedforward_scale': 1.0, 'effort_limits': (), 'limit_policy': 'reject',
        'missing_derivatives': 'reject', 'ramp_time': 0.0}
 MODEL = DriveModel.load()
+REMEMBERS = build_model({**MODEL.values, 'effects.active': ['hysteresis', 'friction_drift'],
+                         **{f'effects.hysteresis.slide_1.{key}': value for key, value in {
+                             'force': 3.0, 'distance': 0.005}.items()},
+                         **{f'effects.friction_drift.slide_1.{key}': value for key, value in {
+                             'force': 5.0, 'time': 0.1}.items()}})
 HEAVY = build_model({**MODEL.values, 'masses.payload': 3.0})
 STEP = 10_000_000  # [ns]
 
@@ -150,6 +155,28 @@ def test_a_stop_never_leads_beyond_a_stroke() -> None:
     q = node.ending_at_rest(answer, 2.0).drive_motion[0]
     lower, upper = narrow.limits.strokes
     assert ((q[-1] >= lower) & (q[-1] <= upper)).all()
+
+
+def test_of_a_piece_the_first_point_is_remembered_and_what_is_foreseen_is_not() -> None:
+    """Pieces that overlap, as a planner sends them, come to what their first points alone do."""
+    pieces, points = Feedforward(REMEMBERS, OWN), Feedforward(REMEMBERS, OWN)
+    start = 5_000_000_000
+    for k in range(40):
+        begin = start + k * STEP
+        piece, point = (TrajectoryRequest(request(1.0 + 0.01 * k, count).motion, begin,
+                                          STEP * np.arange(count)) for count in (6, 1))
+        np.testing.assert_array_equal(pieces.answer(piece).effort[:1],
+                                      points.answer(point).effort)
+
+
+def test_what_is_remembered_goes_by_the_time_since_the_first_message() -> None:
+    """The same, whenever the node was started, and as one recording of all of it."""
+    for start in (0, 5_000_000_000):
+        node = Feedforward(REMEMBERS, OWN)
+        found = [node.answer(TrajectoryRequest(request(1.0 + 0.01 * k).motion, start + k * STEP,
+                                               np.array([0]))).effort[0] for k in range(40)]
+        motion = request(1.0, 40).motion.with_time(0.01 * np.arange(40))
+        np.testing.assert_allclose(found, REMEMBERS.drive_forces(motion).total, atol=1e-9)
 
 
 @pytest.mark.parametrize('moment', [0.0, 1.3, 3.0])

@@ -110,7 +110,7 @@ def test_poses_of_the_tool_are_answered_or_refused_as_those_of_a_platform() -> N
             assert node.counters[code] == counted + 1
             assert len(node.commands) == before
         near = Rotation.from_rotvec([[0.0, 0.0, 1.4]]).as_quat()
-        node.node._settings.own['warning_margin'] = 0.99
+        node.node._settings.node_values['warning_margin'] = 0.99
         node.node._margins_due = 0.0
         node.send(message_of(PlatformMotion.at_rest(at_home, near)))
         assert node.wait_for_status(code='NEAR_SINGULAR')['singularity_margin'] < 0.99

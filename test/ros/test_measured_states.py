@@ -153,3 +153,13 @@ def test_numbers_that_no_drive_has_are_refused_or_no_measurement(robot: Robot) -
                           '1e+09']
     robot.send(JOINTS, PERIOD, effort=[1.0, -1e300, float('inf')])
     np.testing.assert_array_equal(robot.read[0].effort, [1.0, np.nan, np.nan])
+
+
+def test_a_gap_is_one_also_in_a_stream_that_is_ahead_of_the_others(robot: Robot) -> None:
+    robot.send(['a'], -PERIOD)
+    for k in range(40):
+        if not 20 < k < 26:
+            robot.send(['b', 'c'], k * PERIOD)
+    for k in range(39):
+        robot.send(['a'], k * PERIOD)
+    robot.check([k * PERIOD for k in range(39) if not 20 < k < 26])

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from pprs_dynamics.ros.node.senders import MOST, TURNS, Senders
+from pprs_dynamics.ros.node.senders import MOST, TURNS, Senders, namesakes
 
 
 class Clock:
@@ -56,3 +56,24 @@ def test_what_is_remembered_of_publishers_is_bounded() -> None:
     for k in range(10 * MOST):
         senders.passed_over(info(str(k).encode(), 1))
     assert len(senders._sequence) <= MOST
+
+
+def test_others_of_its_name_are_counted_also_before_the_graph_knows_it() -> None:
+    class Graph:
+        def __init__(self) -> None:
+            self.nodes: list[tuple[str, str]] = []
+
+        def get_name(self) -> str:
+            return 'feedforward'
+
+        def get_namespace(self) -> str:
+            return '/left'
+
+        def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
+            return self.nodes
+
+    node: Any = Graph()
+    others = [('feedforward', '/right'), ('monitor', '/left')]
+    for alike, expected in ((0, 0), (1, 0), (2, 1), (3, 2)):
+        node.nodes = others + [('feedforward', '/left')] * alike
+        assert namesakes(node) == expected

@@ -53,3 +53,14 @@ def test_a_setpoint_is_told_at_its_time_with_the_one_after_it() -> None:
     assert queue.advance(1.6, lag=0.25)
     assert drives.told == [(0.75, first, second), (1.25, second, None)]
     assert drives.taken == [1.1 - 0.25, 1.6 - 0.25]  # late by 0.1 s each
+
+
+def test_an_earlier_setpoint_takes_the_place_of_what_waits_for_later_and_of_nothing_else() -> None:
+    drives: Any = Drives()
+    queue, first, second, third = SetpointQueue(drives), at(0.1), at(0.2), at(0.3)
+    queue.add(1.0, first)
+    queue.add(2.0, second)
+    queue.add(1.5, third)
+    for now in (1.0, 1.5, 2.0, 2.5):
+        assert queue.advance(now)
+    assert drives.told == [(1.0, first, third), (1.5, third, None)]

@@ -27,7 +27,6 @@ from pprs_dynamics.inference.experiments.next_experiment import next_experiment 
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 if TYPE_CHECKING:
@@ -160,18 +159,16 @@ def next_experiment(
     found = inputs.model
     share_done = stage(progress, 'designing')
     designed: Experiment | ArmExcitation
-    kind = ArmLimits if isinstance(found, MechanismModel) else MotionLimits
+    kind = ArmLimits if found.moves_joints else MotionLimits
     if limits is not None and not isinstance(limits, kind):
         raise InputError(f'limits are {type(limits).__name__}, must be {kind.__name__} for '
                          f'{found.title}')
     if isinstance(found, MechanismModel) and purpose == 'commission':
         designed = excite_arm(found, limits if isinstance(limits, ArmLimits) else ArmLimits(),
                               duration, seed, share_done)
-    elif isinstance(found, (MechanismModel, DriveModel)):
+    else:
         designed = design(found, inputs.fitted, purpose, limits, duration, seed, noise,
                           share_done)
-    else:
-        raise InputError(f'no motions are designed for {found.title}')
     count = int(duration * rate + 1e-9) + 1
     return ExperimentResult(inputs, designed, designed.motion(np.arange(count) / rate), purpose,
                             seed, rate)

@@ -89,7 +89,6 @@ class SimulationResult(Result):
         """Return the page of `pprs simulate --report`: the moving robot."""
         from pprs_dynamics.app.report.robot_figure import robot_page
 
-        assert isinstance(self.model, (DriveModel, MechanismModel))
         return robot_page(self.model, self.motion, 'The simulated motion')
 
     def table(self) -> DataFrame:

@@ -109,19 +109,19 @@ export class Client {
     return this.chain;
   }
 
-  /* The server told how many changes there were; an answer to one of ours has them as well. */
-  hear(count) {
-    this.heard = Math.max(this.heard, count);
+  /* The server told its version, which an answer to a change of ours may have as well. */
+  hear(version) {
+    this.heard = Math.max(this.heard, version);
     return this.refresh();
   }
 
   async refresh() {
     if (this.isRefreshing) return;
     this.isRefreshing = true;
-    while (!this.underway && (!this.state || this.heard > this.state.count)) {
+    while (!this.underway && (!this.state || this.heard > this.state.version)) {
       try {
         const found = await this.ask(`screen?since=${this.state?.version ?? -1}`);
-        if (this.heard === Infinity) this.heard = found.header.count;
+        if (this.heard === Infinity) this.heard = found.header.version;
         this.take(found);
       } catch (error) {
         this.tell(error.status ? error.message

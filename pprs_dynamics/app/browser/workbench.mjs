@@ -57,7 +57,7 @@ const show = (last, state, arrays) => {
     return;
   }
   if (arrays.now) latest = rowsOf(arrays.now);
-  if (state.generation !== last?.generation || last.is_empty) begin(state.generation);
+  if (state.fitted_since !== last?.fitted_since) begin(state.fitted_since);
   else if (arrays.now && curves.before) curves.setNow(latest);
   showVerdict(state);
   showJobs(Object.values(state.jobs), (kind) => server.run('cancel', {kind}));
@@ -84,10 +84,10 @@ const show = (last, state, arrays) => {
 };
 
 /* Take the times and the error before, which a change of model or recordings makes others. */
-const begin = async (generation) => {
+const begin = async (since) => {
   curves.before = null;
   const {header, arrays} = await server.ask('curves');
-  if (generation !== server.state.generation) return; // overtaken
+  if (since !== server.state.fitted_since) return; // overtaken
   const {seconds, rest} = arrays;
   const time = Float64Array.from(seconds.values, (s, k) => s + rest.values[k]);
   curves.use(header.drives, header.drives.map(() => time), arrays.segment.values,

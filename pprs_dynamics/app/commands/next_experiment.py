@@ -31,7 +31,6 @@ from pprs_dynamics.inference.experiments.next_experiment import (
     check_purpose,
 )
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 LEAST_NOISE = 1e-6  # [N]; what is finer no sensor of forces resolves
 FASTEST = 1e4  # [Hz]; beyond what any controller takes, and a file of 1.2 million poses at most
@@ -87,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
             inputs.model, inputs, purpose=options.purpose, limits=_limits(options, inputs.model),
             duration=options.duration, seed=options.seed, noise=options.noise,
             rate=options.rate, progress=progress)
-    command = '' if isinstance(inputs.model, MechanismModel) else shlex.join([
+    command = '' if inputs.model.moves_joints else shlex.join([
         'ros2', 'run', 'pprs_dynamics', 'play_trajectory', '--ros-args', '-p', 'source:=csv',
         '-p', f'file:={options.output}', '-p', f'rate:={options.rate}', '-p', 'lead_in:=3.0'])
     tell(result, options, screen, lambda: result.page(command), output=options.output)
@@ -101,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _limits(options: argparse.Namespace, model: ForceModel) -> MotionLimits | ArmLimits:
-    if isinstance(model, MechanismModel):
+    if model.moves_joints:
         return ArmLimits(options.velocity or ArmLimits.velocity, options.acceleration,
                          options.margin)
     return MotionLimits(options.velocity or LIMITS.velocity, options.acceleration, options.tilt,

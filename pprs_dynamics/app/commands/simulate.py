@@ -27,7 +27,6 @@ from pprs_dynamics.physics.effects.former_names import FORMER
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.simulation.arm_forms import NAMES as ARM_EFFECTS
@@ -75,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     model = load_model(find_file(options.model))
-    motion = None if isinstance(model, MechanismModel) else _motion(options)
+    motion = None if model.moves_joints else _motion(options)
     with staged_bar(screen) as progress:
         result = simulate(
             model, options.effect, seed=options.seed, scale=options.scale, motion=motion,

@@ -19,7 +19,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.skeleton import DRIVE, GUIDE, LINK, Line, Skeleton
 
 FRAMES = 60
@@ -28,13 +28,13 @@ SLIDE, LIFT, PLATFORM, PATH, ROD = '#0072B2', '#009E73', '#E69F00', '#999999', '
 WEAKNESS = [[0.0, '#B2182B'], [0.35, '#F4A582'], [0.7, '#4393C3'], [1.0, '#053061']]
 
 
-def animate_robot(model: DriveModel | MechanismModel, motion: PlatformMotion | JointMotion,
+def animate_robot(model: ForceModel, motion: PlatformMotion | JointMotion,
                   title: str) -> Any:
     """Return a Plotly figure of the robot moving, with a play button and a slider.
 
     Parameters
     ----------
-    model : DriveModel or MechanismModel
+    model : ForceModel
     motion : PlatformMotion or JointMotion
         Thinned to 60 poses.
     title : str
@@ -70,7 +70,7 @@ def animate_robot(model: DriveModel | MechanismModel, motion: PlatformMotion | J
     return figure
 
 
-def robot_page(model: DriveModel | MechanismModel, motion: PlatformMotion | JointMotion, title: str,
+def robot_page(model: ForceModel, motion: PlatformMotion | JointMotion, title: str,
                ) -> Page:
     """Return the animation as a page."""
     page = Page(title)
@@ -78,7 +78,7 @@ def robot_page(model: DriveModel | MechanismModel, motion: PlatformMotion | Join
     return page
 
 
-def _weakness(model: DriveModel | MechanismModel, motion: Any) -> tuple[Array | None, list[str]]:
+def _weakness(model: ForceModel, motion: Any) -> tuple[Array | None, list[str]]:
     """Return abs(sin u_i), (F, 3), of the 3-PPRS, and how near each pose is to a singular one."""
     if isinstance(model, DriveModel):
         sines = np.abs(model.mechanism(motion).chains.sin_u)

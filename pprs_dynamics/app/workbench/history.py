@@ -22,13 +22,13 @@ class Moment:
     ----------
     model : ForceModel
     ticks : mapping of str to Tick
-    generation : int
-        Of the fits that the ticks belong to.
+    fitted_since : int
+        Revision at which the fits began that the ticks belong to.
     """
 
     model: ForceModel = field(repr=False)
     ticks: Mapping[str, Tick]
-    generation: int
+    fitted_since: int
 
     def is_as(self, other: Moment) -> bool:
         """Return whether both are the same for somebody who looks at them."""

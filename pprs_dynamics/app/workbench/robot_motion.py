@@ -11,8 +11,6 @@ import numpy as np
 
 from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.skeleton import Skeleton
 
 MOST_POSES = 600
@@ -40,7 +38,6 @@ class RobotMotion:
 def robot_motion(session: Session) -> RobotMotion:
     """Return the poses of all recordings, one after the other."""
     model = session.model
-    assert isinstance(model, (DriveModel, MechanismModel))
     chosen = np.unique(np.linspace(0, len(session.data) - 1, MOST_POSES).astype(int))
     found: list[Skeleton] = []
     first = 0

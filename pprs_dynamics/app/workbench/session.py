@@ -37,10 +37,8 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.ledger import Step, read_steps, without_last_step
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.system.numbers import finite
@@ -78,10 +76,8 @@ class Session:
         What somebody did, for `back` and `forward`.
     revision : int
         Counts what somebody changed.
-    generation : int
-        Counts the fits; ticks belong to one of them.
-    version : int
-        Counts every change of what is shown.
+    fitted_since : int
+        Revision at which the fits began that ticks belong to.
 
     Raises
     ------
@@ -101,7 +97,7 @@ class Session:
         self.last_adoption: Adoption | None = None
         self.experiment: DesignedMotion | None = None
         self.jobs: dict[str, Job[Any]] = {}
-        self.revision = self.version = self.generation = 0
+        self.revision = 0
         self.history = History()
         self._lock, self._settling, self._reading = RLock(), RLock(), Lock()
         self._listeners: list[Callable[[], None]] = []
@@ -195,7 +191,7 @@ class Session:
             self.fits = fits
             self.noise_floors: dict[str, float] | None = None
             self.revision += 1
-            self.generation += 1
+            self.fitted_since = self.revision
             self.view_state = view_state.without_ticks(fits, self.revision)
             for name, tick in (ticks or {}).items():
                 with suppress(PprsError):  # what cannot act under this model is ticked no more
@@ -274,7 +270,6 @@ class Session:
     def notify(self) -> None:
         """Tell everybody who subscribed that something changed."""
         with self._lock:
-            self.version += 1
             listeners = list(self._listeners)
         for listener in listeners:
             listener()
@@ -457,7 +452,7 @@ class Session:
                              'was changed elsewhere')
 
     def _moment(self) -> Moment:
-        return Moment(self.model, self.view_state.ticks, self.generation)
+        return Moment(self.model, self.view_state.ticks, self.fitted_since)
 
     def back(self, revision: int | None = None) -> ViewState:
         """Take back what was done last: a tick, a value, an adoption, a step of the ledger.
@@ -482,7 +477,7 @@ class Session:
             moment = to(self._moment())
             if moment is None:
                 raise SessionError(none)
-            if moment.generation == self.generation:
+            if moment.fitted_since == self.fitted_since:
                 return self._linear(dict(moment.ticks))
             self.diagnosis = self.diagnosis if moment.model is self.model else None
             fits = (self.fits if moment.model is self.model
@@ -600,7 +595,6 @@ class Session:
             For a model of another mechanism, or a duration that no design is made for.
         """
         model = self.model
-        assert isinstance(model, (DriveModel, MechanismModel))
         check_duration(duration)
 
         def work(report: Callable[[float], None]) -> DesignedMotion:
@@ -675,7 +669,7 @@ class Session:
             view, diagnosis, adoption = self.view_state, self.diagnosis, self.last_adoption
             called_for = {one.name for one in diagnosis.effects} if diagnosis else None
             return {
-                'revision': self.revision, 'version': self.version, 'stage': view.stage,
+                'revision': self.revision, 'fitted_since': self.fitted_since, 'stage': view.stage,
                 'is_settled': view.is_settled, 'is_approximate': view.is_approximate,
                 'departure': finite(view.departure), 'notice': view.notice,
                 'drives': list(self.drives), 'noise_is_guess': self.noise_floors is None,

@@ -110,7 +110,7 @@ class SinceReference:
         """Return it for a design beside a reference."""
         assert design.carried is not None
         left = design.residuals.error
-        whole = left + design.carried.mean
+        whole = left + design.carried.shown(design.residuals)
         before, after = (np.nansum(one ** 2, axis=0) for one in (whole, left))
         explained = {drive: max(0.0, 1 - float(after[d] / before[d]))
                      for d, drive in enumerate(design.drives) if before[d] > 0}

@@ -32,7 +32,6 @@ from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel, Forces
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 PURPOSES = ('separate', 'commission')
 SURE = 0.9  # probability from which a design counts as separating
@@ -128,7 +127,7 @@ class Experiment:
         Times [s] -> PlatformMotion, or JointMotion of an arm.
     forces : callable
         Times [s] -> Forces.
-    model : DriveModel or MechanismModel
+    model : ForceModel
     """
 
     kind: str
@@ -170,7 +169,7 @@ class Experiment:
         """Mass that the tool should carry more in a second recording [kg]; None: no need."""
         if not self.told_by_load:
             return None
-        return float(f'{LOAD_SHARE * _moved_mass(self.model):.1g}')
+        return float(f'{LOAD_SHARE * self.model.moved_mass:.1g}')
 
     @property
     def text(self) -> str:
@@ -213,13 +212,6 @@ class Experiment:
                 'limits': self.limits, 'duration': self.duration}
 
 
-def _moved_mass(model: ForceModel) -> float:
-    """Return the mass of what a robot moves [kg]."""
-    if isinstance(model, MechanismModel):
-        return float(model.robot.masses.sum())
-    return float(model.values['masses.platform'] + model.values['masses.payload'])
-
-
 def _listed(pairs: Sequence[tuple[str, str]]) -> str:
     """Return pairs in words, those of one effect together."""
     return '; '.join(f'{name} from {", ".join(other for one, other in pairs if one == name)}'
@@ -227,7 +219,7 @@ def _listed(pairs: Sequence[tuple[str, str]]) -> str:
 
 
 def next_experiment(
-    model: DriveModel | MechanismModel, recordings: Sequence[Recording] = (),
+    model: ForceModel, recordings: Sequence[Recording] = (),
     purpose: str = 'separate',
     limits: MotionLimits | ArmLimits | None = None, duration: float = 20.0, seed: int = 0,
     noise: float = 0.05, progress: Callable[[float], None] | None = None,
@@ -252,7 +244,7 @@ def next_experiment(
     question = (commissioning(model, recordings, noise, decisions)
                 if purpose == 'commission' and isinstance(model, DriveModel) else
                 question_of(model, recordings, lambda share: report(0.2 * share), decisions))
-    limits = limits or (ArmLimits() if isinstance(model, MechanismModel) else MotionLimits())
+    limits = limits or (ArmLimits() if model.moves_joints else MotionLimits())
     limits = replace(limits, effort_reserve=max(
         limits.effort_reserve, RESERVE * question.noise_floor))
     search: TrajectorySearch | ArmSearch = (

@@ -26,7 +26,10 @@ from pprs_dynamics.inference.residuals.reconstruction import (
     treated_forces,
 )
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.mechanism.alike import alike_joints
 from pprs_dynamics.physics.mechanism.description import PARAMETERS
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.places import PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel, inertial_values
 from pprs_dynamics.physics.model.model_file import build_model
@@ -102,9 +105,15 @@ class ArmColumns:
         return np.concatenate((self.motion, turning[..., None],
                                np.ones_like(turning)[..., None]), axis=-1)
 
-    def numbers(self, width: Array) -> Array:
-        """Return the columns of all numbers, (M, n, 14 n): of the links, then of each joint."""
-        numbers: Array = np.concatenate((self.inertial, _of_each(self.of_joints(width))), axis=2)
+    def numbers(self, model: MechanismModel) -> Array:
+        """Return the columns of all numbers, (M, n, P): of links, passive joints, each drive."""
+        found = self.reconstruction
+        passive = np.empty((len(self.measured), len(model.drives), 2 * len(own_passive(model))))
+        for chunk in found.chunks():
+            assert isinstance(chunk.motion, JointMotion)
+            passive[chunk.blocks] = chunk.treat(of_passive(model, chunk.motion))
+        numbers: Array = np.concatenate((self.inertial, passive, _of_each(self.of_joints(
+            model.reversal.widths(len(model.drives))))), axis=2)
         return numbers
 
     def efforts(self, own: Array, inertial: Array, width: Array) -> Array:
@@ -218,14 +227,39 @@ def _with(model: MechanismModel, inertial: Array, own: Array, width: Array) -> M
     return fitted
 
 
-def numbers_at(model: MechanismModel, position: Array, velocity: Array, acceleration: Array,
-               width: Array) -> Array:
-    """Return the columns of all numbers at states (M, n), (M, n, 14 n), as `ArmColumns.numbers`."""
+def numbers_at(model: MechanismModel, motion: JointMotion) -> Array:
+    """Return the columns of all numbers in a motion, (M, n, P), as `ArmColumns.numbers`."""
+    position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
+    width = model.reversal.widths(len(model.drives))
     joints = np.stack((acceleration, velocity, np.asarray(smooth_sign(velocity, width)),
                        np.ones_like(velocity)), axis=-1)
     numbers: Array = np.concatenate((model.robot.regressor(position, velocity, acceleration),
-                                     _of_each(joints)), axis=2)
+                                     of_passive(model, motion), _of_each(joints)), axis=2)
     return numbers
+
+
+def own_passive(model: MechanismModel) -> tuple[PassiveJoint, ...]:
+    """Return the passive joints of loops whose friction is not that of another joint.
+
+    Of those that are alike the first; none that goes as a drive does.
+    """
+    if not model.robot.structure.loops:
+        return ()
+    others = {name for group in alike_joints(model.robot) for name in group[1:]}
+    return tuple(one for one in model.robot.passive_joints if one.name not in others)
+
+
+def of_passive(model: MechanismModel, motion: JointMotion) -> Array:
+    """Return the columns of viscous and dry friction of `own_passive`, (N, n, 2 K)."""
+    joints = own_passive(model)
+    columns = np.zeros((len(motion), len(model.drives), 2 * len(joints)))
+    if joints:
+        state = model.mechanism(motion)
+        for k, joint in enumerate(joints):
+            for side, key in enumerate(('viscous', 'torque')):
+                columns[..., 2 * k + side] = state.against_friction(model.robot.friction_table(
+                    {joint.name: {key: 1.0, 'radius': joint.radius}}, model.reversal))
+    return columns
 
 
 def _of_each(joints: Array) -> Array:
@@ -236,34 +270,44 @@ def _of_each(joints: Array) -> Array:
     return own.reshape(samples, count, -1)
 
 
-def own_spread(efforts: Array, joints: Array) -> Array:
-    """Return by how much each joint's own numbers may be otherwise, (n, 4), standard deviations.
+def own_spread(efforts: Array, columns: Array) -> Array:
+    """Return by how much numbers may be otherwise for each joint, (n, k), standard deviations.
 
     Parameters
     ----------
     efforts : (M, n) array
         NaN where they were not measured.
-    joints : (M, n, 4) array
+    columns : (M, n, k) array
     """
     known = np.isfinite(efforts)
     size = np.max(np.abs(efforts), axis=0, initial=0.0, where=known)
-    scale = np.sqrt(np.sum(joints ** 2 * known[..., None], axis=0)
+    scale = np.sqrt(np.sum(columns ** 2 * known[..., None], axis=0)
                     / np.maximum(known.sum(axis=0), 1)[:, None])
     spread: Array = OWN_SPREAD * np.maximum(size, 1e-3)[:, None] / np.maximum(scale, 1e-6)
     return spread
 
 
-def base_prior(model: MechanismModel, spread: Array) -> Array:
-    """Return directions of unit variance of a base's numbers, (14 n, 14 n): links, then joints.
+def base_prior(model: MechanismModel, efforts: Array, numbers: Array) -> Array:
+    """Return directions of unit variance of a base's numbers, (P, P).
 
-    Of what is expected before any recording, about the model as it is.
+    Of what is expected before any recording, about the model as it is. Passive joints may rub as
+    much as the drive that would feel it first allows.
 
     Parameters
     ----------
     model : MechanismModel
-    spread : (n, 4) array
-        See `own_spread`.
+    efforts : (M, n) array
+        NaN where they were not measured.
+    numbers : (M, n, P) array
+        Columns; see `ArmColumns.numbers`.
     """
+    count = len(model.drives)
+    of_links, of_drives = model.robot.inertial.size, numbers.shape[2] - OF_JOINT * count
+    drives = numbers[..., of_drives:].reshape(len(numbers), count, count, OF_JOINT)
+    every = np.arange(count)
+    spread = np.concatenate((
+        own_spread(efforts, numbers[..., of_links:of_drives]).min(axis=0),
+        own_spread(efforts, drives[:, every, every]).ravel()))
     bodies = Bodies(model.robot.inertial)
     at, step = np.zeros(len(bodies)), 1e-6
     moves, away = (np.column_stack([(of(at + step * unit) - of(at)).ravel() / step
@@ -271,9 +315,9 @@ def base_prior(model: MechanismModel, spread: Array) -> Array:
                    for of in (bodies.inertial, bodies.distance))
     values, axes = np.linalg.eigh(away.T @ away / SPREAD ** 2)
     links = moves @ (axes / np.sqrt(values))
-    directions = np.zeros((len(links) + spread.size,) * 2)
+    directions = np.zeros((len(links) + len(spread),) * 2)
     directions[:len(links), :len(links)] = links
-    directions[len(links):, len(links):] = np.diag(spread.ravel())
+    directions[len(links):, len(links):] = np.diag(spread)
     return directions
 
 

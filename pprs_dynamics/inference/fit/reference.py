@@ -41,13 +41,7 @@ from scipy.spatial import cKDTree
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.fit.arm_fit import (
-    OF_JOINT,
-    ArmColumns,
-    base_prior,
-    numbers_at,
-    own_spread,
-)
+from pprs_dynamics.inference.fit.arm_fit import ArmColumns, base_prior, numbers_at
 from pprs_dynamics.inference.regression.base_columns import BaseColumn, ReferenceDirection
 from pprs_dynamics.inference.regression.design import CarriedOver, Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
@@ -58,6 +52,7 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.reference_keys import DIRECTIONS, RESIDUAL
@@ -203,13 +198,17 @@ class Process:
         rows, factor = factor_of(at, MOST_STATES if drive is None else MOST_OWN)
         return cls(drive, states, at[rows], factor[rows]), factor
 
-    def features(self, residuals: Residuals) -> tuple[Array, Array]:
-        """Return features of another recording: known ones (M, R), and those of new states."""
+    def known(self, residuals: Residuals) -> Array:
+        """Return its features in another recording, (M, R)."""
         from scipy.linalg import solve_triangular  # here: commands start without it
 
         at = self.states.at(residuals, self.drive)
         known: Array = solve_triangular(self.root, kernel(self.chosen, at), lower=True).T
-        return known, factor_of(at, MOST_NEW, known)[1]
+        return known
+
+    def new(self, residuals: Residuals) -> Array:
+        """Return features of states that it does not know, (M, r)."""
+        return factor_of(self.states.at(residuals, self.drive), MOST_NEW, self.known(residuals))[1]
 
 
 @dataclass(frozen=True)
@@ -251,12 +250,12 @@ class Waves:
                 -WAVE_STEP, WAVE_STEP, FINE_STEP)
             at = near[int(np.argmax(np.abs(np.exp(1j * np.outer(near, q[known])) @ rest)))]
             found = cls(drive, np.append(found.numbers, at))
-            features = found.features(residuals)[0][known]
+            features = found.known(residuals)[known]
             rest = left - features @ np.linalg.lstsq(features, left)[0]
         return found
 
-    def features(self, residuals: Residuals) -> tuple[Array, Array]:
-        """Return features of a recording, (M, 4 K), and none of new states.
+    def known(self, residuals: Residuals) -> Array:
+        """Return its features in a recording, (M, 4 K).
 
         Means over a sample, in which the wave turns on.
         """
@@ -264,8 +263,12 @@ class Waves:
         numbers = np.concatenate((self.numbers, 2 * self.numbers))
         mean = np.sinc(numbers * v * residuals.period / (2 * np.pi))
         phase = numbers * q
-        found = np.concatenate((mean * np.sin(phase), mean * np.cos(phase)), axis=1)
-        return found, np.zeros((len(found), 0))
+        found: Array = np.concatenate((mean * np.sin(phase), mean * np.cos(phase)), axis=1)
+        return found
+
+    def new(self, residuals: Residuals) -> Array:
+        """Return none: it knows every position."""
+        return np.zeros((len(residuals), 0))
 
 
 @dataclass(frozen=True)
@@ -282,7 +285,7 @@ class Reference:
         Standard deviations of a drive's three [N].
     repeats : (D,) array
         Correlation of the process in two runs.
-    base : (14 n, P) array
+    base : (N, P) array
         Directions of unit variance of the base's numbers, those that the reference tells first.
     coefficients, root : (Q,) and (Q, Q) arrays
         Of told directions, then of the processes of every drive; of their covariance.
@@ -343,10 +346,8 @@ class Reference:
         error, measured = np.split(content[:, 2 + 3 * count:], 2, axis=1)
         residuals = Residuals(model.drives, time, record, measured, measured - error, {}, motion,
                               float(np.median(content[1:, 0])), model.units)
-        numbers = numbers_at(
-            model, motion['position'], motion['velocity'], motion['acceleration'],
-            model.reversal.widths(count)) if (
-                isinstance(model, MechanismModel) and model.is_described) else None
+        numbers = numbers_at(model, JointMotion(*(motion[name] for name in MOTION))) if (
+            isinstance(model, MechanismModel) and model.is_described) else None
         return cls._fitted(model, residuals, numbers, kept, (displayed(model.source),), ())
 
     @classmethod
@@ -361,7 +362,7 @@ class Reference:
         drives = range(len(residuals.drives))
         measured = Regression(residuals).drives
         processes = _processes(residuals, columns, measured)
-        shown = [one.features(residuals)[0] for one in processes]
+        shown = [one.known(residuals) for one in processes]
         features = [(shown[0], *shown[1 + d::len(drives)]) for d in drives]
         fits = {d: _sized(residuals, columns, d, features[d]) for d in measured}
         nothing = np.full(len(features[0]), LEAST_SIZE)
@@ -386,7 +387,7 @@ class Reference:
     def directions(self) -> str:
         """The principal directions of the base's numbers that the recordings told, as a text.
 
-        Each of unit variance, half a precision a number: (14 n, P); '' for none.
+        Each of unit variance, half a precision a number: (N, P); '' for none.
         """
         told = self.told
         if not told:
@@ -427,16 +428,17 @@ class Reference:
     def shown_by(self, recordings: Sequence[Recording]) -> Array:
         """Return the forces that recordings and it have beyond the model, (M, D) [N]."""
         found, residuals = _measured(self.model, recordings)
-        return self._carried_over(residuals, found).mean
+        return self._carried_over(residuals, found).shown(residuals)
 
     def _carried_over(self, residuals: Residuals, reconstructions: Sequence[Reconstruction],
                       ) -> CarriedOver:
         drives, told = range(len(self.size)), self.told
         samples = len(residuals)
-        shared, *own = (one.features(residuals) for one in self.processes)
+        shared, *own = ((one.known(residuals), one.new(residuals)) for one in self.processes)
         numbers = (np.concatenate([_numbers(self.model, one) for one in reconstructions])
                    @ self.base if self.base.size else np.zeros((samples, len(drives), 0)))
-        mean, together, apart, at = np.zeros((samples, len(drives))), [], [], told
+        of_base = numbers[..., :told] @ self.coefficients[:told]
+        together, apart, at = [], [], told
         for d in drives:
             of_drive = shared, *own[d::len(drives)]
             known = np.concatenate([one[0] for one in of_drive], axis=1)
@@ -446,16 +448,28 @@ class Reference:
             place, repeats = slice(at, at + len(sizes)), self.repeats[d]
             at = place.stop
             rows = repeats * known
-            mean[:, d] = (numbers[:, d, :told] @ self.coefficients[:told]
-                          + rows @ self.coefficients[place])
             together.append(np.concatenate((
                 numbers[:, d, :told] @ self.root[:told] + rows @ self.root[place],
                 numbers[:, d, told:]), axis=1))
             apart.append(np.concatenate((
                 np.sqrt(1 - repeats ** 2) * sizes * known, new), axis=1))
-        return CarriedOver(mean, *self._open(replace(
-            residuals, measured=residuals.measured - mean), together, apart), float(np.mean(
-                (shared[0] ** 2).sum(axis=1) > self.decisions.reference_known)))
+
+        def shown(read: Residuals) -> Array:
+            return of_base + self._repeating(read)
+
+        return CarriedOver(shown, *self._open(replace(
+            residuals, measured=residuals.measured - shown(residuals)), together, apart),
+            float(np.mean((shared[0] ** 2).sum(axis=1) > self.decisions.reference_known)))
+
+    def _repeating(self, residuals: Residuals) -> Array:
+        """Return what repeats in a recording beside the base, (M, D) [N]."""
+        shared, *own = (one.known(residuals) for one in self.processes)
+        found, at = np.zeros((len(residuals), len(self.size))), self.told
+        for d in range(len(self.size)):
+            known = np.concatenate((shared, *own[d::len(self.size)]), axis=1)
+            found[:, d] = self.repeats[d] * (known @ self.coefficients[at:at + known.shape[1]])
+            at += known.shape[1]
+        return found
 
     def _open(self, residuals: Residuals, together: Sequence[Array], apart: Sequence[Array],
               ) -> tuple[tuple[ReferenceDirection, ...], dict[int, OpenForces]]:
@@ -571,10 +585,7 @@ def _base(model: ForceModel, numbers: Array | None, residuals: Residuals, kept: 
     if numbers is None:
         return np.zeros((len(residuals), len(residuals.drives), 0)), np.zeros((0, 0)), 0
     assert isinstance(model, MechanismModel)
-    count = len(model.drives)
-    joints = numbers[..., -OF_JOINT * count:].reshape(len(numbers), count, count, OF_JOINT)
-    prior = base_prior(model, own_spread(
-        residuals.measured, joints[:, np.arange(count), np.arange(count)]))
+    prior = base_prior(model, residuals.measured, numbers)
     if kept:
         told_before = _as_array(kept, DIRECTIONS)
         if len(told_before) != len(prior):
@@ -599,9 +610,9 @@ def _measured(model: ForceModel, recordings: Sequence[Recording],
 
 
 def _numbers(model: ForceModel, found: Reconstruction) -> Array:
-    """Return the columns of a base's numbers on a recording, (M, n, 14 n)."""
+    """Return the columns of a base's numbers on a recording, (M, n, P)."""
     assert isinstance(model, MechanismModel)
-    return ArmColumns.of_motion(model, found).numbers(model.reversal.widths(len(model.drives)))
+    return ArmColumns.of_motion(model, found).numbers(model)
 
 
 def _base_columns(columns: Array, drives: Sequence[int] | None = None) -> list[BaseColumn]:

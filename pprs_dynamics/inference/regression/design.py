@@ -78,6 +78,7 @@ from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 
 SHARE = 0.1  # of what a model has of an effect that shifts positions, for derivatives
 SIZES = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # of what it usually is, that are tried where none is
+MOVED = 1e-4  # [m, rad], for derivatives of what is carried over by positions
 SHAPE_STEP = 1e-3  # amount of movement, for derivatives by shape parameters
 LONGEST_DELAY = 0.3  # [s], that a recording may show at once
 # By how many of its standard deviations a number of an effect may have been fitted wrong as long as
@@ -94,8 +95,9 @@ class CarriedOver:
 
     Parameters
     ----------
-    mean : (M, D) array
-        Forces that the model lacks there as well [N].
+    shown : callable
+        Gives the forces that the model lacks there as well, (M, D) [N], of residuals of the same
+        samples whose positions may be read otherwise.
     directions : tuple of ReferenceDirection
         In which they are uncertain most.
     open_forces : mapping of drive to OpenForces
@@ -104,10 +106,23 @@ class CarriedOver:
         Share of the samples whose states the reference knows.
     """
 
-    mean: Array
+    shown: Callable[[Residuals], Array]
     directions: tuple[ReferenceDirection, ...]
     open_forces: Mapping[int, OpenForces]
     covered: float
+
+    def per_position(self, residuals: Residuals) -> Array:
+        """Return how the forces change with the position of each drive, (D, M, D) [N/m]."""
+        q = residuals.variables['position']
+
+        def moved(drive: int, step: float) -> Array:
+            position = q.copy()
+            position[:, drive] += step
+            return self.shown(replace(residuals, variables={
+                **residuals.variables, 'position': position}))
+
+        return np.stack([(moved(d, MOVED) - moved(d, -MOVED)) / (2 * MOVED)
+                         for d in range(q.shape[1])])
 
 
 @dataclass
@@ -230,9 +245,38 @@ class Design:
         """Return this with what a reference says of the recordings, or as it is for None."""
         if carried is None:
             return self
-        residuals = replace(self.residuals, measured=self.residuals.measured - carried.mean)
-        return replace(self, residuals=residuals, base=(*self.base, *carried.directions),
-                       carried=carried)
+        forces = carried.shown(self.residuals)
+        homing = self.homing and tuple(
+            {d: row - slope[:, d] for d, row in rows.items()}
+            for rows, slope in zip(self.homing, carried.per_position(self.residuals), strict=True))
+        alone, end = [], 0
+        for one in self.recordings:
+            part = slice(end, end := end + len(one.treat))
+            alone.append(np.stack([np.interp(one.time, self.residuals.time[part], row)
+                                   for row in forces[part].T], axis=1))
+        recordings = tuple(replace(one, effort=one.effort + more)
+                           for one, more in zip(self.recordings, alone, strict=True))
+        late = replace(self, recordings=tuple(
+            replace(one, effort=more)
+            for one, more in zip(self.recordings, alone, strict=True)))._shown_late()
+        residuals = replace(self.residuals, measured=self.residuals.measured - forces - late)
+        return replace(self, residuals=residuals, recordings=recordings, homing=homing,
+                       base=(*self.base, *carried.directions), carried=carried)
+
+    def _shown_late(self) -> Array:
+        """Return by how much sensors show efforts otherwise than those of the given model do."""
+        late = np.zeros_like(self.residuals.model)
+        sensors, given = ([(one.name, repr(one.drives)) for one in model.effects
+                           if isinstance(one, MeasurementEffect)]
+                          for model in (self.model, self.given))
+        if sensors != given:
+            before = replace(self, model=self.given)
+            for d in range(len(self.drives)):
+                def efforts(recording: FullRate, d: int = d) -> Array:
+                    return recording.effort[None, :, d]
+
+                late[:, d] = (self.shown(d, efforts) - before.shown(d, efforts))[0]
+        return late
 
     def carried_forces(self, coefficients: Array) -> Array:
         """Return what the directions of a reference add to the forces, (M, D) [N].

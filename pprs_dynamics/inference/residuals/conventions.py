@@ -54,9 +54,7 @@ from pprs_dynamics.inference.residuals.readings import (
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Defect
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 # What efforts may be, as multiples of what they are taken for.
 EFFORT_FACTORS = (1.0, -1.0, 1e-3, -1e-3, 1e3, -1e3)
@@ -247,16 +245,11 @@ class _Search:
                 factors, cost + _cost(factors, told, self.model.drives)))
         return min(found, key=lambda one: one.score)
 
-    @property
-    def _strokes(self) -> tuple[Array, Array]:
-        assert isinstance(self.model, (DriveModel, MechanismModel))
-        return self.model.limits.strokes
-
     def _possible(self, reading: Reading, excerpt: Excerpt) -> bool:
         """Return whether a reading brings positions into the strokes, and units where needed."""
         if not reading.kind:
             return True
-        lower, upper = self._strokes
+        lower, upper = self.model.strokes
         with np.errstate(invalid='ignore'):
             slack = STROKE_SLACK * (upper - lower)
 
@@ -275,11 +268,9 @@ class _Search:
         if reading.kind != POSITION_UNIT:
             return False
         motion, group = excerpt.motion, [*reading.drives]
-        lower, upper = self._strokes
+        lower, upper = self.model.strokes
         reach = np.abs(motion.position).max(axis=0) / np.maximum(np.abs(lower), np.abs(upper))
-        speed = np.zeros(len(reach))
-        if isinstance(self.model, MechanismModel):
-            speed = np.abs(motion.velocity).max(axis=0) / self.model.robot.structure.speed
+        speed = np.abs(motion.velocity).max(axis=0) / self.model.speed_limits
         return bool(np.any(np.maximum(reach, speed)[group] > BEYOND))
 
 
@@ -418,8 +409,7 @@ def _of_shares(model: ForceModel, contents: Mapping[str, EffortContent]) -> list
 
 def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Defect]:
     """Yield what positions far outside of the strokes say without any effort."""
-    assert isinstance(model, (DriveModel, MechanismModel))
-    lower, upper = model.limits.strokes
+    lower, upper = model.strokes
     drives, ends = recording.drives, np.maximum(-lower, upper)
     reach = np.abs(recording.position).max(axis=0)
     for turns, names in ((False, LENGTHS), (True, ANGLES)):

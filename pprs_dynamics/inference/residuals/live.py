@@ -18,7 +18,6 @@ from pprs_dynamics.measurement.motion.differentiation import LocalPolynomial
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction, LiveSample
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 WINDOW = 0.12  # [s] of the smoothing that gives velocity and acceleration
 # Arms move ten times as slowly as the 3-PPRS, and their joints carry ten times the inertia.
@@ -69,7 +68,7 @@ class LiveComparison:
 
     def __init__(self, model: ForceModel, window: float | None = None, span: float = ERROR_SPAN,
                  ) -> None:
-        self._window = window or (ARM_WINDOW if isinstance(model, MechanismModel) else WINDOW)
+        self._window = window or (ARM_WINDOW if model.moves_joints else WINDOW)
         self._span = span
         self._stamps: list[float] = []
         self._live: LiveReconstruction | None = None

@@ -33,9 +33,7 @@ from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.laws.elastic_joint import LINK_POSITION
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.three_pprs.forward_motion import find_pose_jumps, solve_forward_motion
 from pprs_dynamics.physics.three_pprs.robot import Geometry
 
@@ -191,11 +189,10 @@ def follow(model: ForceModel | Geometry, time: Array, drives: DriveMotion,
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    if isinstance(model, MechanismModel):
+    if isinstance(model, ForceModel) and model.moves_joints:
         return FollowedMotion(JointMotion(drives.position, drives.velocity, drives.acceleration),
                               np.zeros(len(time), dtype=bool), np.zeros(0, dtype=int))
-    geometry = model.robot.geometry if isinstance(model, DriveModel) else model
-    assert isinstance(geometry, Geometry)
+    geometry = model if isinstance(model, Geometry) else model.robot.geometry
     return _follow_platform(geometry, time, drives, progress)
 
 

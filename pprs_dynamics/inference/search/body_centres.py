@@ -50,7 +50,7 @@ def about_centre(term: Term, mass: str, centre: tuple[float, ...]) -> Term:
 def centre_of(effect: type[CatalogueEffect], names: tuple[str, ...], c: Array,
               model: ForceModel) -> tuple[float, ...]:
     """Return where a body of these coefficients is, within the reach."""
-    size = reach_of(model.robot)  # type: ignore[attr-defined]
+    size = reach_of(model.robot)
     known = dict(zip(names, c.tolist(), strict=True))
     prefix = names[0].removesuffix('mass')
     mass = known[names[0]]
@@ -73,7 +73,7 @@ def find_centre(term: Term, mass: str, error: Array, scale: Mapping[int, float],
         Of each drive's error.
     model : ForceModel
     """
-    size = reach_of(model.robot)  # type: ignore[attr-defined]
+    size = reach_of(model.robot)
     prefix = mass.removesuffix('mass')
     at = [term.names.index(prefix + name) for name in (
         'mass', *(f'moment_{axis}' for axis in AXES), *MOMENTS, *PRODUCTS)]

@@ -61,7 +61,7 @@ def with_possible_bodies(model: ForceModel, regression: Regression, fit: JointFi
         there = [effect for effect in model.effects
                  if not (component.given and effect.name == component.effect.name)]
         before = given_body(component)
-        robot = with_bodies(model.robot, there)  # type: ignore[attr-defined]
+        robot = with_bodies(model.robot, there)
         found = nearest_possible(robot, component, before + fit.of(block),
                                  fit.covariance[place, place])
         if found is None:

@@ -40,6 +40,11 @@ from pprs_dynamics.physics.three_pprs.passive_friction import (
 from pprs_dynamics.physics.three_pprs.robot import Geometry, Masses, Robot
 from pprs_dynamics.physics.three_pprs.state import ThreePprsState, solve_mechanism
 
+HOME_HEIGHT = 0.5  # [m], of the platform at home
+# Of a long trajectory that many samples are looked at for their condition number, evenly spread:
+# neighbours hardly differ, and a singular value decomposition each would cost more than the model.
+MOST_CONDITIONS = 64
+
 __all__ = ['RIGID_BODY', 'DriveForces', 'DriveModel', 'ModelState']
 
 
@@ -96,9 +101,14 @@ class DriveModel(ForceModel):
     equations: str = 'corrected'
 
     @property
-    def mechanism_of_effects(self) -> Robot:
-        """The robot as described."""
-        return self.robot
+    def strokes(self) -> tuple[Array, Array]:
+        """Lowest and highest position of each drive [m], (6,) each."""
+        return self.limits.strokes
+
+    @property
+    def moved_mass(self) -> float:
+        """Mass of the platform and its payload [kg]."""
+        return float(self.values['masses.platform'] + self.values['masses.payload'])
 
     @property
     def effort_limits(self) -> Array:
@@ -211,6 +221,25 @@ class DriveModel(ForceModel):
         """
         mechanism = solve_mechanism(self.robot, motion, minimum_sine=self.limits.rod_sine)
         return condition_number(self.robot.geometry, mechanism.jacobians.J)
+
+    def at_home(self, samples: int) -> PlatformMotion:
+        """Return the platform at rest at its home pose."""
+        return PlatformMotion.at_rest(np.tile([0.0, 0.0, HOME_HEIGHT], (samples, 1)),
+                                      np.tile([0.0, 0.0, 0.0, 1.0], (samples, 1)))
+
+    def singularity_margin(self, state: ThreePprsState) -> float:
+        """Return 1 minus the largest of three shares, see `ForceModel.singularity_margin`.
+
+        Condition number over its limit, smallest sine of a rod angle over that of the rods, and,
+        with independent chains, the ratio for the cosine.
+        """
+        limits, J = self.limits, state.jacobians.J
+        number = condition_number(self.robot.geometry, J[::-(-len(J) // MOST_CONDITIONS)])
+        used = [number.max() / limits.condition_number,
+                limits.rod_sine / np.abs(state.chains.sin_u).min()]
+        if any(isinstance(effect, IndependentChainsFriction) for effect in self.effects):
+            used.append(limits.rod_cosine / np.abs(state.chains.cos_u).min())
+        return float(1 - max(used))
 
 
 def _group(values: Mapping[str, Any], prefix: str) -> dict[str, Any]:

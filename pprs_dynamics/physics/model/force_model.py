@@ -133,6 +133,8 @@ class ForceModel(ABC):
 
     Parameters
     ----------
+    robot : Robot or Mechanism
+        Bodies and joints; effects take their parameters from it.
     effects : tuple of Effect
         What acts beside the rigid body; the model's own friction comes first.
     reversal : Reversal
@@ -162,6 +164,7 @@ class ForceModel(ABC):
     default_file: ClassVar[str] = ''
     takes_long: ClassVar[bool] = False
 
+    robot: Any
     effects: tuple[Effect, ...]
     reversal: Reversal
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -208,6 +211,11 @@ class ForceModel(ABC):
     @abstractmethod
     def motions(self) -> tuple[type, ...]:
         """Kinds of motion that it has forces for."""
+
+    @property
+    def moves_joints(self) -> bool:
+        """Whether it is commanded by the motion of its joints; else by that of a platform."""
+        return JointMotion in self.motions
 
     @property
     @abstractmethod
@@ -258,6 +266,11 @@ class ForceModel(ABC):
         return hashlib.sha256(text.encode()).hexdigest()
 
     @property
+    def block(self) -> str:
+        """Block of its files that describes the robot; '' for that of the paper."""
+        return ''
+
+    @property
     def is_described(self) -> bool:
         """Whether its bodies and joints are those of a description, as of a URDF."""
         return False
@@ -268,9 +281,24 @@ class ForceModel(ABC):
         return None
 
     @property
+    @abstractmethod
+    def moved_mass(self) -> float:
+        """Mass of what carries a load, or of all links [kg]."""
+
+    @property
     def gear_ratios(self) -> tuple[float, ...]:
         """Turns of the motor per turn of each drive; 1 where no gear is known."""
         return (1.0,) * len(self.drives)
+
+    @property
+    @abstractmethod
+    def strokes(self) -> tuple[Array, Array]:
+        """Lowest and highest position of each drive [m, rad], (D,) each; may be infinite."""
+
+    @property
+    def speed_limits(self) -> Array:
+        """Largest speed of each drive [m/s, rad/s], (D,); infinite where none is known."""
+        return np.full(len(self.drives), np.inf)
 
     @property
     def effort_limits(self) -> Array:
@@ -327,15 +355,10 @@ class ForceModel(ABC):
         return self.kind in effect.acts_in and (
             len(self.drives) > 1 or not effect.needs_several_drives)
 
-    @property
-    def mechanism_of_effects(self) -> Any:
-        """The mechanism that effects take their parameters from; None where they have their own."""
-        return None
-
     def bound(self, effect: type[CatalogueEffect]) -> type[CatalogueEffect]:
         """Return an effect of the catalogue with the parameters that it has in this model."""
         # Of one with the parameters that it has elsewhere, its own again.
-        return (find_effect(effect.name) or effect).bound(self.mechanism_of_effects)
+        return (find_effect(effect.name) or effect).bound(self.robot)
 
     @abstractmethod
     def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
@@ -423,6 +446,17 @@ class ForceModel(ABC):
                 if not effect.is_measurement and not isinstance(effect, BodyEffect):
                     parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
             return kind(total_force(tuple(parts.values())), parts, mechanism)
+
+    @abstractmethod
+    def at_home(self, samples: int) -> Any:
+        """Return a motion at rest where the robot is put together, one sample a second."""
+
+    @abstractmethod
+    def singularity_margin(self, state: Any) -> float | None:
+        """Return how far a motion stays from singular states: 0 at the limit, at most 1.
+
+        None for what comes near none.
+        """
 
     @abstractmethod
     def variables(self, state: Any) -> dict[str, Array]:

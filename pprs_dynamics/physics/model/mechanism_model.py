@@ -33,7 +33,7 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tool_pose import ToolPose
-from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
+from pprs_dynamics.physics.mechanism.tree_equations import WORST_CONDITION, JointFriction
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION
 from pprs_dynamics.physics.model.effects_block import added_effects
 from pprs_dynamics.physics.model.force_model import ForceModel, Forces, ModelState
@@ -103,9 +103,15 @@ class MechanismModel(ForceModel):
         return self.robot.structure.drives
 
     @property
-    def mechanism_of_effects(self) -> Mechanism:
-        """The mechanism as described."""
-        return self.robot
+    def strokes(self) -> tuple[Array, Array]:
+        """Lowest and highest position of each drive [m, rad], (D,) each."""
+        return self.limits.strokes
+
+    @property
+    def speed_limits(self) -> Array:
+        """Largest speed of each drive by the description [m/s, rad/s], (D,)."""
+        speed: Array = self.robot.structure.speed
+        return speed
 
     @property
     def friction(self) -> AxisFriction:
@@ -147,6 +153,11 @@ class MechanismModel(ForceModel):
         """Turns of the motor per turn of each drive."""
         ratios: tuple[float, ...] = self.values.get(f'{self.block}.gear_ratio', super().gear_ratios)
         return ratios
+
+    @property
+    def moved_mass(self) -> float:
+        """Mass of all links [kg]."""
+        return float(self.robot.masses.sum())
 
     @property
     def effort_limits(self) -> Array:
@@ -286,6 +297,19 @@ class MechanismModel(ForceModel):
     def at_drives(self, state: MechanismState) -> MechanismState:
         """Return the state in which the links follow drives that move as in another."""
         return self.mechanism(state)
+
+    def at_home(self, samples: int) -> JointMotion:
+        """Return the drives at rest where the description has them."""
+        structure = self.robot.structure
+        position = np.tile(structure.home[structure.tables.drives], (samples, 1))
+        still = np.zeros_like(position)
+        return JointMotion(position, still, still, np.arange(samples, dtype=float))
+
+    def singularity_margin(self, state: MechanismState) -> float | None:
+        """Return 1 minus the condition number of the closures over its limit; None without any."""
+        if not self.robot.structure.loops:
+            return None
+        return float(1 - state.links.condition.max() / WORST_CONDITION)
 
     def variables(self, state: MechanismState) -> dict[str, Array]:
         """Return the loads of the gears, where they are known."""

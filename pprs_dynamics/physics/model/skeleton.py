@@ -14,6 +14,7 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import joint_positions
 
@@ -68,11 +69,12 @@ class Skeleton:
     labels: dict[str, int]
 
     @classmethod
-    def of(cls, model: DriveModel | MechanismModel, motion: PlatformMotion | JointMotion,
+    def of(cls, model: ForceModel, motion: PlatformMotion | JointMotion,
            ) -> Skeleton:
         """Return the poses of a motion of a model."""
         if isinstance(model, MechanismModel):
             return _of_links(model, model.mechanism(motion).links)
+        assert isinstance(model, DriveModel)
         assert isinstance(motion, PlatformMotion)
         return _of_platform(model, motion)
 

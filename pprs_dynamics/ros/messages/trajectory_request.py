@@ -333,7 +333,7 @@ def readers_for(model: ForceModel, names: RobotNames | None = None) -> dict[str,
 def reader_for(model: ForceModel, names: RobotNames | None = None) -> RequestReader:
     """Return how trajectories for a model arrive, by the names of its robot."""
     joints, frame = names or RobotNames.of(model)
-    if isinstance(model, MechanismModel):
+    if model.moves_joints:
         return RequestReader(JointTrajectory, lambda data, *rules: read_joint_trajectory(
             message_in(data, JointTrajectory), joints, *rules))
     if trajectories_have_known_bytes():

@@ -30,7 +30,7 @@ from pprs_dynamics.ros.node.parameters import (
     added_descriptor,
     current_values,
     declare_model,
-    declare_own,
+    declare_node_parameters,
     has_model,
     in_declared_type,
     node_parameter,
@@ -86,12 +86,12 @@ class Followed(ABC, Generic[Checked]):
     Parameters
     ----------
     node : Node
-    own : iterable of NodeParameter
+    declared : iterable of NodeParameter
         The node's own parameters, declared already.
     """
 
-    def __init__(self, node: Node, own: Iterable[NodeParameter]) -> None:
-        self._node, self._declared = node, tuple(own)
+    def __init__(self, node: Node, declared: Iterable[NodeParameter]) -> None:
+        self._node, self._declared = node, tuple(declared)
         self._checked = self._validated(())
         node.add_on_set_parameters_callback(self.check)
         node.add_post_set_parameters_callback(self._after_change)
@@ -125,8 +125,8 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
     Parameters
     ----------
     node : Node
-    own : iterable of NodeParameter
-        The node's own parameters, which are declared before the model's.
+    parameters : iterable of NodeParameter
+        The node's own, which are declared before the model's.
     changed : callable
         Called after every change that was accepted.
 
@@ -134,7 +134,7 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
     ----------
     model : DriveModel or MechanismModel
         In force now; of one kind, and of the same drives, as long as the node runs.
-    own : dict
+    node_values : dict
         Values of the node's own parameters.
     taken_from_paper : list of str
         Keys without a value of their own; none where a whole model was given.
@@ -148,21 +148,21 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
     """
 
     def __init__(
-        self, node: Node, own: Iterable[NodeParameter], changed: Callable[[], None],
+        self, node: Node, parameters: Iterable[NodeParameter], changed: Callable[[], None],
     ) -> None:
         self._changed = changed
-        own = (*own, DEMO)
-        declare_own(node, own)
+        parameters = (*parameters, DEMO)
+        declare_node_parameters(node, parameters)
         given = overrides(node)
         self._kind: type[NodeModel] = MechanismModel if is_mechanism(given) else DriveModel
         taken_from_paper = declare_model(node)
         self._stays: dict[str, Any] = {}
-        super().__init__(node, own)
-        self.model, self.own = self._checked
+        super().__init__(node, parameters)
+        self.model, self.node_values = self._checked
         # Whatever is connected would be driven by the forces of another robot.
-        if not self.own[DEMO.name] and not has_model(given):
+        if not self.node_values[DEMO.name] and not has_model(given):
             raise NoModelError(node.get_name())
-        self._stays = self._staying(self.model, self.own)
+        self._stays = self._staying(self.model, self.node_values)
         # A status entry, and a line in the log: another robot would get wrong forces.
         self.taken_from_paper = taken_from_paper
         if taken_from_paper:
@@ -174,22 +174,23 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
     def _validated(self, changes: Iterable[Parameter]) -> tuple[NodeModel, dict[str, Any]]:
         self._refuse_foreign(changes)
         values = current_values(self._node, changes)
-        own = {each.name: each.check(values.pop(each.name, None)) for each in self._declared}
+        node_values = {each.name: each.check(values.pop(each.name, None))
+                       for each in self._declared}
         model = self._kind.from_parameters(values)
-        now = self._staying(model, own)
+        now = self._staying(model, node_values)
         for name, before in self._stays.items():
             if now[name] != before:
                 raise ModelError(name, now[name], 'stay as it was when the node started: '
                                  f'{"empty" if before == "" else before}')
         model.initial_state()  # an effect that cannot even begin is refused
-        return model, own
+        return model, node_values
 
-    def _staying(self, model: NodeModel, own: Mapping[str, Any]) -> dict[str, Any]:
+    def _staying(self, model: NodeModel, node_values: Mapping[str, Any]) -> dict[str, Any]:
         """Return what holds as long as the node runs, its topics were made by it."""
         names = {drives_key(mechanism_block(model.values)): model.drives,
                  'joint_prefix and joint_map': model.recorded.joints}
         return {**{name: ', '.join(value) for name, value in names.items()},
-                **{each.name: own[each.name] for each in self._declared if each.stays}}
+                **{each.name: node_values[each.name] for each in self._declared if each.stays}}
 
     def _refuse_foreign(self, changes: Iterable[Parameter]) -> None:
         """Refuse new values for other nodes, which a model file may hold: nothing would come of it.
@@ -198,16 +199,16 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
         ------
         ModelError
         """
-        own, before = {each.name for each in self._declared}, current_values(self._node)
+        names, before = {each.name for each in self._declared}, current_values(self._node)
         for change in changes:
             value = current_values(self._node, [change]).get(change.name)
-            if change.name in OF_OTHERS - own and before.get(change.name) != value:
+            if change.name in OF_OTHERS - names and before.get(change.name) != value:
                 raise ModelError(change.name, value, 'be set on the node that has it: '
                                  f'{self._node.get_name()} has no such parameter')
 
     def _apply(self, checked: tuple[NodeModel, dict[str, Any]],
                changes: Iterable[Parameter]) -> None:
-        self.model, self.own = checked
+        self.model, self.node_values = checked
         for change in changes:
             if change.name not in NAMES and change.name.startswith('effects.') and (
                     self._node.has_parameter(change.name)):

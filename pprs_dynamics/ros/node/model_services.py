@@ -90,10 +90,10 @@ class ModelServices:
         return found if found and self._node.count_publishers(f'{self._other}/status') else ''
 
     def _different(self) -> str:
-        own = self._model()[0]
-        return '' if self._in_force == own else (
+        here = self._model()[0]
+        return '' if self._in_force == here else (
             f'{self._other} has another model in force than {self._node.get_name()} '
-            f'(sha256 {self._in_force[:12] or "unknown"}, not {own[:12]})')
+            f'(sha256 {self._in_force[:12] or "unknown"}, not {here[:12]})')
 
     def _on_status(self, message: String) -> None:
         with suppress(ValueError, AttributeError):

@@ -117,7 +117,7 @@ def node_parameter(
         is_text=is_text, may_be_empty=is_text or is_list, default=default, **more)
 
 
-def declare_own(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, Any]:
+def declare_node_parameters(node: Node, parameters: Iterable[NodeParameter]) -> dict[str, Any]:
     """Declare parameters of the node's own and return their checked values.
 
     Raises

@@ -15,8 +15,7 @@ from typing import Any
 from rclpy.node import Node
 
 from pprs_dynamics.physics.mechanism.evaluation import compiling_here
-from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.preparation import prepare
 
 NAME = 'preparation'
@@ -25,7 +24,7 @@ NAME = 'preparation'
 SWITCH_INTERVAL = 0.0002
 
 
-def prepare_beside(node: Node, model: DriveModel | MechanismModel) -> threading.Thread:
+def prepare_beside(node: Node, model: ForceModel) -> threading.Thread:
     """Start loading or compiling what a model needs in a thread of its own.
 
     Compiled kernels load in a second. The first time after an installation they are compiled,
@@ -56,7 +55,7 @@ def end_if_preparing(status: int) -> None:
         os._exit(status)
 
 
-def _prepare(logger: Any, model: DriveModel | MechanismModel) -> None:
+def _prepare(logger: Any, model: ForceModel) -> None:
     began, interval = time.monotonic(), sys.getswitchinterval()
     sys.setswitchinterval(SWITCH_INTERVAL)
     try:

@@ -74,5 +74,5 @@ def publishers_of(node: Node, topic: str) -> str:
 
 def namesakes(node: Node) -> int:
     """Return how many other nodes have the name of this one, as discovery knows them."""
-    own = (node.get_name(), node.get_namespace())
-    return max(0, sum(found == own for found in node.get_node_names_and_namespaces()) - 1)
+    this = (node.get_name(), node.get_namespace())
+    return max(0, sum(found == this for found in node.get_node_names_and_namespaces()) - 1)

@@ -82,7 +82,7 @@ class _Sorting:
         # Joints of a format that passive joints of the model are; those without do not turn alone.
         self.passive = {
             one.name: HINGES if isinstance(model, DriveModel) else (one.name,)
-            for one in model.robot.passive_joints if one.has_position}  # type: ignore[attr-defined]
+            for one in model.robot.passive_joints if one.has_position}
         self.joints: dict[str, dict[str, float]] = {}
         self.left: list[str] = []
         self.values = dict(model.values)
@@ -142,7 +142,6 @@ class _Sorting:
                 self.kind == MJCF or not self._turns_gravity(effect))
 
     def _turns_gravity(self, effect: BodyEffect) -> bool:
-        assert isinstance(self.model, (DriveModel, MechanismModel))
         robot = self.model.robot
         return bool(np.any(np.subtract(effect.changed(robot).gravity, robot.gravity)))
 
@@ -217,7 +216,7 @@ def _sort_arm(model: MechanismModel, sorting: _Sorting) -> None:
 
 def _under_standard_gravity(model: ForceModel, sorting: _Sorting) -> None:
     """Take the gravity that is assumed where a file has none."""
-    if isinstance(model, MechanismModel) and model.is_described:
+    if model.is_described:
         sorting.exchange(f'{model.block}.gravity', STANDARD_GRAVITY)
     elif isinstance(model, MechanismModel):
         # The axis is put at a slope that gives its share of it.

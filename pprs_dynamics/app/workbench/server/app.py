@@ -150,17 +150,17 @@ class Api:
         """Answer what of the screen changed since a version, the errors now where they did."""
         hub = self.hub
         with hub.steady():
-            session, count = hub.session, hub.count
-            state = {'generation': hub.generation, 'failure': hub.failure,
+            session, version = hub.session, hub.log.version
+            state = {'failure': hub.failure,
                      'is_beginning': hub.is_beginning, 'has_live': hub.live is not None,
                      'has_folders': bool(hub.offered.folders or hub.offered.surveyed),
                      'is_empty': session is None,
                      **(session.to_dict() if session else units_to_dict(hub.inputs.model))}
-            state['drawn'] = [state.get(key) for key in ('generation', 'revision', 'stage')]
-            hub.log.update(state)
-            known = index_of(str((query or {}).get('since', '')), hub.log.version + 1)
+            state['drawn'] = [state.get(key) for key in ('fitted_since', 'revision', 'stage')]
+            version = hub.log.update(state, version)
+            known = index_of(str((query or {}).get('since', '')), version + 1)
             changes = hub.log.since(-1 if known is None else known)
-            return binary({**changes, 'count': count, 'version': hub.log.version},
+            return binary({**changes, 'version': version},
                           {'now': session.current_residual.T}
                           if session and 'drawn' in changes else {})
 
@@ -172,7 +172,7 @@ class Api:
             # Times of a long recording have more digits than float32: seconds and the rest.
             whole = np.floor(data.time)
             return binary(
-                {'generation': self.hub.generation, 'drives': list(session.drives),
+                {'fitted_since': session.fitted_since, 'drives': list(session.drives),
                  'quantities': quantities(data)},
                 {'seconds': whole, 'rest': data.time - whole, 'segment': data.segment.astype(float),
                  'before': session.given_residual.T, 'measured': data.measured.T})
@@ -308,7 +308,7 @@ class Api:
         return self.hub.live
 
     async def events(self, request: Request) -> Response:
-        """Tell the page, whenever something changed, how often so far."""
+        """Tell the page, whenever something changed, the version that it led to."""
         async def lines() -> AsyncIterator[bytes]:
             queue = self.hub.subscribe()
             try:
@@ -316,7 +316,7 @@ class Api:
                 while not self.hub.is_over:
                     with suppress(TimeoutError):
                         await asyncio.wait_for(queue.get(), HEARTBEAT)
-                    yield b'data: %d\n\n' % self.hub.count
+                    yield b'data: %d\n\n' % self.hub.log.version
             finally:
                 self.hub.unsubscribe(queue)
         return StreamingResponse(lines(), media_type='text/event-stream')

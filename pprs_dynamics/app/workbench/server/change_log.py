@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from threading import Lock
 from typing import Any
 
 EFFECTS = 'effects'  # a list of objects with names, that change one by one
@@ -17,24 +18,42 @@ class ChangeLog:
     Attributes
     ----------
     version : int
-        Counts states that differ.
+        Counts what may have changed the state, and looks that found it changed.
     """
 
     def __init__(self) -> None:
         self.version = 0
+        self._lock = Lock()
         self._parts: dict[tuple[str, str], Any] = {}
         self._changed: dict[tuple[str, str], int] = {}
 
-    def update(self, state: Mapping[str, Any]) -> None:
-        """Take a state, later than all before."""
+    def count(self) -> None:
+        """Count that something may have changed; from any thread, after it did."""
+        with self._lock:
+            self.version += 1
+
+    def update(self, state: Mapping[str, Any], version: int) -> int:
+        """Take a state, later than all before, and return the version that it is.
+
+        Parameters
+        ----------
+        state : mapping of str to Any
+        version : int
+            As it was before the state was looked at.
+        """
         effects = {(EFFECTS, one['name']): one for one in state.get(EFFECTS, ())}
         parts = {(key, ''): value for key, value in state.items() if key != EFFECTS} | effects
         parts['effect_names', ''] = [name for _, name in effects]
         changed = [key for key, part in parts.items()
                    if key not in self._parts or self._parts[key] != part]
-        self.version += bool(changed)
         self._parts |= parts
-        self._changed |= dict.fromkeys(changed, self.version)
+        if not changed:
+            return version
+        with self._lock:
+            self.version += 1
+            self._changed |= dict.fromkeys(changed, self.version)
+            # What was counted meanwhile may not be in this state: it has to be asked for again.
+            return self.version if self.version == version + 1 else version
 
     def since(self, version: int) -> dict[str, Any]:
         """Return the parts that changed after a version, all of them after -1."""

@@ -75,7 +75,6 @@ class Hub:
         self.session: Session | None = None
         self.failure = ''
         self.is_beginning = True
-        self.generation = self.count = 0
         self._is_unjudged = False
         self._uploads = TemporaryDirectory(prefix='pprs_workbench_')
         self.log = ChangeLog()
@@ -84,7 +83,6 @@ class Hub:
         self.is_over = False
         self._waiting: set[asyncio.Queue[None]] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._fits: object = None
         self._diagnosed: object = None  # once for each model, also where it fails
         self._worker = Thread(target=self._run, name='workbench', daemon=True)
 
@@ -132,7 +130,7 @@ class Hub:
 
     def notify(self) -> None:
         """Tell all browsers that something changed."""
-        self.count += 1
+        self.log.count()
         if self._loop is not None and not self._loop.is_closed():
             with suppress(RuntimeError):  # it closes just now
                 self._loop.call_soon_threadsafe(self._put)
@@ -213,11 +211,6 @@ class Hub:
         session.subscribe(self._changed)
 
     def _changed(self) -> None:
-        fits = self.session.fits if self.session is not None else None
-        if fits is not self._fits:
-            # Times and the error before are others: browsers fetch them again.
-            self._fits = fits
-            self.generation += 1
         self._work.set()
         self.notify()
 
