@@ -390,9 +390,11 @@ class _Answer:
         """Return the best set in which effects may begin, end or grow, as `with_courses` does.
 
         Where what was found bends the columns, around the model as given, too: an effect that is
-        there all the time may be none, and does not show what is there for a part of it.
+        there all the time may be none, and does not show what is there for a part of it. What
+        held-out data refute is not tried again with a beginning.
         """
-        ranking, alone = self.ranking, list(self.ranking.alone.values())
+        ranking = self.ranking
+        alone = [] if ranking.refuted else list(ranking.alone.values())
         fits, found = with_courses(self.fits, self.reported, alone)
         if found is self.reported and ranking.first is not self.fits:
             kept = ranking.first.evaluate(self.reported.candidates)
