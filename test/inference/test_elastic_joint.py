@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import made_up_arm
@@ -129,6 +130,24 @@ def test_what_efforts_do_not_show_the_second_encoder_tells(tmp_path: Path) -> No
     assert number is not None
     assert float(number[1]) == pytest.approx(2e-5, rel=0.1)
     assert 1e-3 * float(number[2]) == pytest.approx(LOSS, rel=0.3)
+
+
+@pytest.mark.parametrize(('of', 'drive'), [('motion', SWING), ('load', 0)])
+def test_a_clearance_that_the_second_encoder_tells_is_lost_motion(
+        tmp_path: Path, of: str, drive: int) -> None:
+    """The efforts are those of the motor's motion: 0.2 mrad would hardly change them."""
+    model = made_up_arm.real_arm(tmp_path)
+    moved, plain = made_up_arm.motion(20.0), wound_up(model, 0.0)
+    side = (moved.velocity if of == 'motion'
+            else model.drive_forces(moved).mechanism.transmitted)[:, drive]
+    link = plain.channels['link_position'].copy()
+    link[:, drive] -= 1e-4 * np.sign(side)
+    said, = (one for one in diagnose(model, [replace(plain, channels={
+        'link_position': link})]).warnings if 'second encoder' in one)
+    number = re.search(r'clearance of (\S+) rad .*whose side the (\S+) chooses', said)
+    assert number is not None
+    assert float(number[1]) == pytest.approx(2e-4, rel=0.15)
+    assert number[2] == of
 
 
 def test_a_zero_that_is_off_is_none(tmp_path: Path) -> None:

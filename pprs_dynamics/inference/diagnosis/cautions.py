@@ -13,6 +13,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.search.candidates import SINCE, CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint
+from pprs_dynamics.physics.effects.laws.lost_motion import LostMotion
 
 
 def find_cautions(
@@ -20,7 +21,7 @@ def find_cautions(
 ) -> tuple[str, ...]:
     """Return sentences, the graver first."""
     return (*fits.design.given.faults, *_courses(effects), *_length(fits, best), *_motion(fits),
-            *_filtered(fits), *_wound_up(fits, effects),
+            *_filtered(fits), *_second_encoders(fits, effects),
             *_unexcited(fits, best), *_bounds(effects))
 
 
@@ -61,17 +62,24 @@ def _motion(fits: FittedSets) -> Iterator[str]:
                'constant force; record motion both ways')
 
 
-def _wound_up(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]:
-    """Look for second encoders that tell of a wind-up which efforts do not."""
-    design = fits.design
-    told = {name for effect in effects if effect.name == ElasticJoint.name
-            for name in effect.drives or ()}
-    for d, windup in fits.components.windups.items():
+def _second_encoders(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]:
+    """Look for second encoders that tell of a wind-up or a clearance which efforts do not."""
+    design, windups = fits.design, fits.components.windups
+    told = {(effect.name, name) for effect in effects for name in effect.drives or ()}
+    for d, clearance in design.clearances.items():
         name, units = design.drives[d], design.given.units[d]
-        if name not in told:
-            yield (f'the link of {name} is not where its motor is: by its second encoder it winds '
-                   f'up by {windup.compliance:.3g} {units.of("m/N")}, {1e3 * windup.loss:.2g} '
-                   'ms behind its load, which changes the efforts by less than can be told')
+        where = f'the link of {name} is not where its motor is: by its second encoder '
+        unseen = 'which changes the efforts by less than can be told'
+        windup = windups.get(d)
+        if clearance.explained > max(fits.decisions.explained,
+                                     0.0 if windup is None else windup.explained):
+            if clearance.size > 0 and (LostMotion.name, name) not in told:
+                yield (f'{where}there is a clearance of {clearance.size:.3g} {units.of("m")} '
+                       f'between them ({LostMotion.name}), whose side the {clearance.of} chooses, '
+                       f'{unseen}')
+        elif windup is not None and (ElasticJoint.name, name) not in told:
+            yield (f'{where}it winds up by {windup.compliance:.3g} {units.of("m/N")}, '
+                   f'{1e3 * windup.loss:.2g} ms behind its load, {unseen}')
 
 
 def _filtered(fits: FittedSets) -> Iterator[str]:

@@ -60,6 +60,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import (
+    Clearance,
     DriveEffect,
     DriveRange,
     DriveSamples,
@@ -370,17 +371,43 @@ class Design:
     @cached_property
     def windups(self) -> dict[int, Windup]:
         """What second encoders tell of drives that wind up under their loads."""
-        read = [(one.transmitted, found.windup) for one, found in zip(
-            self.recordings, self.reconstructions, strict=False) if found.windup is not None]
         found = {}
-        for d in range(len(self.drives) if read else 0):
-            load = np.concatenate([one[:, d] for one, _ in read])
-            windup = np.concatenate([one[:, :, d] for _, one in read], axis=1)
-            if np.ptp(load) and np.any(windup):
+        for d, (load, _, windup) in self._second_encoders.items():
+            if np.ptp(load):
                 stiffness, damping, said = told_by_windup(load, windup)
                 if stiffness > 0:
                     found[d] = Windup(1 / stiffness, damping / stiffness,
                                       float(np.var(said) / np.var(load)))
+        return found
+
+    @cached_property
+    def clearances(self) -> dict[int, Clearance]:
+        """What second encoders tell of drives that lead their links by one of two distances."""
+        found = {}
+        for d, (load, direction, windup) in self._second_encoders.items():
+            lead = windup[0] - windup[0].mean()
+
+            def clearance(side: Array, of: str, lead: Array = lead) -> Clearance:
+                side = side - side.mean()
+                size = float(side @ lead / max(float(side @ side), 1e-300))
+                left = float(np.var(lead - size * side))
+                return Clearance(2 * size, of, 1 - left / max(float(np.var(lead)), 1e-300))
+
+            found[d] = max(clearance(direction, 'motion'), clearance(np.sign(load), 'load'),
+                           key=lambda one: one.explained)
+        return found
+
+    @cached_property
+    def _second_encoders(self) -> dict[int, tuple[Array, Array, Array]]:
+        """Load, direction and lead with its rates (3, N) of drives with a second encoder."""
+        read = [(one.transmitted, one.direction, found.windup) for one, found in zip(
+            self.recordings, self.reconstructions, strict=False) if found.windup is not None]
+        found = {}
+        for d in range(len(self.drives) if read else 0):
+            load, direction = (np.concatenate([one[k][:, d] for one in read]) for k in (0, 1))
+            windup = np.concatenate([one[:, :, d] for *_, one in read], axis=1)
+            if np.any(windup):
+                found[d] = load, direction, windup
         return found
 
     def moving(self, drive: int) -> np.typing.NDArray[np.bool_]:

@@ -104,6 +104,25 @@ class Windup:
     explained: float
 
 
+@dataclass(frozen=True)
+class Clearance:
+    """What a second encoder, on the link, tells of a drive that leads it by one of two distances.
+
+    Parameters
+    ----------
+    size : float
+        Between the two [m, rad].
+    of : {'motion', 'load'}
+        Whose side chooses.
+    explained : float
+        Share of the variance of the distance that the two explain.
+    """
+
+    size: float
+    of: str
+    explained: float
+
+
 class DriveEffect(CatalogueEffect):
     """An effect that acts in drives, each with its own parameters.
 
