@@ -72,6 +72,7 @@ OWN_LENGTHS = tuple((position, speed) for position in (0.3, 1.0, 3.0) for speed 
 # of what is left sine and cosine explain: by chance one in 25 000 that are tried does.
 MOST_WAVES, LONGEST_WAVE, FINEST_WAVE, LEAST_WAVE = 6, 10.0, 400.0, 20.0
 WAVE_STEP, FINE_STEP = 0.5, 0.02  # of a wave over the stroke, between those that are tried
+FEW_WHOLE = 10.0  # waves over the stroke between whole numbers for a turn, for one to be meant
 FIRST_SIZE = 0.4  # of a process, over the error: from which its size is fitted
 LEAST_SIZE = 1e-9  # [N, N m], of a process that does nothing
 ROUNDS = 3  # of the size of the process
@@ -229,10 +230,12 @@ class Waves:
         return 4 * len(self.numbers)
 
     @classmethod
-    def of(cls, residuals: Residuals, drive: int, left: Array) -> Waves:
+    def of(cls, residuals: Residuals, drive: int, left: Array, gear: float) -> Waves:
         """Return those that what is left of a drive's error, (M,), shows.
 
-        The strongest first, each beside those before it.
+        The strongest first, each beside those before it. One stroke tells a number by less than
+        a wave, and where another path goes that is out of phase: what may be a whole number for
+        each turn of the motor, `gear` times the drive's, is.
         """
         q, known = _motion(residuals)[0][:, drive], np.isfinite(left)
         found, stroke = cls(drive, np.empty(0)), float(np.ptp(q))
@@ -249,6 +252,9 @@ class Waves:
             near = tried[int(np.argmax(power))] + 2 * np.pi / stroke * np.arange(
                 -WAVE_STEP, WAVE_STEP, FINE_STEP)
             at = near[int(np.argmax(np.abs(np.exp(1j * np.outer(near, q[known])) @ rest)))]
+            apart, whole = 2 * np.pi / stroke, gear * np.round(at / gear)
+            if abs(whole - at) < apart < gear / FEW_WHOLE:
+                at = whole
             found = cls(drive, np.append(found.numbers, at))
             features = found.known(residuals)[known]
             rest = left - features @ np.linalg.lstsq(features, left)[0]
@@ -361,7 +367,7 @@ class Reference:
         columns, base, told = _base(model, numbers, residuals, kept)
         drives = range(len(residuals.drives))
         measured = Regression(residuals).drives
-        processes = _processes(residuals, columns, measured)
+        processes = _processes(residuals, columns, measured, model.gear_ratios)
         shown = [one.known(residuals) for one in processes]
         features = [(shown[0], *shown[1 + d::len(drives)]) for d in drives]
         fits = {d: _sized(residuals, columns, d, features[d]) for d in measured}
@@ -671,7 +677,7 @@ def _parts(residuals: Residuals) -> Integers:
 
 
 def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
-               ) -> tuple[Process | Waves, ...]:
+               gears: Sequence[float]) -> tuple[Process | Waves, ...]:
     """Return the process over all drives, those of each, and waves.
 
     Lengths are those of the largest evidence, of one drive after another beside the base alone,
@@ -695,7 +701,7 @@ def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
             explained = np.concatenate((columns[:, d], shared[1], own[d][1]), axis=1)
             left = left - explained @ fits[d][1].coefficients
             left = left - np.nanmean(left)
-        waves.append(Waves.of(residuals, d, left))
+        waves.append(Waves.of(residuals, d, left, gears[d]))
     return (shared[0], *(one for one, _ in own), *waves)
 
 
