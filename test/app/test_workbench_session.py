@@ -143,7 +143,7 @@ def test_a_shape_that_is_dragged_costs_what_it_departs(session: Session) -> None
     session.release('stribeck_friction')
 
 
-def test_shares_say_where_an_error_is_from_less_its_price(session: Session) -> None:
+def test_shares_say_where_an_error_is_from_less_its_prior_cost(session: Session) -> None:
     lifts = session.shares(session.span(2.0, 6.0, ['lift_1', 'lift_3']))
     assert lifts[0].net > 0.8
     assert 'payload_mass' in {one.effect for one in lifts if one.net > 0.9 * lifts[0].net}

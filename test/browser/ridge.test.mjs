@@ -11,10 +11,10 @@ const near = (found, wanted) => assert.ok(
 // By Cramer's rule: [[4, 1, .5], [1, 3, .2], [.5, .2, 2]] c = [1, 2, 3].
 const data = () => ({
   gram: Float64Array.of(4, 1, 0.5, 1, 3, 0.2, 0.5, 0.2, 2), side: Float64Array.of(1, 2, 3),
-  always: [0], limited: [], deviations: 2, steepness: 100, name_price: 5, wrong_sign_odds: 0.01,
-  drive_prices: [3, 4], effects: []});
+  always: [0], limited: [], deviations: 2, steepness: 100, name_prior_cost: 5, wrong_sign_odds: 0.01,
+  drive_prior_costs: [3, 4], effects: []});
 const placement = (columns, more = {}) => ({
-  columns, fixed: [], signs: [], price: 0, hypotheses: [], drive: null, ...more});
+  columns, fixed: [], signs: [], prior_cost: 0, hypotheses: [], drive: null, ...more});
 const solve2 = ([[a, b], [, d]], [p, q]) => [(p * d - b * q) / (a * d - b * b),
                                              (a * q - b * p) / (a * d - b * b)];
 
@@ -68,16 +68,16 @@ test('the cost of a number near its tolerance is the integral over it', () => {
 
 test('names, drives and unphysical signs are priced', () => {
   const effect = {placements: [
-    placement([1], {price: 0.5, hypotheses: ['h'], drive: 'a', signs: [[1, 10], [0, -10]]}),
-    placement([2], {price: 0.25, hypotheses: ['h', 'g'], drive: 'b'})]};
+    placement([1], {prior_cost: 0.5, hypotheses: ['h'], drive: 'a', signs: [[1, 10], [0, -10]]}),
+    placement([2], {prior_cost: 0.25, hypotheses: ['h', 'g'], drive: 'b'})]};
   const priced = new RidgeSystem({...data(), effects: [effect]});
   const bare = new RidgeSystem(data());
   const strip = (one) => placement(one.columns);
-  const price = (used) => priced.fit(used).cost - bare.fit(used.map(strip)).cost;
+  const prior_cost = (used) => priced.fit(used).cost - bare.fit(used.map(strip)).cost;
   // Of four choices of two signs one has the odds of 99 : 1, the others share the rest.
   const wrong = 2 * Math.log(99 * 3);
-  near(price([effect.placements[0]]), 0.5 + wrong + 5 + 3);
-  near(price(effect.placements), 0.75 + wrong + 2 * 5 + 4);
+  near(prior_cost([effect.placements[0]]), 0.5 + wrong + 5 + 3);
+  near(prior_cost(effect.placements), 0.75 + wrong + 2 * 5 + 4);
 });
 
 test('what is left of a drive is a sum of squares, and a curve', () => {

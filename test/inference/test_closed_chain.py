@@ -66,10 +66,10 @@ def test_friction_of_the_base_turns_over_within_the_motion(base: MechanismModel)
 def test_the_weight_on_top_is_a_body_on_the_pitch_links(base: MechanismModel) -> None:
     fits = FittedSets(Design.of(base, [part_of(base, 'load_insertion_105_fast.csv.gz')]), DECISIONS)
     found = [fits.refined(fits.evaluate((EffectCandidate.of([component]),)))
-             for component in fits.library.structure]
+             for component in fits.components.structure]
     best = min(found, key=lambda one: one.cost)
     (candidate,) = best.effects
-    assert candidate.claim == 'link_mass:back_link'
+    assert candidate.placed_name == 'link_mass:back_link'
     assert candidate.effect.places_of(candidate.components[0].names) == (
         ('back_link', 'front_link', 'rocker'),)
     values = candidate.components[0].values(best.coefficients(candidate.components[0]))

@@ -21,11 +21,11 @@ from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.search.candidates import Prices
+from pprs_dynamics.inference.search.candidates import PriorCosts
+from pprs_dynamics.inference.search.components import Components
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_model import linear_error
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.library import Library
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -46,9 +46,9 @@ def design() -> Design:
 
 
 @pytest.fixture(scope='module')
-def library(design: Design) -> Library:
+def components(design: Design) -> Components:
     regression = Regression(design.residuals, design.base)
-    return Library(design, regression, Prices.of(regression, DECISIONS))
+    return Components(design, regression, PriorCosts.of(regression, DECISIONS))
 
 
 def change(design: Design, effect: str, values: dict[str, float], drive: str = '') -> np.ndarray:
@@ -125,10 +125,10 @@ def test_a_wrong_zero_is_felt_by_all_drives(design: Design) -> None:
     assert np.all(np.abs(column).max(axis=0) > 1e-4)
 
 
-def test_no_candidate_leaves_the_prediction_as_it_is(library: Library) -> None:
-    for d, local in library.local.items():
-        for term in [term for effect in local.effects for term in library.design.trial_terms(
-                effect, d, effect.trials(library.design.covered[d]))]:
+def test_no_candidate_leaves_the_prediction_as_it_is(components: Components) -> None:
+    for d, local in components.local.items():
+        for term in [term for effect in local.effects for term in components.design.trial_terms(
+                effect, d, effect.trials(components.design.covered[d]))]:
             assert np.all(np.abs(term.rows[d]).max(axis=1) > 0), (term.effect.name, term.shape)
 
 

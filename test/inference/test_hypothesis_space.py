@@ -24,7 +24,7 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.terms import Term
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search import candidates as candidates_module
-from pprs_dynamics.inference.search import library as library_module
+from pprs_dynamics.inference.search import components as components_module
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
@@ -72,9 +72,9 @@ class RandomDesign(Design):
 def catalogue_of_random_effects(monkeypatch: pytest.MonkeyPatch) -> None:
     every = {effect.name: effect for effect in EVERY}
     monkeypatch.setattr(candidates_module, 'catalogue', lambda: every)
-    monkeypatch.setattr(library_module, 'searched_in_drives', lambda design: list(ON_DRIVES))
+    monkeypatch.setattr(components_module, 'searched_in_drives', lambda design: list(ON_DRIVES))
     # Nothing of it knows loads or turns over.
-    monkeypatch.setattr(library_module, 'nuisance_rows', lambda *_: np.zeros((0, SAMPLES)))
+    monkeypatch.setattr(components_module, 'nuisance_rows', lambda *_: np.zeros((0, SAMPLES)))
 
 
 def random_design(truth: Mapping[tuple[str, int | None], float], seed: int) -> RandomDesign:
@@ -184,7 +184,7 @@ def test_an_effect_alone_is_on_the_drives_where_it_costs_least(number: int) -> N
         assert not alone or min(alone) <= min(exhaustive) + DECISIONS.rival_margin / 10
 
 
-def test_the_terms_of_a_cost_add_up_to_the_likelihood_and_the_prices_of_what_was_chosen() -> None:
+def test_the_terms_of_a_cost_add_up_to_the_likelihood_and_the_prior_costs() -> None:
     design = random_design({('structure_0', None): 0.4, ('drive_1', 1): -0.5}, 12)
     fits = FittedSets(design, DECISIONS)
     structure, on_drives = everything()[0], next(

@@ -228,7 +228,7 @@ def test_a_relinearised_set_is_on_the_drives_where_it_costs_least() -> None:
              for d in range(3)]
     for drives in ((0,), (0, 1, 2)):
         found = fits.evaluate((EffectCandidate.of(zeros[d] for d in drives),))
-        assert ExactSet.of(fits, found).found.effects[0].drives == (0, 1)
+        assert ExactSet.of(fits, found).fitted.effects[0].drives == (0, 1)
 
 
 def test_what_costs_least_by_exact_forces_is_the_best_whatever_its_linear_cost(
@@ -312,7 +312,7 @@ def test_a_freer_form_of_what_was_found_is_no_rival() -> None:
     assert any(names(one) == ['asymmetric_friction'] for one in found.sets)
     assert 'asymmetric_friction' not in {
         name for rival in found.rivals(1e6) for name in rival.instead
-        if names(rival.found) == ['asymmetric_friction']}
+        if names(rival.fitted) == ['asymmetric_friction']}
 
 
 def test_one_cause_wins_over_several_that_imitate_it() -> None:

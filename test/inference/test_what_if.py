@@ -93,13 +93,13 @@ def fitted(diagnosis: Diagnosis, tried: list[Tried]) -> tuple[JointFit, float]:
     assert selection is not None
     fits = selection.last
     blocks = [block for candidate, one in tried for component in candidate.components
-              for block in (fits.library.block(component), *one.nuisance.get(component, ()))]
+              for block in (fits.components.block(component), *one.nuisance.get(component, ()))]
     fit = fits.regression.at(blocks, selection.map_set.fit.amplitudes)
     components = [component for one, _ in tried for component in one.components]
-    price = sum(fits.library.price(one).total for one, _ in tried) + sum(
-        fits.prices.of_wrong_signs(one, one.values(fit.of(fits.library.block(one))))
+    prior_cost = sum(fits.components.prior_cost(one).total for one, _ in tried) + sum(
+        fits.prior_costs.of_wrong_signs(one, one.values(fit.of(fits.components.block(one))))
         for one in components)
-    return fit, fit.deviance + price
+    return fit, fit.deviance + prior_cost
 
 
 def errors(diagnosis: Diagnosis, fit: JointFit) -> Array:

@@ -22,7 +22,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.noise import NoiseShapes
 from pprs_dynamics.inference.search import fitted_sets, ranking, relinearisation, search
-from pprs_dynamics.inference.search.candidates import DURING, SINCE, Component, Course, Prices
+from pprs_dynamics.inference.search.candidates import DURING, SINCE, Component, Course, PriorCosts
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -49,7 +49,7 @@ def white_noise(problem: Problem) -> Answer:
     return _without(problem, (NoiseShapes, 'fitted', fitted))
 
 
-class BayesianInformation(Prices):
+class BayesianInformation(PriorCosts):
     """Half of ln n for each number that is fitted, and nothing for what is chosen."""
 
     @classmethod
@@ -94,7 +94,7 @@ class BayesianInformation(Prices):
 
 def without_prices(problem: Problem) -> Answer:
     """Return the diagnosis by fit and ln n alone."""
-    return _without(problem, (fitted_sets, 'Prices', BayesianInformation))
+    return _without(problem, (fitted_sets, 'PriorCosts', BayesianInformation))
 
 
 def greedy(problem: Problem) -> Answer:

@@ -29,7 +29,7 @@ export const showShares = (asked, found, tick, see, unit = '') => {
     return;
   }
   $('shares-of').textContent = `${found.samples} samples in ${placeOf(asked)}: error ${
-    amount(found.before)} → ${amount(found.now)} ${unit}. Of the squared error now, less the price
+    amount(found.before)} → ${amount(found.now)} ${unit}. Of the squared error now, less the prior cost
  of each effect:`;
   const told = found.shares.filter((one) => one.net > LEAST).slice(0, MOST).map((one) => {
     const item = make('li');
@@ -41,7 +41,7 @@ export const showShares = (asked, found, tick, see, unit = '') => {
     return item;
   });
   $('share-list').replaceChildren(...(told.length ? told
-    : [make('li', 'No effect explains it and pays its price.')]));
+    : [make('li', 'No effect explains it and pays its prior cost.')]));
   if (!asked.time && found.spans.length) {
     $('spans').append(button(`Show when: ${found.spans.length} span${
       found.spans.length > 1 ? 's' : ''}, the longest at ${found.spans[0][0].toFixed(2)} s`,

@@ -52,8 +52,8 @@ METHOD = (
     'as far as these are free.',
     'Sets of effects and of patterns of no catalogue are compared by one cost: the penalised '
     'deviance under noise that is correlated in time, whose spectrum is fitted anew for each set, '
-    'and prices for effects, drives, shapes and patterns that were tried. Evidence of an effect '
-    'is by how much more the best set without it costs, whatever stands there instead.')
+    'and prior costs for effects, drives, shapes and patterns that were tried. Evidence of an '
+    'effect is by how much more the best set without it costs, whatever stands there instead.')
 
 
 def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False,
@@ -349,8 +349,8 @@ def _sets(page: Page, diagnosis: Diagnosis) -> None:
     with page.fold('The best sets of effects, and their costs'):
         page.text('Cost above that of the best set. 10 stands for odds of 150 to 1: a set that '
                   'comes nearer is told as a rival. Of which: how much worse it fits, what its '
-                  'coefficients ask of their prior, and the prices of its names, drives, shapes '
-                  'and signs.', 'note')
+                  'coefficients ask of their prior, and the prior costs of its names, drives, '
+                  'shapes and signs.', 'note')
         page.table(('cost', 'set', 'of which'), [
             (cost, text, why) for text, cost, why in set_rows(diagnosis)])
         if diagnosis.candidates:

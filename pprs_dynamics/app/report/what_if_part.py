@@ -56,8 +56,8 @@ def add_what_if(page: Page, system: WhatIf, residuals: Residuals) -> None:
             'effects': [asdict(one) for one in system.effects],
             'always': system.always, 'limited': system.limited,
             'gram': _letters(system.gram, 'f8'), 'side': _letters(system.side, 'f8'),
-            'name_price': system.name_price, 'wrong_sign_odds': system.wrong_sign_odds,
-            'drive_prices': system.drive_prices,
+            'name_prior_cost': system.name_prior_cost, 'wrong_sign_odds': system.wrong_sign_odds,
+            'drive_prior_costs': system.drive_prior_costs,
             'units': {one.name: {'effort': residuals.units_of(one.name).effort}
                       for one in system.drives},
             'unit': residuals.unit, 'gap': GAP,

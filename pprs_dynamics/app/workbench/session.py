@@ -505,7 +505,7 @@ class Session:
         return region_mask(x_values, y_values, x_range, y_range, self.data, d)
 
     def shares(self, mask: Mask) -> list[Share]:
-        """Return what each unticked effect explains of the error in a mask, less its price."""
+        """Return what each unticked effect explains of the error in a mask, less its prior cost."""
         return shares_in(mask, self.fits, self.view_state)
 
     def _indices(self, drives: Sequence[str] | None) -> list[int]:

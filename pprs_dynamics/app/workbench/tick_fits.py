@@ -67,7 +67,7 @@ class Offer:
     ----------
     candidate : EffectCandidate
     gain, evidence : float
-        By which the penalised deviance would fall at the noise as it is; and less its price.
+        By which the penalised deviance would fall at the noise as it is; and less its prior cost.
     residual : (M, D) array
         What would be left [N].
     """
@@ -167,15 +167,15 @@ class TickFits:
 
     def _on_drive(self, effect: type[DriveEffect], d: int, found: CandidateSet,
                   ) -> Component | None:
-        library = self.fits.library
-        if d in library.local:
-            scanned = library.local[d].offers(found.fit).get(effect.name)
+        components = self.fits.components
+        if d in components.local:
+            scanned = components.local[d].offers(found.fit).get(effect.name)
             if scanned is not None:
                 return scanned[0]
-        there = [one for one in library.spanning if one.effect is effect and one.drive == d]
-        # All have the same price.
+        there = [one for one in components.spanning if one.effect is effect and one.drive == d]
+        # All have the same prior cost.
         return max(there, key=lambda one: self.fits.regression.gain(
-            found.fit, library.block(one)), default=None)
+            found.fit, components.block(one)), default=None)
 
     def _proposed(self, found: CandidateSet) -> list[EffectCandidate]:
         """Return every effect where it pays best beside a set."""

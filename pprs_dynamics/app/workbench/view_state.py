@@ -61,7 +61,7 @@ class Share:
     explained : float
         Of the squared error there, that would go.
     net : float
-        The same less the price of its freedom: what it explains of the whole recording counts
+        The same less the prior cost of its freedom: what it explains of the whole recording counts
         only in as far as it pays. 0 where it does not pay at all.
     """
 

@@ -133,7 +133,7 @@ def adopt(
         held_out, gain = case.validated(fitted.plain, fitted.model, diagnosis.noise)
     else:
         held_out, gain = (fitted.held_out_before, fitted.held_out_after), fitted.gain
-    promised = linear_error(fitted.fits, fitted.found)
+    promised = linear_error(fitted.fits, fitted.fitted)
     found += [*objections.of_linearity(promised, rms(after), after.unit),
               *objections.of_held_out_error(*held_out, gain, model, case.held_out)]
     report(1.0)

@@ -69,7 +69,7 @@ class EffectFit:
         The least share of its force's square on a place that nothing else in the model explains.
     fits : FittedSets
         Around the model with the effect.
-    found : CandidateSet
+    fitted : CandidateSet
     held_out_before, held_out_after : float
         Over blocks, each predicted from the others [N].
     gain : PairedGain
@@ -91,7 +91,7 @@ class EffectFit:
     evidence: float
     own_share: float
     fits: FittedSets
-    found: CandidateSet
+    fitted: CandidateSet
     held_out_before: float
     held_out_after: float
     gain: PairedGain

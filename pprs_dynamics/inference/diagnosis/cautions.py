@@ -64,8 +64,9 @@ def _motion(fits: FittedSets) -> Iterator[str]:
 def _wound_up(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]:
     """Look for second encoders that tell of a wind-up which efforts do not."""
     design = fits.design
-    told = {name for one in effects if one.name == ElasticJoint.name for name in one.drives or ()}
-    for d, windup in fits.library.windups.items():
+    told = {name for effect in effects if effect.name == ElasticJoint.name
+            for name in effect.drives or ()}
+    for d, windup in fits.components.windups.items():
         name, units = design.drives[d], design.given.units[d]
         if name not in told:
             yield (f'the link of {name} is not where its motor is: by its second encoder it winds '
@@ -78,8 +79,8 @@ def _filtered(fits: FittedSets) -> Iterator[str]:
     design = fits.design
     found = []
     for d, name in enumerate(design.drives):
-        error = [one.effort_measured[part, d] - one.effort[part, d]
-                 for one in design.recordings for part in one.segments]
+        error = [recording.effort_measured[part, d] - recording.effort[part, d]
+                 for recording in design.recordings for part in recording.segments]
         longest = max(error, key=len)
         longest = longest[np.isfinite(longest)]
         if len(longest) < 200 or not np.any(longest):
@@ -118,19 +119,19 @@ def _unexcited(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
 
 def _courses(effects: Sequence[FoundEffect]) -> Iterator[str]:
     """Say what to do with effects that are not there all the time."""
-    for one in effects:
-        if one.course is None:
+    for effect in effects:
+        if effect.course is None:
             continue
-        if one.course.kind == SINCE:
-            yield (f'{one.name} is there{one.when}: adopt would fit it throughout, and must be '
-                   'given a recording that begins after that')
+        if effect.course.kind == SINCE:
+            yield (f'{effect.name} is there{effect.when}: adopt would fit it throughout, and must '
+                   'be given a recording that begins after that')
         else:
-            yield (f'{one.name} is not constant{one.when}: warm the machine up, and look for what '
-                   'slips')
+            yield (f'{effect.name} is not constant{effect.when}: warm the machine up, and look for '
+                   'what slips')
 
 
 def _bounds(effects: Sequence[FoundEffect]) -> Iterator[str]:
-    for one in effects:
-        if one.at_bound:
-            yield (f'{one.name}: {", ".join(one.at_bound)} stands at the edge of what was tried; '
-                   'its value is not to be trusted')
+    for effect in effects:
+        if effect.at_bound:
+            yield (f'{effect.name}: {", ".join(effect.at_bound)} stands at the edge of what was '
+                   'tried; its value is not to be trusted')

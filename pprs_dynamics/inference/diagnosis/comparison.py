@@ -177,11 +177,12 @@ class Comparison:
     @property
     def where(self) -> tuple[Statement, ...]:
         """Where it fails, what explains most of the squared error first, and nothing slight."""
-        told = [one for one in self.localisation.statements if one.drive in self.drives
-                and not self.drives[one.drive].relative < DECISIONS.negligible
-                and one.share_of_error >= DECISIONS.statement_share
-                and one.mean_square >= (
-                    DECISIONS.statement_share * self.drives[one.drive].rms ** 2)]
+        told = [statement for statement in self.localisation.statements
+                if statement.drive in self.drives
+                and not self.drives[statement.drive].relative < DECISIONS.negligible
+                and statement.share_of_error >= DECISIONS.statement_share
+                and statement.mean_square >= (
+                    DECISIONS.statement_share * self.drives[statement.drive].rms ** 2)]
         return tuple(sorted(told, key=lambda one: -one.mean_square))
 
     @property
@@ -265,8 +266,8 @@ def _compare_drive(
     error, effort = residuals.error[known, index], residuals.measured[known, index]
     rms, swing = root_mean_square(error), root_mean_square(effort - effort.mean())
     findings = where.drives.get(name, DriveFindings((), None))
-    most = max((one.mean_square for one in findings.statements
-                if one.kind not in ('scatter', 'level')), default=0.0)
+    most = max((statement.mean_square for statement in findings.statements
+                if statement.kind not in ('scatter', 'level')), default=0.0)
     return DriveComparison(
         name, rms, float(error.mean()), float(np.abs(error).max()), swing,
         float('nan') if np.isnan(share) else rms / swing, share, len(error),

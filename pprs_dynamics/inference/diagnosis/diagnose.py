@@ -215,19 +215,19 @@ class Diagnosis:
         """Return the JSON: the keys that docs/commands.md lists."""
         return {
             'verdict': self.verdict,
-            'effects': [one.to_dict() for one in self.effects],
+            'effects': [effect.to_dict() for effect in self.effects],
             'indistinguishable': [list(names) for names in self.indistinguishable],
             'unconfirmed': [one.to_dict() for one in self.unconfirmed],
-            'candidates': [one.to_dict() for one in self.candidates],
+            'candidates': [candidate.to_dict() for candidate in self.candidates],
             'depends_on': [
                 {'drive': s.drive, 'variable': s.variable, 'share_of_error': s.share_of_error,
                  'range': None if s.range is None else list(s.range), 'text': s.text}
                 for s in self.depends_on],
             'suspects': [{key: value for key, value in s.to_dict().items() if key != 'error_after'}
                          for s in self.suspects],
-            'sets': [one.to_dict() for one in self.sets],
+            'sets': [fitted.to_dict() for fitted in self.sets],
             'barred': [one.to_dict() for one in self.barred],
-            'calibrated': [one.to_dict() for one in self.calibrated],
+            'calibrated': [number.to_dict() for number in self.calibrated],
             'held_out_on': self.held_out_on, 'above_noise': dict(self.above_noise),
             'effort_looks_like': kinds_of(self.effort_looks_like),
             'stick_slip': {drive: {'frequency': one.frequency, 'speed': one.speed,
@@ -237,7 +237,8 @@ class Diagnosis:
             'little_explained': dict(self.little),
             'explained_after': _for_json(explained_shares(self.residuals, self.remaining)),
             'reference': None if self.since is None else self.since.to_dict(),
-            'changed_since': None if self.since is None else [one.name for one in self.effects],
+            'changed_since': None if self.since is None else [
+                effect.name for effect in self.effects],
             'noise_floor': self.noise_floor,
             'noise_floors': dict(self.noise_floors), 'warnings': list(self.warnings)}
 
@@ -270,10 +271,11 @@ def diagnose(
         Where no drive moves, and as `measure_residuals`.
     """
     report = progress or (lambda share: None)
-    if not any(share_in_motion(one.time, one.position) for one in recordings):
+    if not any(share_in_motion(recording.time, recording.position) for recording in recordings):
         raise MotionError('position', 'no drive moves by more than its measured position resolves '
-                          f'in {", ".join(one.name for one in recordings)}', 'move: a robot that '
-                          'stands tells nothing of friction, masses or delays', 'shape')
+                          f'in {", ".join(recording.name for recording in recordings)}',
+                          'move: a robot that stands tells nothing of friction, masses or '
+                          'delays', 'shape')
     other = {} if as_it_is else looks_like(model, recordings)
     if other and reference is not None:
         # What the reference looks like as well is no change.
@@ -286,7 +288,7 @@ def diagnose(
         if one.share > decisions.stick_slip}
     if other or sticking:
         bare = _Answer(without_search(model, recordings, decisions, report), validate, decisions,
-                       claims=False).diagnosis(())
+                       try_courses=False).diagnosis(())
         return replace(bare, verdict='unknown', warnings=(), effort_looks_like=other,
                        stick_slip=sticking, depends_on=tuple(
                            word_stick_slip(drive, one, bare.residuals)
@@ -297,15 +299,15 @@ def diagnose(
     since = None if reference is None else SinceReference.of(
         reference, answer.ranking.first.design)
     unconfirmed: list[FoundEffect] = []
-    if any(one.is_impossible for one in answer.effects):
+    if any(effect.is_impossible for effect in answer.effects):
         # Whatever stands for what cannot be, or beside it, would be as wrong.
         found = _all_objected(answer.effects)
-        answer = _Answer(answer.ranking.claiming_nothing(), validate, decisions,
-                         claims=False)
+        answer = _Answer(answer.ranking.reporting_nothing(), validate, decisions,
+                         try_courses=False)
         report(1.0)
         return replace(answer.diagnosis(found), verdict='unknown', since=since)
-    while weak := [one for one in answer.effects
-                   if one.objection or one.certainty < -decisions.sure]:
+    while weak := [effect for effect in answer.effects
+                   if effect.objection or effect.certainty < -decisions.sure]:
         unconfirmed.append(min(weak, key=lambda one: one.evidence))
         gone = answer.ranking.order[answer.effects.index(unconfirmed[-1])]
         answer = _Answer(answer.ranking.less(gone), validate, decisions)
@@ -316,17 +318,18 @@ def diagnose(
 
 def _all_objected(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
     """Return effects of which one cannot be: that first, and the others as found beside it."""
-    impossible = [one for one in effects if one.is_impossible]
+    impossible = [effect for effect in effects if effect.is_impossible]
     beside = listed([one.name for one in impossible])
-    return (*impossible, *(replace(one, objection=f'it was found beside {beside}, which cannot be')
-                           for one in effects if not one.is_impossible))
+    return (*impossible,
+            *(replace(effect, objection=f'it was found beside {beside}, which cannot be')
+              for effect in effects if not effect.is_impossible))
 
 
 class _Answer:
     """What is to be said of a ranking."""
 
     def __init__(self, ranking: Ranking, validate: Sequence[Recording],
-                 decisions: Decisions, claims: bool = True) -> None:
+                 decisions: Decisions, try_courses: bool = True) -> None:
         self.ranking, self.validate, self.decisions = ranking, validate, decisions
         self.fits, self.map_set, self.reported = ranking.last, ranking.map_set, ranking.reported
         self.design = self.fits.design
@@ -334,18 +337,18 @@ class _Answer:
         self.final = settled(self.fits, self.reported)
         self.remaining = ranking.first.design.residuals.measured - exact_forces(
             self.design, self.final.model) - self.design.carried_forces(
-                self.final.found.fit.coefficients)
+                self.final.fitted.fit.coefficients)
         for d, series in self.fits.regression.series.items():
             self.remaining[:, d] -= series.open_forces(self.remaining[:, d])
         # Before a constant form is believed.
         self.dated_fits, self.dated = with_courses(
-            self.fits, self.reported, ranking.alone.values()) if claims else (
+            self.fits, self.reported, ranking.alone.values()) if try_courses else (
                 self.fits, self.reported)
         self.is_dated, self.adopted = self.dated is not self.reported, self.final.model
         if self.is_dated:
             self.remaining = linear_residual(self.dated_fits, self.dated)
             self.adopted = self._dated_model()
-        self.effects = self._dated_effects() if self.is_dated else self._effects()
+        self.effects = self._dated_effects() if self.is_dated else self._effects_reported()
 
     def diagnosis(self, unconfirmed: tuple[FoundEffect, ...]) -> Diagnosis:
         first, final, effects = self.ranking.first.design, self.final, self.effects
@@ -366,10 +369,11 @@ class _Answer:
         sets = tuple((name, *others) for name, others in rivals.items() if others)
         above = self._above_noise(floors)
         little = little_explained(self.adopted, first.residuals, self.remaining, self.decisions)
-        passing = any(one.course is not None and one.course.kind != SINCE for one in effects)
+        passing = any(effect.course is not None and effect.course.kind != SINCE
+                      for effect in effects)
         verdict = ('unknown' if depends or above or little or passing else 'ambiguous' if sets
                    else 'effect' if effects else 'adequate')
-        moved = [one for one in calibrations(final.fits, final.found, final.widths)
+        moved = [one for one in calibrations(final.fits, final.fitted, final.widths)
                  if abs(one.after - one.before) > self.decisions.sure * one.std]
         absorbed = () if self.is_dated else self.ranking.absorbed
         return Diagnosis(
@@ -383,8 +387,8 @@ class _Answer:
             'validation' if self.validate else 'blocks', selection=self.ranking,
             decisions=self.decisions)
 
-    def _effects(self) -> list[FoundEffect]:
-        """Return what is adopted, with the errors as one after the other is added."""
+    def _effects_reported(self) -> list[FoundEffect]:
+        """Return the effects of the reported set, with the errors as one after another joins."""
         order, path = self.ranking.order, self.ranking.path
         if not order:
             return []
@@ -409,8 +413,8 @@ class _Answer:
                 held_out: Sequence[float]) -> FoundEffect:
         """Return an effect of the reported set, with the errors before it and with it."""
         final = self.final
-        last = next(c for c in final.found.effects if c.effect is candidate.effect)
-        estimates = averaged(estimate(final.fits, final.found, last), self._nearly(candidate))
+        last = next(c for c in final.fitted.effects if c.effect is candidate.effect)
+        estimates = averaged(estimate(final.fits, final.fitted, last), self._nearly(candidate))
         parameters = estimates.parameters
         without = self._told(self.ranking.best_without(candidate),
                              self.ranking.best_with(candidate))
@@ -422,7 +426,7 @@ class _Answer:
             candidate.effect, parameters, in_model)
         return FoundEffect(
             candidate.effect, self.design.named(candidate.drives), parameters,
-            final.fits.library.force(final.found, last, self.remaining.shape), without.cost,
+            final.fits.components.force(final.fitted, last, self.remaining.shape), without.cost,
             errors[0], errors[1], held_out[0], held_out[1], estimates.at_bound, share,
             self._certainty(candidate), impossible or nothing, bool(impossible), without,
             in_model, moments=estimates.moments)
@@ -431,9 +435,10 @@ class _Answer:
         """Return where recordings speak for less than no friction or inertia, as a clause."""
         if self.reported.terms.feasibility <= self.decisions.rival_margin:
             return ''
-        return next((f'{self.drives[one.drive]} would have less than no {of} with what the model '
-                     'has' for one in candidate.components if one.drive is not None
-                     for of in left_at_nothing(self.design, self.reported, one)), '')
+        return next((f'{self.drives[component.drive]} would have less than no {of} with what the '
+                     'model has' for component in candidate.components
+                     if component.drive is not None
+                     for of in left_at_nothing(self.design, self.reported, component)), '')
 
     def _dated_effects(self) -> list[FoundEffect]:
         """Return the effects where some begin, end or grow within the recordings."""
@@ -451,7 +456,7 @@ class _Answer:
             estimates = estimate(fits, found, candidate, are_drives_known=True)
             effects.append(FoundEffect(
                 candidate.effect, self.design.named(candidate.drives), estimates.parameters,
-                fits.library.force(found, candidate, self.remaining.shape),
+                fits.components.force(found, candidate, self.remaining.shape),
                 fits.evaluate(found.without(candidate)).total - found.total, errors[k],
                 errors[k + 1], held_out[k], held_out[k + 1], estimates.at_bound,
                 (errors[k] - errors[k + 1]) / errors[0],
@@ -471,7 +476,7 @@ class _Answer:
             course = candidate.course
             if course is None or course.kind != DURING:
                 continue
-            force = fits.library.force(found, candidate, self.remaining.shape)
+            force = fits.components.force(found, candidate, self.remaining.shape)
             span = (course.begin - begun, course.end - begun)
             inside = (residuals.time >= course.begin) & (residuals.time < course.end)
             evidence = fits.evaluate(found.without(candidate)).total - found.total
@@ -506,15 +511,16 @@ class _Answer:
         Of links and joints only those that it is on are told.
         """
         found = {}
-        for one in candidate.components:
-            values = self.ranking.first.design.present(one.effect, one.drive)
-            prefix = '' if one.drive is None else f'{self.drives[one.drive]}.'
+        for component in candidate.components:
+            values = self.ranking.first.design.present(component.effect, component.drive)
+            prefix = '' if component.drive is None else f'{self.drives[component.drive]}.'
             found.update({prefix + name: float(value) for name, value in (values or {}).items()
                           if prefix + name in keys})
         # A body or friction on a link or joint where there is none is new.
         return found if not candidate.effect.is_of_one_place or any(
-            one.given[k] for one in candidate.components if one.given
-            for k, c in enumerate(one.effect.coefficients) if c.name in one.names) else {}
+            component.given[k] for component in candidate.components if component.given
+            for k, c in enumerate(component.effect.coefficients)
+            if c.name in component.names) else {}
 
     def _nearly(self, candidate: EffectCandidate) -> list[tuple[float, Estimates]]:
         """Return what sets that are nearly as good say of an effect, and what they cost more."""
@@ -565,13 +571,13 @@ class _Answer:
 
     def _depends_on(self, noise: dict[str, NoiseSpectrum]) -> tuple[Statement, ...]:
         statements = []
-        libraries = {library.d: library for library in self.ranking.patterns}
+        by_drive = {pattern.d: pattern for pattern in self.ranking.patterns}
         for candidate in self.dated.unknowns:
             evidence = (self.dated_fits.evaluate(self.dated.without(candidate)).total
                         - self.dated.total if self.is_dated else self._evidence(candidate))
             for d, block in candidate.parts.items():
                 statements.append(word_statement(
-                    libraries[d], candidate, self.dated.fit.of(block), evidence))
+                    by_drive[d], candidate, self.dated.fit.of(block), evidence))
         drifting = levels(self.fits.regression.residuals, dict(noise), self.decisions)
         statements += [one for name, one in drifting.items()
                        if one.amplitude > self._lack_of_fit[self.drives.index(name)]]
@@ -584,9 +590,10 @@ class _Answer:
         A share of their sum: what others nearly cancel is no force of a machine.
         """
         force = np.zeros(self.remaining.shape)
-        for one in self.dated.effects:
-            if one.effect.idealised:
-                force += self.dated_fits.library.force(self.dated, one, self.remaining.shape)
+        for candidate in self.dated.effects:
+            if candidate.effect.idealised:
+                force += self.dated_fits.components.force(self.dated, candidate,
+                                                          self.remaining.shape)
         return [self.decisions.form_share * root_mean_square(of_drive) for of_drive in force.T]
 
     def _candidates(self) -> tuple[RankedEffect, ...]:
@@ -600,10 +607,10 @@ class _Answer:
         return tuple(self._ranked(self.fits, one, candidate, self.map_set.cost - one.cost)
                      for candidate, one in self.ranking.suspects(self.decisions.suspect_margin))
 
-    def _ranked(self, fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
+    def _ranked(self, fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
                 evidence: float) -> RankedEffect:
         return RankedEffect(candidate.name, self.design.named(candidate.drives), evidence,
-                            linear_error(fits, found))
+                            linear_error(fits, fitted))
 
     def _sets(self) -> tuple[RankedSet, ...]:
         if self.is_dated:
@@ -612,7 +619,7 @@ class _Answer:
                                     for c in self.dated.candidates), CostTerms()),)
         # Of a linear set the cost is that in the first design.
         best, *others = self._of_each_name(self.ranking.sets, MOST_SETS)
-        return (best, *sorted(others, key=lambda one: one.cost))
+        return (best, *sorted(others, key=lambda fitted: fitted.cost))
 
     def _barred(self) -> tuple[RankedSet, ...]:
         """Return the sets that would be rivals, or better, and may not be."""
@@ -621,21 +628,21 @@ class _Answer:
     def _of_each_name(self, sets: Iterable[CandidateSet], most: int) -> tuple[RankedSet, ...]:
         """Return the first set of every choice of names."""
         found: dict[frozenset[str], RankedSet] = {}
-        for one in sets:
-            told = self._told(one, self.map_set)
+        for fitted in sets:
+            told = self._told(fitted, self.map_set)
             found.setdefault(frozenset(name for name, _ in told.names), told)
             if len(found) == most:
                 break
         return tuple(found.values())
 
-    def _told(self, found: CandidateSet, best: CandidateSet) -> RankedSet:
+    def _told(self, fitted: CandidateSet, best: CandidateSet) -> RankedSet:
         """Return a set against another one."""
-        names = tuple((c.name, self.design.named(c.drives)) for c in found.candidates)
-        return RankedSet(names, self.ranking.difference(found, best), found.barred)
+        names = tuple((c.name, self.design.named(c.drives)) for c in fitted.candidates)
+        return RankedSet(names, self.ranking.difference(fitted, best), fitted.barred)
 
     def _within_model_error(self, absorbed: Absorbed) -> WithinModelError:
-        force = self.fits.library.force(absorbed.beside, absorbed.candidate,
-                                        self.design.residuals.measured.shape)
+        force = self.fits.components.force(absorbed.beside, absorbed.candidate,
+                                           self.design.residuals.measured.shape)
         return WithinModelError(
             absorbed.candidate.name, self.design.named(absorbed.candidate.drives),
             float(np.sqrt(np.mean(force ** 2, axis=0)).max()), absorbed.of)
@@ -659,29 +666,29 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
     if selection is None:
         return ()
     found = []
-    adopted = {c.name: c.claim for c in selection.reported.effects}
+    adopted = {c.name: c.placed_name for c in selection.reported.effects}
     for of, name in ((names[0], name) for names in diagnosis.indistinguishable
                      for name in names[1:]):
-        best = next((one for one in selection.sets
-                     if any(name in (c.name, c.claim) for c in one.effects)
-                     and adopted[of] not in {c.claim for c in one.effects}), None)
+        best = next((fitted for fitted in selection.sets
+                     if any(name in (c.name, c.placed_name) for c in fitted.effects)
+                     and adopted[of] not in {c.placed_name for c in fitted.effects}), None)
         if best is None:
             continue
         fits = selection.fits_of(best)
-        candidate = next(c for c in best.effects if name in (c.name, c.claim))
+        candidate = next(c for c in best.effects if name in (c.name, c.placed_name))
         remaining = linear_residual(fits, best)
         found.append(RivalEffect(
             candidate.effect, fits.design.named(candidate.drives),
             estimate(fits, best, candidate).parameters,
-            fits.library.force(best, candidate, remaining.shape), of, linear_error(fits, best),
+            fits.components.force(best, candidate, remaining.shape), of, linear_error(fits, best),
             _held_out(fits, best, validate), best.cost - selection.map_set.cost, remaining))
     return tuple(found)
 
 
-def _held_out(fits: FittedSets, found: CandidateSet, validate: Sequence[Recording]) -> float:
+def _held_out(fits: FittedSets, fitted: CandidateSet, validate: Sequence[Recording]) -> float:
     if not validate:
-        return hold_out(fits, found).error
+        return hold_out(fits, fitted).error
     try:
-        return rms(measure_residuals(fitted_model(fits, found), validate)[0])
+        return rms(measure_residuals(fitted_model(fits, fitted), validate)[0])
     except PprsError:
         return float('nan')

@@ -233,14 +233,14 @@ class LiveDiagnosis:
         effects = []
         for found in answer.effects:
             effect = LiveEffect(found, None, False, _names(answer, found))
-            known = next((one for one in self.effects if one.is_same(effect)), None)
+            known = next((present for present in self.effects if present.is_same(effect)), None)
             if known is not None and known.confirmed:
                 effect = replace(effect, since=known.since, confirmed=True)
             elif known is not None and holds:
                 effect = replace(effect, since=beginning(), confirmed=True)
             effects.append(effect)
-        missed = [one for one in self.effects if one.confirmed
-                  and not any(one.is_same(effect) for effect in effects)]
+        missed = [present for present in self.effects if present.confirmed
+                  and not any(present.is_same(effect) for effect in effects)]
         # A window in which a change happens to be weak does not end it while it still helps.
         if holds:
             effects += missed
@@ -276,7 +276,7 @@ class LiveDiagnosis:
 
 def without_found(model: ForceModel, answer: Diagnosis) -> ForceModel:
     """Return the model of a diagnosis without what it found, its other numbers as they are."""
-    found = {one.name for one in answer.effects}
+    found = {effect.name for effect in answer.effects}
     given = {effect.name: effect for effect in model.effects}
     return replace(answer.adopted, effects=tuple(
         given.get(effect.name, effect) if effect.name in found else effect

@@ -24,11 +24,11 @@ from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.bins import MOST_SHARE
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
-from pprs_dynamics.inference.search.candidates import Prices, UnknownCandidate
+from pprs_dynamics.inference.search.candidates import PriorCosts, UnknownCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.patterns import Pattern
 from pprs_dynamics.inference.search.scan import with_fast_noise
-from pprs_dynamics.inference.search.unknown import PatternLibrary
+from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.system.parallel import each
 
 MOST_SAMPLES = 16_000  # of a drive; longer recordings are averaged
@@ -142,89 +142,90 @@ def _search(residuals: Residuals, drive: int) -> DriveFindings:
     error, measured = residuals.error[:, drive], residuals.measured[:, drive]
     if np.nanmax(np.abs(error)) <= ROUNDING * np.nanmax(np.abs(measured)):
         return DriveFindings((), None)
-    prices = replace(Prices.of(regression, DECISIONS), drives=len(residuals.drives))
-    library = PatternLibrary(regression, prices, drive, with_plain_forms=True)
+    prior_costs = replace(PriorCosts.of(regression, DECISIONS), drives=len(residuals.drives))
+    drive_patterns = DrivePatterns(regression, prior_costs, drive, with_plain_forms=True)
     fit = regression.fit(())
     statements: list[Statement] = []
     blocks: list[Block] = []
     patterns: list[Array] = []
     while len(statements) < MOST_STATEMENTS:
-        winner = _best(library, fit, blocks, {one.variable for one in statements})
+        winner = _best(drive_patterns, fit, blocks,
+                       {statement.variable for statement in statements})
         if winner is None:
             break
-        candidate, found, evidence, rivals = winner
-        statements.append(word_statement(library, candidate, found.of(candidate.parts[drive]),
-                                         evidence, rivals))
+        candidate, found, evidence, other_variables = winner
+        statements.append(word_statement(drive_patterns, candidate, found.of(
+            candidate.parts[drive]), evidence, other_variables))
         patterns.append(candidate.rows[drive])
-        blocks += [*candidate.blocks, *_carried(library, candidate)]
+        blocks += [*candidate.blocks, *_carried(drive_patterns, candidate)]
         fit = regression.fit(blocks, found.amplitudes)
-    scatter = _scatter(library, fit, {one.variable for one in statements})
+    scatter = _scatter(drive_patterns, fit, {statement.variable for statement in statements})
     if scatter is not None:
         statements.append(scatter)
     return DriveFindings(tuple(statements), regression.noise(fit)[drive], tuple(patterns))
 
 
-def _best(library: PatternLibrary, fit: JointFit, blocks: list[Block], stated: set[str],
+def _best(drive_patterns: DrivePatterns, fit: JointFit, blocks: list[Block], stated: set[str],
           ) -> tuple[UnknownCandidate, JointFit, float, tuple[str, ...]] | None:
-    """Return the pattern that lowers the cost most, with its fit, evidence and rivals."""
-    regression = library.regression
+    """Return the pattern that lowers the cost most, with its fit, evidence and other_variables."""
+    regression = drive_patterns.regression
     chosen: dict[object, tuple[UnknownCandidate, JointFit]] = {}
     for near in (fit, with_fast_noise(regression, fit)):
-        for candidate, score in library.proposals(near, PROPOSALS, always=True):
+        for candidate, score in drive_patterns.proposals(near, PROPOSALS, always=True):
             variable = candidate.family.variable
             if (variable in stated and candidate.pattern.kind != 'line') or score < PROPOSED:
                 continue
             chosen.setdefault(candidate.key, (candidate, near))
     scored = []
     for candidate, near in chosen.values():
-        refined = library.refined(candidate, near)
+        refined = drive_patterns.refined(candidate, near)
         if refined.pattern.kind in PLACES and np.mean(
-                refined.rows[library.d][0] != 0) > MOST_SHARE:
+                refined.rows[drive_patterns.d][0] != 0) > MOST_SHARE:
             continue
         found = regression.fit([*blocks, *refined.blocks], near.amplitudes)
-        scored.append((fit.deviance - found.deviance - refined.price, refined, found))
-    scored.sort(key=lambda one: -one[0])
+        scored.append((fit.deviance - found.deviance - refined.prior_cost, refined, found))
+    scored.sort(key=lambda scored: -scored[0])
     if not scored or scored[0][0] <= 0:
         return None
     evidence, winner, found = scored[0]
-    if _is_friction(winner, library):
+    if _is_friction(winner, drive_patterns):
         # What follows the sign of all but the slowest motion is the direction's.
         evidence, winner, found = next(
             (one for one in scored if one[1].pattern.kind == 'friction' and one[0] > 0), scored[0])
-    margin = library.prices.decisions.rival_margin
+    margin = drive_patterns.prior_costs.decisions.rival_margin
     kin = {winner.family.variable, 'velocity' if winner.family.variable == 'direction' else ''}
-    rivals = [one.family.variable for score, one, _ in scored
-              if score > evidence - margin and one.family.variable not in kin]
-    return winner, found, evidence, tuple(dict.fromkeys(rivals))
+    other_variables = [one.family.variable for score, one, _ in scored
+                       if score > evidence - margin and one.family.variable not in kin]
+    return winner, found, evidence, tuple(dict.fromkeys(other_variables))
 
 
-def _is_friction(winner: UnknownCandidate, library: PatternLibrary) -> bool:
+def _is_friction(winner: UnknownCandidate, drive_patterns: DrivePatterns) -> bool:
     if winner.family.variable != 'velocity' or winner.pattern.kind != 'directed_range':
         return False
-    speed = np.abs(library.values('velocity'))
+    speed = np.abs(drive_patterns.values('velocity'))
     assert winner.pattern.limits is not None
     low, high = winner.pattern.limits
     return high >= speed.max() and bool(
-        np.mean(speed < low) <= library.prices.decisions.reversal_share)
+        np.mean(speed < low) <= drive_patterns.prior_costs.decisions.reversal_share)
 
 
-def _carried(library: PatternLibrary, winner: UnknownCandidate) -> list[Block]:
+def _carried(drive_patterns: DrivePatterns, winner: UnknownCandidate) -> list[Block]:
     """Return all columns that the variable of a statement can carry, as one block each."""
     if winner.pattern.kind in ('line', 'offset'):
         return []
     variables = {winner.family.variable}
     if winner.family.variable in ('velocity', 'direction'):
         variables = {'velocity', 'direction'}
-    return [library.family_block(family) for family in library.families
+    return [drive_patterns.family_block(family) for family in drive_patterns.families
             if family.variable in variables and not family.paired]
 
 
-def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str]) -> Statement | None:
+def _scatter(drive_patterns: DrivePatterns, fit: JointFit, stated: set[str]) -> Statement | None:
     """Return the statement of where the noise is larger than elsewhere, if any range stands out.
 
     Ranks of the sizes of innovations stand for them, so that noise need not be Gaussian.
     """
-    regression, d = library.regression, library.d
+    regression, d = drive_patterns.regression, drive_patterns.d
     white = regression.innovations(fit, d)
     n = len(white)
     shares = (_ranks(np.abs(white)) - 0.5) / n
@@ -232,7 +233,7 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str]) -> Statem
     # Equal sizes share a rank, which shifts and narrows the scores of quantised efforts.
     scores = (ranked - ranked.mean()) / max(float(ranked.std()), 1e-12)
     best: tuple[float, str, Pattern, Array] | None = None
-    for family in library.families:
+    for family in drive_patterns.families:
         if family.paired or family.variable in stated or len(family.columns) == 1:
             continue
         # Bins do not overlap, so that sums over patterns are sums over their bins.
@@ -240,7 +241,7 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str]) -> Statem
         inside = family.weights @ members.sum(axis=1)
         totals = family.weights @ (members @ scores)
         gains = (totals ** 2 / np.maximum(inside * (1 - inside / n), 1e-9)
-                 - library.price(family).total)
+                 - drive_patterns.prior_cost(family).total)
         for at in np.argsort(-gains):
             pattern, gain = family.patterns[at], float(gains[at])
             if gain <= max(0.0, best[0] if best else 0.0):
@@ -251,7 +252,7 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str]) -> Statem
             held = column > 0.5
             ratio = (np.mean(white[held] ** 2)
                      / max(float(np.mean(white[~held] ** 2)), 1e-300))
-            if ratio >= library.prices.decisions.scatter_ratio:
+            if ratio >= drive_patterns.prior_costs.decisions.scatter_ratio:
                 best = (gain, family.variable, Pattern('scatter', pattern.limits, float(ratio)),
                         column)
     if best is None:
@@ -263,9 +264,9 @@ def _scatter(library: PatternLibrary, fit: JointFit, stated: set[str]) -> Statem
         centred[part] -= centred[part].mean()
     lags = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2)[:200]
     worth = 1 / max(1 + 2 * float(np.maximum(lags[1:] / lags[0], 0.0)[:20].sum()), 1.0)
-    price = library.prices.of_pattern(1, 1, 1).total
-    score = worth * (gain + price) - price
-    return word_scatter(library, variable, pattern, column, score) if score > 0 else None
+    prior_cost = drive_patterns.prior_costs.of_pattern(1, 1, 1).total
+    score = worth * (gain + prior_cost) - prior_cost
+    return word_scatter(drive_patterns, variable, pattern, column, score) if score > 0 else None
 
 
 def _ranks(values: Array) -> Array:

@@ -104,7 +104,7 @@ def first_step(model: ForceModel, files: GivenFiles) -> tuple[str, str]:
 
 def measure_first(findings: Sequence[NoMeasurement], files: GivenFiles) -> tuple[str, str]:
     """Return what to do where efforts are no measurement, and the command that goes on."""
-    lines = dict.fromkeys(one.line for one in findings if one.line)
+    lines = dict.fromkeys(finding.line for finding in findings if finding.line)
     say = ('; where it is what it looks like, write '
            f'{listed(tuple(lines), "or")} into the model file' if lines else '')
     return (f'Record the effort that is measured{say}. Where it is measured all the same',
@@ -121,7 +121,8 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                 'transmission)', replace(files, recordings=(SECOND,)).command('diagnose'))
     if diagnosis.little:
         return first_step(diagnosis.model, files)
-    if changing := [f'{one.name}{one.when}' for one in diagnosis.effects if one.course is not None]:
+    if changing := [f'{effect.name}{effect.when}' for effect in diagnosis.effects
+                    if effect.course is not None]:
         # Fitted throughout it would be wrong at every moment.
         return (f'Find out what happened to the machine ({"; ".join(changing)}). Then record it as '
                 'it is now, and diagnose that recording alone',

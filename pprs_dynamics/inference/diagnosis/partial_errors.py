@@ -57,14 +57,14 @@ def error_steps(diagnosis: Diagnosis, after: Residuals) -> tuple[ErrorStep, ...]
         Of `diagnosis.adopted` on the same recordings.
     """
     effects = diagnosis.effects
-    missing = sum((one.force for one in effects), np.zeros_like(after.error))
+    missing = sum((effect.force for effect in effects), np.zeros_like(after.error))
     steps = [_step('model as given', diagnosis.residuals.error)]
     refitted = _step('its own numbers', after.error + missing)
     if abs(refitted.overall / steps[0].overall - 1) > LEAST_STEP:
         steps.append(refitted)
-    for one in effects:
-        missing = missing - one.force
-        steps.append(_step(one.name, after.error + missing))
+    for effect in effects:
+        missing = missing - effect.force
+        steps.append(_step(effect.name, after.error + missing))
     return tuple(steps)
 
 

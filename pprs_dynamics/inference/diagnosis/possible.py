@@ -64,7 +64,7 @@ def why_nothing(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate
 def _sizes(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
            ) -> dict[str, Estimate]:
     """Return the numbers that make an effect as large as it is, without those left at 0."""
-    linear = {one.name for one in effect.linear}
+    linear = {parameter.name for parameter in effect.linear}
     return {key: one for key, one in parameters.items()
             if effect.place_and_parameter(key)[1] in linear and one.value}
 

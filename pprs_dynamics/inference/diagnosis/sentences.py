@@ -150,15 +150,15 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
     following, command = next_step(diagnosis, files)
     return Sentences(
         _since(diagnosis) + _headline(diagnosis),
-        tuple(_effect(diagnosis, one, k == 0) for k, one in enumerate(diagnosis.effects)),
-        tuple(_rival(diagnosis, one) for one in rivals),
+        tuple(_effect(diagnosis, effect, k == 0) for k, effect in enumerate(diagnosis.effects)),
+        tuple(_rival(diagnosis, rival) for rival in rivals),
         tuple(Finding(*describe_unexplained(group, bool(diagnosis.effects)))
               for group in unexplained_groups(diagnosis)),
-        tuple(_suspect(diagnosis, one) for one in diagnosis.suspects),
+        tuple(_suspect(diagnosis, suspect) for suspect in diagnosis.suspects),
         tuple(_within_model_error(diagnosis, one) for one in diagnosis.within_model_error),
         tuple(f'{_set(diagnosis, one)} may not be, whatever it costs: {one.barred}. It '
               f'{_cost(one)}' for one in diagnosis.barred),
-        tuple(_calibrated(diagnosis, one) for one in diagnosis.calibrated),
+        tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated),
         diagnosis.warnings, following, command, _reference(diagnosis))
 
 
@@ -177,8 +177,8 @@ def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
 
 def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     """Return the best sets of effects in words, each with its cost above the best, and of what."""
-    return [(_set(diagnosis, one), f'{one.cost:+.1f}' if number else 'the best',
-             word_terms(one.terms)) for number, one in enumerate(diagnosis.sets)]
+    return [(_set(diagnosis, fitted), f'{fitted.cost:+.1f}' if number else 'the best',
+             word_terms(fitted.terms)) for number, fitted in enumerate(diagnosis.sets)]
 
 
 def _set(diagnosis: Diagnosis, found: RankedSet) -> str:
@@ -205,9 +205,10 @@ def runner_up(diagnosis: Diagnosis) -> str:
     By what is told: what is within the model error of others was never named as missing.
     """
     within = {one.name for one in diagnosis.within_model_error} - {
-        one.name for one in diagnosis.effects}
-    untold = within & {name for one in diagnosis.sets[:1] for name, _ in one.names}
-    sets = [(one, {pair for pair in one.names if pair[0] not in untold}) for one in diagnosis.sets]
+        effect.name for effect in diagnosis.effects}
+    untold = within & {name for fitted in diagnosis.sets[:1] for name, _ in fitted.names}
+    sets = [(fitted, {pair for pair in fitted.names if pair[0] not in untold})
+            for fitted in diagnosis.sets]
     following = next(((one, names) for one, names in sets[1:] if names != sets[0][1]), None)
     if following is None:
         return ''
@@ -263,7 +264,7 @@ def _headline(diagnosis: Diagnosis) -> str:
     noise = in_unit(diagnosis.noise_floor, unit)
     if diagnosis.little:
         little = word_little(diagnosis.little, ' with what was found' if held else '')
-        beside = f' What was found: {_claims(diagnosis)}.{fall}.' if held else ''
+        beside = f' What was found: {_lacking(diagnosis)}.{fall}.' if held else ''
         return (f'{little[:1].upper()}{little[1:]}, and no effect of the catalogue the rest.'
                 f'{beside}{doubt}')
     if not held and not diagnosis.depends_on and diagnosis.unconfirmed:
@@ -273,7 +274,7 @@ def _headline(diagnosis: Diagnosis) -> str:
                  if left > AT_NOISE * diagnosis.noise_floor else '')
         return f'{lacks}Nothing that was found holds{above}.{doubt}'
     if any(one.course is not None and one.course.kind != SINCE for one in held):
-        return (f'Something changes within the recording, as if {_claims(diagnosis)}.{fall}. No '
+        return (f'Something changes within the recording, as if {_lacking(diagnosis)}.{fall}. No '
                 f'constant effect does that.{doubt}')
     if diagnosis.verdict == 'unknown':
         groups = unexplained_groups(diagnosis)
@@ -282,7 +283,7 @@ def _headline(diagnosis: Diagnosis) -> str:
             for drive, ratio in diagnosis.above_noise.items()])
         more = len(groups) - 2
         places += f' and in {more} more place{"s" * (more > 1)}' if more > 0 else ''
-        beside = f' Beside it, {_claims(diagnosis)}.{fall}, not to the noise.' if held else ''
+        beside = f' Beside it, {_lacking(diagnosis)}.{fall}, not to the noise.' if held else ''
         return ('Something is missing that no effect of the catalogue explains: '
                 f'{places}.{beside}{doubt}')
     unseen = (f'How much of the error of {listed(diagnosis.unseen_noise)} is noise cannot be told '
@@ -304,17 +305,17 @@ def _headline(diagnosis: Diagnosis) -> str:
              else f'. The noise is {noise}; the rest lies near reversals, where friction turns '
              'over in another width than the model\'s.')
     which = ': this data cannot tell which' if any(_rivals(diagnosis, one) for one in held) else ''
-    claims = _claims(diagnosis)
-    begin = 'T' if claims.startswith('the model') else claims[:1]
-    return f'{begin}{claims[1:]}{which}.{fall}{level}{doubt}'
+    missing = _lacking(diagnosis)
+    begin = 'T' if missing.startswith('the model') else missing[:1]
+    return f'{begin}{missing[1:]}{which}.{fall}{level}{doubt}'
 
 
-def _claims(diagnosis: Diagnosis) -> str:
+def _lacking(diagnosis: Diagnosis) -> str:
     """Return what the model lacks, and what it has that is not as the recordings say."""
-    new = [_or_rivals(diagnosis, one) for one in diagnosis.effects if not one.in_model]
+    new = [_or_rivals(diagnosis, effect) for effect in diagnosis.effects if not effect.in_model]
     told = [f'the model lacks {listed(new)}'] if new else []
-    return '; '.join([*told, *(_otherwise(diagnosis, one)
-                               for one in diagnosis.effects if one.in_model)])
+    return '; '.join([*told, *(_otherwise(diagnosis, effect)
+                               for effect in diagnosis.effects if effect.in_model)])
 
 
 def _otherwise(diagnosis: Diagnosis, found: FoundEffect) -> str:
@@ -442,7 +443,7 @@ def sure_moments(effect: type[CatalogueEffect], parameters: Mapping[str, Estimat
     def is_vague(one: Estimate) -> bool:
         return INTERVAL * one.std > VAGUE * abs(one.value)
 
-    known = {one.name: one for one in effect.coefficients}
+    known = {coefficient.name: coefficient for coefficient in effect.coefficients}
     masses = {key: parameters.get(f'{key.rpartition("moment_")[0]}mass') for key in moments}
     return [known[key] for key, mass in masses.items()
             if mass is not None and is_vague(mass) and not is_vague(moments[key])]

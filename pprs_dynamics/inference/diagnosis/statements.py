@@ -23,7 +23,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import UnknownCandidate
 from pprs_dynamics.inference.search.patterns import Pattern
-from pprs_dynamics.inference.search.unknown import PatternLibrary
+from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.measurement.motion.stick_slip import StickSlip
 
 STICK_SLIP = 'stick_slip'  # kind of statement
@@ -115,7 +115,7 @@ class Statement:
         Size of the pattern [N].
     mean_square : float
         Of the pattern over the record [N^2]; of a scatter what it is beyond the rest's.
-    rivals : tuple of str
+    other_variables : tuple of str
         Other variables that do nearly as well.
     """
 
@@ -129,7 +129,7 @@ class Statement:
     kind: str
     amplitude: float
     mean_square: float
-    rivals: tuple[str, ...] = ()
+    other_variables: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface."""
@@ -140,38 +140,38 @@ class Statement:
 
 
 def word_statement(
-    library: PatternLibrary, candidate: UnknownCandidate, coefficients: Array, evidence: float,
-    rivals: tuple[str, ...] = (),
+    drive_patterns: DrivePatterns, candidate: UnknownCandidate, coefficients: Array,
+    evidence: float, other_variables: tuple[str, ...] = (),
 ) -> Statement:
     """Return the statement that a pattern makes.
 
     Parameters
     ----------
-    library : PatternLibrary
+    drive_patterns : DrivePatterns
         Of the drive.
     candidate : UnknownCandidate
     coefficients : (1 or 2,) array
         Fitted [N].
     evidence : float
-    rivals : tuple of str, optional
+    other_variables : tuple of str, optional
         Variables that would do as well.
     """
     pattern, variable = candidate.pattern, candidate.family.variable
-    drive, series = library.residuals.drives[library.d], library.series
+    drive, series = drive_patterns.residuals.drives[drive_patterns.d], drive_patterns.series
     error = series.error
-    columns = candidate.rows[library.d][:, series.index]
+    columns = candidate.rows[drive_patterns.d][:, series.index]
     shape = coefficients @ columns
     total = max(float(error @ error), 1e-300)
     limits, share, time = pattern.limits, 0.0, 1.0
     if limits is None:
         share = float(np.clip(1 - (error - shape) @ (error - shape) / total, 0.0, 1.0))
         if pattern.kind == 'line':
-            width = 1 / (len(series) * library.residuals.period)
+            width = 1 / (len(series) * drive_patterns.residuals.period)
             limits = (pattern.scale - width, pattern.scale + width)
     else:
         held = np.abs(columns[0]) > 0.5
         if pattern.kind == 'fading':
-            held = np.abs(library.values(variable)) < limits[1]
+            held = np.abs(drive_patterns.values(variable)) < limits[1]
         share, time = float(error[held] @ error[held]) / total, float(held.mean())
     amplitude = float(np.hypot(*coefficients)) if candidate.family.paired else float(
         np.abs(coefficients).max())
@@ -184,34 +184,34 @@ def word_statement(
         # The mean error there, which the table and a plot show; the coefficient is what this
         # pattern has beside the others that overlap it.
         signed = float(error @ columns[0] / (columns[0] @ columns[0]))
-    said = _sentence(variable, pattern, library, signed, amplitude, share, time, shape)
-    if rivals:
-        others = listed([in_words(name) for name in rivals], 'or')
+    said = _sentence(variable, pattern, drive_patterns, signed, amplitude, share, time, shape)
+    if other_variables:
+        others = listed([in_words(name) for name in other_variables], 'or')
         said += f'; {others} would explain it about as well'
     return Statement(drive, variable, limits, share, time, f'{drive}: {said}', evidence,
-                     pattern.kind, amplitude, float(np.mean(shape ** 2)), rivals)
+                     pattern.kind, amplitude, float(np.mean(shape ** 2)), other_variables)
 
 
-def word_scatter(library: PatternLibrary, variable: str, pattern: Pattern, column: Array,
+def word_scatter(drive_patterns: DrivePatterns, variable: str, pattern: Pattern, column: Array,
                  evidence: float) -> Statement:
     """Return the statement that the noise is larger in a range than elsewhere."""
-    drive = library.residuals.drives[library.d]
-    error = library.series.error
+    drive = drive_patterns.residuals.drives[drive_patterns.d]
+    error = drive_patterns.series.error
     held = column > 0.5
     total = max(float(error @ error), 1e-300)
     share, time = float(error[held] @ error[held]) / total, float(held.mean())
-    said = _sentence(variable, pattern, library, 0.0, 0.0, share, time, np.zeros(0))
+    said = _sentence(variable, pattern, drive_patterns, 0.0, 0.0, share, time, np.zeros(0))
     return Statement(drive, variable, pattern.limits, share, time, f'{drive}: {said}',
                      evidence, 'scatter', 0.0, total / len(error) * max(share - time, 0.0))
 
 
 def _sentence(
-    variable: str, pattern: Pattern, library: PatternLibrary, signed: float, amplitude: float,
+    variable: str, pattern: Pattern, drive_patterns: DrivePatterns, signed: float, amplitude: float,
     share: float, time: float, shape: Array,
 ) -> str:
     kind, word = pattern.kind, in_words(variable)
-    residuals = library.residuals
-    units = residuals.units_of(residuals.drives[library.d])
+    residuals = drive_patterns.residuals
+    units = residuals.units_of(residuals.drives[drive_patterns.d])
     effort = units.effort
     if kind == 'offset':
         return (f'its error has a mean of {with_sign(signed)} {effort} over the whole recording, '
@@ -229,11 +229,11 @@ def _sentence(
                 f'{plain(amplitude)} {effort}, {share:.0%} of its squared error')
     if kind in ('growth', 'directed_growth'):
         opposed = ' in the direction of motion' if kind == 'directed_growth' else ''
-        low, high = _ends(library, variable, shape, kind == 'directed_growth')
+        low, high = _ends(drive_patterns, variable, shape, kind == 'directed_growth')
         return (f'its error changes with {word}: {with_sign(low)} {effort} at its least, '
                 f'{with_sign(high)} {effort} at its greatest{opposed}; this is '
                 f'{share:.0%} of its squared error')
-    place = _place(variable, pattern, library)
+    place = _place(variable, pattern, drive_patterns)
     where = f'{share:.0%} of its squared error lies {place}, in {time:.0%} of the time'
     if kind == 'scatter':
         return (f'{where}; it scatters there {plain(float(np.sqrt(pattern.scale)), 2)} times as '
@@ -242,15 +242,15 @@ def _sentence(
     return f'{where}; it is shifted there by {with_sign(signed)} {effort}{along}'
 
 
-def _place(variable: str, pattern: Pattern, library: PatternLibrary) -> str:
+def _place(variable: str, pattern: Pattern, drive_patterns: DrivePatterns) -> str:
     assert pattern.limits is not None
     low, high = pattern.limits
     if variable == 'direction':
         return 'in the positive direction' if low >= 0 else 'in the negative direction'
-    of = variable.partition(' of ')[2] or library.residuals.drives[library.d]
-    factor, unit = read_in(variable, library.residuals.units_of(of))
+    of = variable.partition(' of ')[2] or drive_patterns.residuals.drives[drive_patterns.d]
+    factor, unit = read_in(variable, drive_patterns.residuals.units_of(of))
     word = in_words(variable)
-    values = library.values(variable)
+    values = drive_patterns.values(variable)
     speed = pattern.kind in ('directed_range', 'fast', 'fading') and variable.startswith('velocity')
     if variable.startswith('velocity') and (speed or np.isclose(-low, high)):
         word = word.replace('velocity', 'speed')
@@ -264,11 +264,11 @@ def _place(variable: str, pattern: Pattern, library: PatternLibrary) -> str:
 
 
 def _ends(
-    library: PatternLibrary, variable: str, shape: Array, directed: bool,
+    drive_patterns: DrivePatterns, variable: str, shape: Array, directed: bool,
 ) -> tuple[float, float]:
-    values = library.values(variable)
+    values = drive_patterns.values(variable)
     if directed:
-        shape = shape * library.values('direction')
+        shape = shape * drive_patterns.values('direction')
     order = np.argsort(values)
     few = max(1, len(order) // 100)
     return float(np.median(shape[order[:few]])), float(np.median(shape[order[-few:]]))

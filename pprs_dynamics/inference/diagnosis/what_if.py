@@ -46,10 +46,10 @@ class OptionalPlacement:
         Its columns, those with fitted coefficients and those whose coefficient is 1.
     signs : tuple of (int, float)
         Columns and the bounds below which their coefficients are unphysical.
-    price : float
+    prior_cost : float
         Of its shape and of physical signs, less ln det of its prior's precision.
     hypotheses : tuple of str
-        That it claims: over all placements of an effect each is priced as a name.
+        That it claims: over all placements of an effect each costs the prior odds of a name.
     """
 
     drive: str | None
@@ -58,7 +58,7 @@ class OptionalPlacement:
     columns: tuple[int, ...]
     fixed: tuple[int, ...]
     signs: tuple[tuple[int, float], ...]
-    price: float
+    prior_cost: float
     hypotheses: tuple[str, ...]
 
 
@@ -131,11 +131,11 @@ class WhatIf:
         Whitened products of the columns, with the precision of their prior.
     side : (P,) array
         Whitened products with the error.
-    name_price : float
+    name_prior_cost : float
         Of an effect.
     wrong_sign_odds : float
         Of coefficients beyond their bounds.
-    drive_prices : tuple of float
+    drive_prior_costs : tuple of float
         Of a choice of one drive, of two and so on.
     drives : tuple of OptionalForces
     """
@@ -145,9 +145,9 @@ class WhatIf:
     limited: tuple[int, ...]
     gram: Array = field(repr=False)
     side: Array = field(repr=False)
-    name_price: float
+    name_prior_cost: float
     wrong_sign_odds: float
-    drive_prices: tuple[float, ...]
+    drive_prior_costs: tuple[float, ...]
     drives: tuple[OptionalForces, ...]
 
 
@@ -168,13 +168,13 @@ class _System:
         self.blocks: dict[Component, tuple[Block, ...]] = {}
         for candidates, found in self._tried(selection):
             for candidate in candidates:
-                drives = {one.drive for one in candidate.components}
+                drives = {component.drive for component in candidate.components}
                 self.first_choice.setdefault(candidate.name, drives)
                 for placement in candidate.components:
                     key = (candidate.name, placement.drive)
                     if key not in self.placements:
                         self.placements[key] = placement
-                        self.blocks[placement] = (self.fits.library.block(placement),
+                        self.blocks[placement] = (self.fits.components.block(placement),
                                                   *found.nuisance.get(placement, ()))
         self.unknown = [block for candidate in self.kept.unknowns for block in candidate.blocks]
         blocks = [*self.unknown, *chain.from_iterable(self.blocks.values())]
@@ -200,18 +200,18 @@ class _System:
     def _tried(self, selection: Ranking,
                ) -> Iterable[tuple[tuple[EffectCandidate, ...], CandidateSet]]:
         """Yield the effects of sets, and the sets, those that matter most first."""
-        alone = [one for one in selection.of_first if len(one.candidates) == 1]
+        alone = [fitted for fitted in selection.of_first if len(fitted.candidates) == 1]
         yield selection.order, self.kept
         for sets in (alone, selection.of_last):
-            for one in sorted(sets, key=lambda one: one.total):
-                yield one.effects, one
+            for fitted in sorted(sets, key=lambda fitted: fitted.total):
+                yield fitted.effects, fitted
         # Where no set has an effect, a scan beside what was found says in which shape and where.
         for proposal in Scan(self.fits).proposals(self.kept, least=-inf):
             yield tuple(one for one in proposal if isinstance(one, EffectCandidate)), self.kept
 
     def what_if(self) -> WhatIf:
         """Return what a page needs of it."""
-        fits, prices = self.fits, self.fits.prices
+        fits, prior_costs = self.fits, self.fits.prior_costs
         always = [*range(len(fits.design.base)),
                   *(column for block in self.unknown for column in self.columns[block])]
         return WhatIf(
@@ -221,8 +221,8 @@ class _System:
                     self.placements.items(), key=lambda item: item[0][1] or 0) if of == name)
             ) for name in self.first_choice),
             tuple(always), tuple(np.flatnonzero(self.equations.prior.limited).tolist()),
-            self.gram, self.side, prices.of_name(), fits.decisions.wrong_sign_odds,
-            tuple(prices.of_drives(count + 1) for count in range(len(fits.regression.drives))),
+            self.gram, self.side, prior_costs.of_name(), fits.decisions.wrong_sign_odds,
+            tuple(prior_costs.of_drives(count + 1) for count in range(len(fits.regression.drives))),
             tuple(self._forces(d, drive, index) for d, drive, index in zip(
                 fits.regression.drives, self.equations.drives, self.equations.indices,
                 strict=True)))
@@ -233,14 +233,14 @@ class _System:
         free = [block for block in own if block.mean is None]
         return OptionalPlacement(
             None if d is None else self.fits.design.drives[d],
-            any(placement in one.components for one in self.kept.effects),
+            any(placement in candidate.components for candidate in self.kept.effects),
             d in self.first_choice[effect.name],
             tuple(column for block in free for column in self.columns[block]),
             tuple(column for block in own if block.mean is not None
                   for column in self.columns[block]),
             tuple((column, effect.unphysical_below[name]) for name, column in zip(
                 placement.names, self.columns[own[0]], strict=False) if name in placement.signed),
-            self.fits.library.component_price(placement).total
+            self.fits.components.component_prior_cost(placement).total
             - sum(float(np.linalg.slogdet(one.precision)[1]) for one in free),
             tuple(sorted(map(str, effect.hypotheses(placement.names)))))
 

@@ -103,7 +103,7 @@ class Explanation:
         Places of the columns that make up its force.
     truth : (k,) array
         Their coefficients where it is there as the recordings say.
-    price : float
+    prior_cost : float
         Against nothing: of its choice and of its coefficients.
     """
 
@@ -112,7 +112,7 @@ class Explanation:
     free: tuple[int, ...]
     index: tuple[int, ...]
     truth: Array
-    price: float = 0.0
+    prior_cost: float = 0.0
 
     @property
     def name(self) -> str:

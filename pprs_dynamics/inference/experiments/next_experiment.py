@@ -308,7 +308,7 @@ def _evidences(question: Question, after: Array) -> dict[str, float]:
     found: dict[str, float] = {}
     for one in question.subjects:
         own = Precision(one.index, base, np.ones(len(one.index))).own(after)
-        evidence = float(one.truth @ own @ one.truth) - one.price
+        evidence = float(one.truth @ own @ one.truth) - one.prior_cost
         found[one.name] = min(evidence, found.get(one.name, np.inf))
     return found
 

@@ -37,7 +37,7 @@ from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.search.candidates import (
     CandidateSet,
     EffectCandidate,
-    Prices,
+    PriorCosts,
     names_of,
 )
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
@@ -156,41 +156,32 @@ def question_after(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
 
 
 def _separation(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
-    """Return how to tell sets apart, each pair of effects in the sets of lowest cost."""
-    pairs: set[tuple[str, str]] = set()
-    sets = [ranking.reported]
-    for rival in rivals:
-        new = set(product(rival.missing, rival.instead))
-        if not new <= pairs:
-            pairs |= new
-            sets.append(rival.found)
+    """Return how to tell sets apart: each tried by the data that each other one predicts."""
+    sets = _told_apart(ranking, rivals)
     # The last search, or the first where one of the sets is linear around its point.
-    fits = (ranking.last if all(ranking.fits_of(one) is ranking.last for one in sets)
+    fits = (ranking.last if all(ranking.fits_of(fitted) is ranking.last for fitted in sets)
             else ranking.first)
-    placed = [fits.evaluate(one.candidates) for one in sets]
+    placed = [fits.evaluate(fitted.candidates) for fitted in sets]
     terms = _Terms()
-    parts = [terms.of_set(one) for one in placed]
-    further = {(k, j): terms.on_drives_of(placed[k], placed[j])
-               for k, j in permutations(range(len(sets)), 2)}
+    parts = [terms.of_set(fitted) for fitted in placed]
+    # A set that is refitted to what another one predicts may also be on that one's drives.
+    joining = {(refitted, true): terms.on_drives_of(placed[refitted], placed[true])
+               for refitted, true in permutations(range(len(sets)), 2)}
     plan = ColumnPlan.of_design(fits.design, terms.all)
-    # By name, and two of the same name by link or joint.
-    claims = [{c.claim: c.name for c in one.effects} for one in placed]
-    moved = {name for one in claims[1:] for claim, name in one.items()
-             if name in claims[0].values() and claim not in claims[0]}
-    explanations = [_explanation([claim if name in moved else name
-                                  for claim, name in mine.items()], own, plan, 0.0)
-                    for mine, own in zip(claims, parts, strict=True)]
+    explanations = [_explanation(names, part, plan, 0.0)
+                    for names, part in zip(_names_apart(placed), parts, strict=True)]
     contests = []
-    for (k, j), more in further.items():
-        free = explanations[k].free + tuple(
-            place for term in more for place in _places(plan, term)[term.free])
-        contest = Contest(explanations[j], explanations[k], (*range(len(plan.base)), *free),
-                          sets[k].cost - sets[j].cost)
-        refitted = [*(term for term, _ in parts[k]), *more]
-        sides = {name.partition(':')[0] for name in contest.sides[0]}
-        own = [term for term, _ in parts[j] if term.effect.name in sides]
+    for (refitted, true), joined in joining.items():
+        free = explanations[refitted].free + tuple(
+            place for term in joined for place in _places(plan, term)[term.free])
+        contest = Contest(explanations[true], explanations[refitted],
+                          (*range(len(plan.base)), *free), sets[refitted].cost - sets[true].cost)
+        only_true = {name.partition(':')[0] for name in contest.sides[0]}
+        to_imitate = [term for term, _ in parts[true] if term.effect.name in only_true]
+        free_terms = [*(term for term, _ in parts[refitted]), *joined]
         # An effect that can be all that another one is fits it on any motion.
-        if all(contest.sides) and not all(_holds(refitted, one, fits.design) for one in own):
+        if all(contest.sides) and not all(
+                _holds(free_terms, term, fits.design) for term in to_imitate):
             contests.append(contest)
     subjects = [_explanation([c.name], terms.of_candidate(placed[0], c), plan, 0.0)
                 for c in placed[0].effects]
@@ -198,13 +189,34 @@ def _separation(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
                   subjects)
 
 
+def _told_apart(ranking: Ranking, rivals: Sequence[Rival]) -> list[CandidateSet]:
+    """Return the reported set and, of each further pair of effects, the best set with it."""
+    pairs: set[tuple[str, str]] = set()
+    sets = [ranking.reported]
+    for rival in rivals:
+        new = set(product(rival.missing, rival.instead))
+        if not new <= pairs:
+            pairs |= new
+            sets.append(rival.fitted)
+    return sets
+
+
+def _names_apart(sets: Sequence[CandidateSet]) -> list[list[str]]:
+    """Return the names of each set's effects, those that are elsewhere than in the first placed."""
+    first, *others = names = [{c.placed_name: c.name for c in fitted.effects} for fitted in sets]
+    moved = {name for other in others for placed_name, name in other.items()
+             if name in first.values() and placed_name not in first}
+    return [[placed_name if name in moved else name for placed_name, name in of_set.items()]
+            for of_set in names]
+
+
 def _estimation(fits: FittedSets, adopted: CandidateSet) -> Question:
     """Return how to measure the parameters of effects that are there."""
     terms = _Terms()
     parts = [terms.of_candidate(adopted, c) for c in adopted.effects]
     plan = ColumnPlan.of_design(fits.design, terms.all)
-    samples = fits.library.prices.samples
-    subjects = [_explanation([c.name], own, plan, fits.library.price(c).total + sum(
+    samples = fits.components.prior_costs.samples
+    subjects = [_explanation([c.name], own, plan, fits.components.prior_cost(c).total + sum(
         len(term.names) for term, _ in own) * log(samples))
         for c, own in zip(adopted.effects, parts, strict=True)]
     return _asked('estimate', fits, adopted, plan, precision_of(plan, subjects), (), subjects)
@@ -224,19 +236,19 @@ def _excitation(fits: FittedSets, nothing: CandidateSet) -> Question:
         if np.any(gain[here] * found.scales ** 2 < fits.decisions.unexcited):
             weak.append(found)
     plan = ColumnPlan.of_design(fits.design, weak)
-    subjects = subjects_of(plan, fits.library.prices)
+    subjects = subjects_of(plan, fits.components.prior_costs)
     return _asked('excite', fits, nothing, plan, precision_of(plan, subjects), (), subjects)
 
 
-def subjects_of(plan: ColumnPlan, prices: Prices) -> list[Explanation]:
+def subjects_of(plan: ColumnPlan, prior_costs: PriorCosts) -> list[Explanation]:
     """Return each term of a plan as an effect that may be there."""
     subjects = []
     for term in plan.terms:
-        price = (prices.of_name() + prices.of_component(term.effect, 1)
-                 + len(term.names) * log(prices.samples))
+        prior_cost = (prior_costs.of_name() + prior_costs.of_component(term.effect, 1)
+                      + len(term.names) * log(prior_costs.samples))
         if term.drive is not None:
-            price += prices.of_drives(1)
-        subjects.append(_explanation([term.effect.name], [(term, term.values)], plan, price))
+            prior_cost += prior_costs.of_drives(1)
+        subjects.append(_explanation([term.effect.name], [(term, term.values)], plan, prior_cost))
     return subjects
 
 
@@ -244,15 +256,15 @@ def precision_of(plan: ColumnPlan, subjects: Sequence[Explanation]) -> Precision
     """Return how well effects are known beside the base; without any, the model's numbers."""
     if not subjects:
         return Precision(plan.numbers, plan.others, np.ones(len(plan.numbers)))
-    scales = np.concatenate([term.scales for one in subjects for term in one.terms])
+    scales = np.concatenate([term.scales for subject in subjects for term in subject.terms])
     return Precision(free_of(subjects), tuple(range(len(plan.base))), scales)
 
 
-def _asked(kind: str, fits: FittedSets, found: CandidateSet, plan: ColumnPlan,
+def _asked(kind: str, fits: FittedSets, fitted: CandidateSet, plan: ColumnPlan,
            criterion: Separation | Precision, contests: Sequence[Contest],
            subjects: Sequence[Explanation]) -> Question:
     """Return a question under the noise of a set."""
-    regression, fit = fits.regression, found.fit
+    regression, fit = fits.regression, fitted.fit
     noise = regression.noise(fit)
     known = Information(plan, noise).of_recordings(fits.design, regression, fit)
     floor = max(regression.noise_floor(fit, d) for d in regression.drives)
@@ -271,28 +283,29 @@ class _Terms:
         """In the order in which they came."""
         return tuple(self._found.values())
 
-    def of_set(self, found: CandidateSet) -> list[Part]:
+    def of_set(self, fitted: CandidateSet) -> list[Part]:
         """Return the terms of a set."""
-        return [part for c in found.effects for part in self.of_candidate(found, c)]
+        return [part for c in fitted.effects for part in self.of_candidate(fitted, c)]
 
-    def of_candidate(self, found: CandidateSet, candidate: EffectCandidate) -> list[Part]:
+    def of_candidate(self, fitted: CandidateSet, candidate: EffectCandidate) -> list[Part]:
         """Return the terms of an effect of a set."""
         parts = []
-        for one in candidate.components:
-            values = found.coefficients(one)
-            term = FittedTerm(candidate.effect, one.drive, one.parameters, one.names, values,
-                              one.centre)
+        for component in candidate.components:
+            values = fitted.coefficients(component)
+            term = FittedTerm(candidate.effect, component.drive, component.parameters,
+                              component.names, values, component.centre)
             parts.append((self._once(term), values))
         return parts
 
-    def on_drives_of(self, found: CandidateSet, truth: CandidateSet) -> list[FittedTerm]:
+    def on_drives_of(self, fitted: CandidateSet, truth: CandidateSet) -> list[FittedTerm]:
         """Return the effects of a set on further drives, where those of another set sit."""
         theirs = {d for c in truth.effects for d in c.drives or ()}
         more = []
-        for c in found.effects:
+        for c in fitted.effects:
             first = c.components[0]
-            if c.drives is not None and c.name not in {one.name for one in truth.effects} and (
-                    len(found.blocks[first].rows) == 1):
+            known = {candidate.name for candidate in truth.effects}
+            if c.drives is not None and c.name not in known and (
+                    len(fitted.blocks[first].rows) == 1):
                 values = np.zeros(len(first.names)) if first.names else np.ones(1)
                 more += [self._once(FittedTerm(c.effect, d, first.parameters, first.names, values))
                          for d in sorted(theirs - set(c.drives))]
@@ -304,7 +317,7 @@ class _Terms:
         return self._found.setdefault(key, term)
 
 
-def _explanation(names: Sequence[str], parts: Sequence[Part], plan: ColumnPlan, price: float,
+def _explanation(names: Sequence[str], parts: Sequence[Part], plan: ColumnPlan, prior_cost: float,
                  ) -> Explanation:
     places = [_places(plan, term) for term, _ in parts]
     return Explanation(
@@ -312,7 +325,7 @@ def _explanation(names: Sequence[str], parts: Sequence[Part], plan: ColumnPlan, 
         tuple(k for place, (term, _) in zip(places, parts, strict=True) for k in place[term.free]),
         tuple(k for place, (_, values) in zip(places, parts, strict=True)
               for k in place[:len(values)]),
-        np.concatenate([values for _, values in parts]), price)
+        np.concatenate([values for _, values in parts]), prior_cost)
 
 
 def _places(plan: ColumnPlan, term: FittedTerm) -> range:
@@ -380,7 +393,7 @@ def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: flo
         plan = ColumnPlan(model, model, base_without_recordings(model), tuple(terms))
         spectra = dict.fromkeys(range(len(DRIVES)), white)
         known = Information(plan, spectra).prior()
-    subjects = subjects_of(plan, Prices(names_of(model), len(DRIVES), samples, decisions))
+    subjects = subjects_of(plan, PriorCosts(names_of(model), len(DRIVES), samples, decisions))
     scales = np.concatenate([np.ones(len(plan.numbers)), *(term.scales for term in terms)])
     criterion = Precision((*plan.numbers, *free_of(subjects)), plan.others, scales)
     return Question('commission', plan, spectra, known, criterion, (), tuple(subjects), noise,

@@ -61,7 +61,7 @@ def without_absorbed(search: Search, map_set: CandidateSet,
         # What paid beside them only is not kept for their sake, and neither are shapes.
         reported = fits.refined(fits.pruned(reported))
     names = {candidate.name for candidate in reported.candidates}
-    return map_set, reported, tuple(one for one in absorbed if one.candidate.name not in names)
+    return map_set, reported, tuple(pair for pair in absorbed if pair.candidate.name not in names)
 
 
 def beyond_discrepancy(fits: FittedSets, map_set: CandidateSet,
@@ -83,15 +83,15 @@ def beyond_discrepancy(fits: FittedSets, map_set: CandidateSet,
     return rest, tuple(absorbed)
 
 
-def _is_of_loads(fits: FittedSets, found: CandidateSet, candidate: Candidate) -> bool:
+def _is_of_loads(fits: FittedSets, fitted: CandidateSet, candidate: Candidate) -> bool:
     """Return whether a candidate is friction of drives that an effect beside it loads.
 
     Friction may follow such loads or not, which is known to first order only.
     """
     return (isinstance(candidate, EffectCandidate) and candidate.effect.is_friction
             and issubclass(candidate.effect, DriveEffect)
-            and any(fits.library.term(one).bare for other in found.effects
-                    if other is not candidate for one in other.components))
+            and any(fits.components.term(component).bare for other in fitted.effects
+                    if other is not candidate for component in other.components))
 
 
 def _over_noise(fits: FittedSets, map_set: CandidateSet, smaller: CandidateSet) -> float:
@@ -101,8 +101,8 @@ def _over_noise(fits: FittedSets, map_set: CandidateSet, smaller: CandidateSet) 
     return float(np.max(regression.left(smaller.fit) / np.maximum(noise, 1e-300)))
 
 
-def _absorbable(fits: FittedSets, found: CandidateSet) -> dict[Candidate, tuple[str, ...]]:
+def _absorbable(fits: FittedSets, fitted: CandidateSet) -> dict[Candidate, tuple[str, ...]]:
     """Return the candidates within the model discrepancy of others, and of which."""
-    ratios = {candidate: discrepancy_ratio(fits.design, fits.regression, fits.decisions, found,
-                                           candidate) for candidate in found.candidates}
+    ratios = {candidate: discrepancy_ratio(fits.design, fits.regression, fits.decisions, fitted,
+                                           candidate) for candidate in fitted.candidates}
     return {candidate: names for candidate, (ratio, names) in ratios.items() if ratio < 1}

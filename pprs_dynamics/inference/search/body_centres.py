@@ -99,7 +99,7 @@ def find_centre(term: Term, mass: str, error: Array, scale: Mapping[int, float],
 
     best = min((least_squares(left, start, bounds=(-1, 1), max_nfev=40, xtol=CLOSE,
                               ftol=CLOSE / 10, gtol=CLOSE / 10) for start in STARTS),
-               key=lambda one: float(one.cost))
+               key=lambda fitted: float(fitted.cost))
     return tuple((size * best.x).tolist())
 
 

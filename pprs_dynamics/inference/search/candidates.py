@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What may be missing: effects on drives, in the structure, and their prices."""
+"""What may be missing: effects on drives, in the structure, and their prior costs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE, catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 
-Claims = frozenset[str]  # the names of a set's effects, bodies and joint friction with their place
+PlacedNames = frozenset[str]  # of a set's effects; of bodies and joint friction with their place
 COURSE_TIMES = 200  # beginnings that are tried, evenly over the recordings
 SINCE, DURING, DRIFT = 'since', 'during', 'drift'  # kinds of courses
 
@@ -60,7 +60,7 @@ class Course:
 class Component:
     """An effect on one drive or in the structure: what it is, and no arrays.
 
-    The columns come from a linearisation (`Library.block`), so that a component means the same
+    The columns come from a linearisation (`Components.block`), so that a component means the same
     around every operating point.
 
     Parameters
@@ -98,7 +98,7 @@ class Component:
         """Return whether all linear parameters are within their bounds in a drive of such units."""
         values = self.values(coefficients)
         return all(p.lower <= values[p.name] <= p.upper
-                   for p in (one.of(units.turns) for one in self.effect.linear))
+                   for p in (parameter.of(units.turns) for parameter in self.effect.linear))
 
     @property
     def signed(self) -> tuple[str, ...]:
@@ -162,7 +162,7 @@ class EffectCandidate:
         return self.components[0].course
 
     @property
-    def claim(self) -> str:
+    def placed_name(self) -> str:
         """Name, with the link or joint of an effect that is on one: what a rival denies."""
         places = self.effect.places_of(self.components[0].names)
         return f'{self.name}:{places[0][0]}' if places else self.name
@@ -185,13 +185,13 @@ class EffectCandidate:
 
     @property
     def hypotheses(self) -> frozenset[Hashable]:
-        """What it claims, each priced as a name.
+        """What it says is there, each of the prior odds of a name.
 
         With other coefficients, on other drives or on one, it may be more than one hypothesis:
         asymmetric friction that is dry and viscous is two.
         """
-        return frozenset[Hashable]().union(*(self.effect.hypotheses(one.names)
-                                             for one in self.components))
+        return frozenset[Hashable]().union(*(self.effect.hypotheses(component.names)
+                                             for component in self.components))
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +208,7 @@ class UnknownCandidate:
         In time [1].
     parts : mapping of drive to Block
     terms : CostTerms
-        Of its price.
+        Of its prior cost.
     """
 
     components: ClassVar[tuple[Component, ...]] = ()  # none of the catalogue's
@@ -220,7 +220,7 @@ class UnknownCandidate:
     terms: CostTerms
 
     @property
-    def price(self) -> float:
+    def prior_cost(self) -> float:
         """Of everything that was chosen."""
         return self.terms.total
 
@@ -262,7 +262,7 @@ class CandidateSet:
     candidates : tuple of Candidate
     fit : JointFit
     terms : CostTerms
-        Of the penalised deviance with all prices.
+        Of the penalised deviance with all prior costs.
     blocks : mapping of Component to Block
         Columns of the components.
     nuisance : mapping of Component to tuple of Block
@@ -305,9 +305,9 @@ class CandidateSet:
         return tuple(c for c in self.candidates if isinstance(c, EffectCandidate))
 
     @property
-    def claims(self) -> Claims:
-        """What its effects claim."""
-        return frozenset(candidate.claim for candidate in self.effects)
+    def placed_names(self) -> PlacedNames:
+        """Those of its effects."""
+        return frozenset(candidate.placed_name for candidate in self.effects)
 
     @property
     def is_nonlinear(self) -> bool:
@@ -321,7 +321,7 @@ class CandidateSet:
 
     def without(self, *gone: Candidate) -> tuple[Candidate, ...]:
         """Return the candidates but some."""
-        return tuple(c for c in self.candidates if not any(c is one for one in gone))
+        return tuple(c for c in self.candidates if not any(c is left_out for left_out in gone))
 
     def coefficients(self, component: Component) -> Array:
         """Return the coefficients of a component; not that of what is known of it."""
@@ -345,7 +345,7 @@ def names_of(model: ForceModel) -> int:
 
 
 @dataclass(frozen=True)
-class Prices:
+class PriorCosts:
     """Twice the logarithms of prior odds, for everything that is chosen.
 
     Parameters
@@ -365,8 +365,8 @@ class Prices:
 
     @classmethod
     def of(cls, regression: Regression, decisions: Decisions,
-           model: ForceModel | None = None) -> Prices:
-        """Return the prices for the drives and samples of a regression, of a model's errors.
+           model: ForceModel | None = None) -> PriorCosts:
+        """Return the prior costs for the drives and samples of a regression, of a model's errors.
 
         Names are those of effects that can act in what it is a model of, those of other packages
         among them. Of errors without a model they are the package's own.
@@ -375,11 +375,11 @@ class Prices:
         return cls(names, len(regression.drives), regression.samples, decisions)
 
     def of_name(self) -> float:
-        """Return the price of one more effect, whichever."""
+        """Return the prior cost of one more effect, whichever."""
         return 2 * log(self.names) - 2 * log(self.decisions.effect_odds)
 
     def of_drives(self, count: int) -> float:
-        """Return the price of a choice of drives: all, one or some; how many, and which.
+        """Return the prior cost of a choice of drives: all, one or some; how many, and which.
 
         One cause is in one drive or in all of them; to be in five of seven takes five.
         """
@@ -389,43 +389,43 @@ class Prices:
 
     def of_candidate(self, candidate: Candidate,
                      of_component: Callable[[Component], CostTerms]) -> CostTerms:
-        """Return the price of what was chosen: hypotheses, drives, and each component."""
+        """Return the prior cost of what was chosen: hypotheses, drives, and each component."""
         if isinstance(candidate, UnknownCandidate):
             return candidate.terms
         terms = CostTerms(
             names=len(candidate.hypotheses) * self.of_name(),
             drives=0.0 if candidate.drives is None else self.of_drives(len(candidate.components)),
             shapes=0.0 if candidate.course is None else self.of_course(candidate.course))
-        return sum((of_component(one) for one in candidate.components), terms)
+        return sum((of_component(component) for component in candidate.components), terms)
 
     def of_component(self, effect: type[CatalogueEffect], tried: int) -> float:
-        """Return the price of a variant and of a shape among those tried.
+        """Return the prior cost of a variant and of a shape among those tried.
 
         A shape is worth at least what a coefficient of weak prior is.
         """
-        price = 2 * log(len(effect.variants))
+        prior_cost = 2 * log(len(effect.variants))
         if effect.shape:
-            price += max(len(effect.shape) * log(self.samples), 2 * log(max(tried, 1)))
-        return price
+            prior_cost += max(len(effect.shape) * log(self.samples), 2 * log(max(tried, 1)))
+        return prior_cost
 
     def of_course(self, course: Course) -> float:
-        """Return the price of a change within the recordings: that there is one, and when."""
+        """Return the prior cost of a change within the recordings: that there is one, and when."""
         times = {SINCE: 1, DURING: 2, DRIFT: 0}[course.kind]
         return 2 * times * log(COURSE_TIMES) - 2 * log(self.decisions.effect_odds)
 
     def of_width(self, tried: int) -> float:
-        """Return the price of a width of reversal that is another than the model's, on a drive."""
+        """Return the prior cost of a width of reversal other than the model's, on a drive."""
         return (2 * log(self.drives) - 2 * log(self.decisions.effect_odds)
                 + max(log(self.samples), 2 * log(tried)))
 
     def of_pattern(self, families: int, patterns: int, drives: int) -> CostTerms:
-        """Return the price of an unknown pattern among those tried on each drive."""
+        """Return the prior cost of an unknown pattern among those tried on each drive."""
         return CostTerms(names=self.of_name() - 2 * log(self.decisions.unknown_odds),
                          drives=self.of_drives(drives),
                          shapes=2 * log(families) + 2 * log(patterns))
 
     def of_right_signs(self, component: Component) -> float:
-        """Return the price of physical signs: less than nothing.
+        """Return the prior cost of physical signs: less than nothing.
 
         The prior of k signed coefficients is symmetric; of its 2^k orthants one has all but the
         odds of a wrong sign, and the others share these.

@@ -46,7 +46,7 @@ class _Offer:
         """Return whether it may pay for itself, beyond the margin of rivals."""
         course = self.candidate.course
         return course is not None and (
-            self.gain > fits.prices.of_course(course) + fits.decisions.rival_margin)
+            self.gain > fits.prior_costs.of_course(course) + fits.decisions.rival_margin)
 
 
 def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[CandidateSet],
@@ -63,35 +63,36 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
     others : iterable of CandidateSet
         Of one effect each, that may be the right one with a step in time.
     """
-    own = [(kept, one) for one in kept.effects if _is_new(one)]
+    own = [(kept, candidate) for candidate in kept.effects if _is_new(candidate)]
     if not kept.unknowns and not any(
             offer.is_worth_a_fit(fits) for offer in _offers(fits, kept, own)):
         return fits, kept
     # Sets of their own: those of the search are of constant forms, and so are its rivals.
     dated = FittedSets(fits.design, fits.decisions, fits.regression.error_scale)
     best = dated.evaluate(kept.candidates)
-    names = {one.name for one in kept.effects}
-    more = [(one, one.effects[0]) for one in (*others, *_alone_on_drives(fits, kept))
-            if one.effects[0].name not in names and _is_new(one.effects[0])]
+    names = {candidate.name for candidate in kept.effects}
+    more = [(other, other.effects[0]) for other in (*others, *_alone_on_drives(fits, kept))
+            if other.effects[0].name not in names and _is_new(other.effects[0])]
     likely: list[EffectCandidate] = []
     for _ in range(MOST_COURSES):
-        held = [(best, one) for one in best.effects if not one.course and _is_new(one)]
+        held = [(best, candidate) for candidate in best.effects
+                if not candidate.course and _is_new(candidate)]
         # Patterns of no catalogue imitate what changes: offers are beside effects alone.
         plain = dated.at_noise_of(best, best.effects) if best.unknowns else best
-        offers = sorted(_offers(dated, plain, [*held, *more]), key=lambda one: -one.gain)
+        offers = sorted(_offers(dated, plain, [*held, *more]), key=lambda offer: -offer.gain)
         found, offered = best, _best_of_each(offers)
-        likely += [one.candidate for one in offered]
+        likely += [offer.candidate for offer in offered]
         for offer in offered:
             for rest in _rests(best, offer.candidate):
                 tried = dated.pruned(dated.evaluate((*rest, offer.candidate)))
-                found = min(found, tried, key=lambda one: one.cost)
+                found = min(found, tried, key=lambda fitted: fitted.cost)
         if not found.cost < best.cost - fits.decisions.rival_margin:
             break
         best = _refined(dated, found)
-    best = _simplest(dated, best, {one.effect: one for one in (
-        *(one for _, one in own), *likely)}.values())
+    best = _simplest(dated, best, {candidate.effect: candidate for candidate in (
+        *(candidate for _, candidate in own), *likely)}.values())
     best, _ = beyond_discrepancy(dated, best)
-    return (dated, best) if any(one.course for one in best.effects) else (fits, kept)
+    return (dated, best) if any(candidate.course for candidate in best.effects) else (fits, kept)
 
 
 def _alone_on_drives(fits: FittedSets, kept: CandidateSet) -> Iterator[CandidateSet]:
@@ -101,14 +102,14 @@ def _alone_on_drives(fits: FittedSets, kept: CandidateSet) -> Iterator[Candidate
     the search's to propose.
     """
     base = fits.evaluate(()).fit
-    for d in sorted({d for one in kept.unknowns for d in one.drives}):
-        for component, _ in fits.library.local[d].offers(base).values():
+    for d in sorted({d for unknown in kept.unknowns for d in unknown.drives}):
+        for component, _ in fits.components.local[d].offers(base).values():
             yield fits.evaluate((EffectCandidate.of([component]),))
 
 
 def _is_new(candidate: EffectCandidate) -> bool:
     """Return whether the given model lacks an effect: what it has is there all the time."""
-    return not any(one.given for one in candidate.components)
+    return not any(component.given for component in candidate.components)
 
 
 def _courses(fits: FittedSets) -> Iterator[Course]:
@@ -127,10 +128,10 @@ def _offers(fits: FittedSets, base: CandidateSet,
     """Yield effects with the course that lowers the deviance most, by the force that they had."""
     residuals, shape = fits.design.residuals, fits.design.residuals.measured.shape
     courses = list(_courses(fits))
-    weights = np.array([one.weight(residuals.time, residuals.period) for one in courses])
+    weights = np.array([course.weight(residuals.time, residuals.period) for course in courses])
     lengths = weights.sum(axis=1)
     for found, candidate in effects:
-        force = fits.library.force(found, candidate, shape)
+        force = fits.components.force(found, candidate, shape)
         rows = {d: fits.regression.series[d].transform(
             (weights * force[:, d]).astype(np.float32)) for d in fits.regression.drives
             if np.any(force[:, d])}
@@ -141,7 +142,7 @@ def _offers(fits: FittedSets, base: CandidateSet,
         test = ScoreTest(fits.regression, every,
                          [Entry(course, (k,)) for k, course in enumerate(courses)])
         # A stretch of no more samples than coefficients can be explained by anything.
-        told = lengths > sum(len(one.names) for one in candidate.components)
+        told = lengths > sum(len(component.names) for component in candidate.components)
         for labels, gains in test.gains(base.fit):
             gains = np.where(told, gains, -np.inf)
             ranked = np.argsort(-gains)
@@ -153,98 +154,100 @@ def _offers(fits: FittedSets, base: CandidateSet,
 def _best_of_each(offers: list[_Offer]) -> list[_Offer]:
     """Return the best offers of different effects and kinds of course."""
     found: dict[tuple[str, str], _Offer] = {}
-    for one in offers:
-        assert one.candidate.course is not None
-        found.setdefault((one.candidate.name, one.candidate.course.kind), one)
+    for offer in offers:
+        assert offer.candidate.course is not None
+        found.setdefault((offer.candidate.name, offer.candidate.course.kind), offer)
     return list(found.values())[:2 * COURSE_TRIALS]
 
 
 def _rests(base: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
     """Yield what may stand beside a candidate: all else, and all but what imitates it."""
-    effects = tuple(one for one in base.effects if one.effect is not candidate.effect)
-    rests: list[Candidates] = [tuple(one for one in effects if one.course), effects,
+    effects = tuple(effect for effect in base.effects if effect.effect is not candidate.effect)
+    rests: list[Candidates] = [tuple(effect for effect in effects if effect.course), effects,
                                (*effects, *base.unknowns)]
     yield from dict.fromkeys(rests)
 
 
 def _with_course(candidate: EffectCandidate, course: Course) -> EffectCandidate:
-    return EffectCandidate.of(replace(one, course=course) for one in candidate.components)
+    return EffectCandidate.of(replace(component, course=course)
+                              for component in candidate.components)
 
 
-def _refined(fits: FittedSets, found: CandidateSet) -> CandidateSet:
+def _refined(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
     """Return a set with beginnings and ends where they cost least.
 
     At the noise of the set: with its own, one that is a block off costs as much as one that is
     far off.
     """
     time = fits.design.residuals.time
-    for candidate in found.effects:
+    for candidate in fitted.effects:
         course = candidate.course
         if course is None or course.kind == DRIFT:
             continue
-        rest = found.without(candidate)
+        rest = fitted.without(candidate)
         step = float(time[-1] - time[0]) / (
             STRETCHES if course.kind == DURING else COURSE_TIMES)
-        best = fits.at_noise_of(found, found.candidates).total
+        best = fits.at_noise_of(fitted, fitted.candidates).total
         for _ in range(COURSE_HALVINGS):
             step /= 2
             moved = [replace(course, begin=course.begin + by) for by in (-step, step)]
             if course.kind == DURING:
-                moved += [replace(one, end=one.end + by) for one in (course, *moved)
+                moved += [replace(course, end=course.end + by) for course in (course, *moved)
                           for by in (-step, step)]
-            for one in moved:
-                if one.begin < one.end - step:
+            for tried in moved:
+                if tried.begin < tried.end - step:
                     total = fits.at_noise_of(
-                        found, (*rest, _with_course(candidate, one))).total
+                        fitted, (*rest, _with_course(candidate, tried))).total
                     if total < best:
-                        best, course = total, one
-        found = min(found, fits.evaluate((*rest, _with_course(candidate, course))),
-                    key=lambda one: one.cost)
-    return found
+                        best, course = total, tried
+        fitted = min(fitted, fits.evaluate((*rest, _with_course(candidate, course))),
+                     key=lambda fitted: fitted.cost)
+    return fitted
 
 
-def _simplest(fits: FittedSets, found: CandidateSet, effects: Iterable[EffectCandidate],
+def _simplest(fits: FittedSets, fitted: CandidateSet, effects: Iterable[EffectCandidate],
               ) -> CandidateSet:
     """Return the best of a set and those in which one effect changes when several did.
 
     What changes at one time has one cause, and what comes and goes is one stretch.
     """
-    courses = [one.course for one in found.effects if one.course is not None]
-    edges = sorted({at for one in courses if one.kind != DRIFT
-                    for at in ((one.begin, one.end) if one.kind == DURING else (one.begin,))})
+    courses = [candidate.course for candidate in fitted.effects if candidate.course is not None]
+    edges = sorted({at for course in courses if course.kind != DRIFT
+                    for at in ((course.begin, course.end)
+                               if course.kind == DURING else (course.begin,))})
     first, last = fits.design.residuals.time[[0, -1]].tolist()
     ends = np.linspace(first, last, STRETCHES + 1).tolist()
-    dated = {one.effect for one in found.effects if one.course is not None}
+    dated = {candidate.effect for candidate in fitted.effects if candidate.course is not None}
     tried = [*(Course(SINCE, at, last) for at in edges),
              *(Course(DURING, begin, end) for k, begin in enumerate(edges)
                for end in edges[k + 1:])]
-    constant = tuple(one for one in found.effects if one.course is None)
+    constant = tuple(candidate for candidate in fitted.effects if candidate.course is None)
     simpler: list[CandidateSet] = []
     for effect in effects:
-        beside = tuple(one for one in constant if one.effect is not effect.effect)
+        beside = tuple(present for present in constant if present.effect is not effect.effect)
         # What begins may end where nothing else begins.
         more = [Course(DURING, begin, end) for begin in edges for end in ends
                 if end > begin] if effect.effect in dated else []
         simpler += [fits.evaluate((*rest, _with_course(effect, course)))
                     for course in (*tried, *more) for rest in dict.fromkeys(((), beside))]
     best: dict[tuple[str, str], CandidateSet] = {}
-    for one in sorted(simpler, key=lambda one: one.cost):
-        changing = next(effect for effect in one.effects if effect.course is not None)
+    for other in sorted(simpler, key=lambda fitted: fitted.cost):
+        changing = next(effect for effect in other.effects if effect.course is not None)
         assert changing.course is not None
-        best.setdefault((changing.name, changing.course.kind), one)
+        best.setdefault((changing.name, changing.course.kind), other)
     # A change that is a hundredth of a second off costs more than patterns that make it good.
-    return _lasting(fits, min([found, *(fits.pruned(_refined(fits, one))
-                                        for one in list(best.values())[:2 * COURSE_TRIALS])],
-                              key=lambda one: one.cost))
+    return _lasting(fits, min([fitted, *(fits.pruned(_refined(fits, offer))
+                                         for offer in list(best.values())[:2 * COURSE_TRIALS])],
+                              key=lambda fitted: fitted.cost))
 
 
-def _lasting(fits: FittedSets, found: CandidateSet) -> CandidateSet:
+def _lasting(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
     """Return a set in which what is there for a stretch stays, where that costs less."""
     last = float(fits.design.residuals.time[-1])
-    for candidate in found.effects:
+    for candidate in fitted.effects:
         course = candidate.course
         if course is not None and course.kind == DURING:
             stays = _with_course(candidate, Course(SINCE, course.begin, last))
-            found = min(found, _refined(fits, fits.evaluate((*found.without(candidate), stays))),
-                        key=lambda one: one.cost)
-    return found
+            fitted = min(fitted, _refined(fits, fits.evaluate((*fitted.without(candidate), stays))),
+                         key=lambda fitted: fitted.cost)
+    return fitted

@@ -24,8 +24,8 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
+from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.library import placed
 from pprs_dynamics.inference.search.reversal_widths import place_of
 from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -89,7 +89,7 @@ class Estimates:
     moments: dict[str, Estimate] = field(default_factory=dict)
 
 
-def estimate(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
+def estimate(fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
              are_drives_known: bool = False) -> Estimates:
     """Return the parameters of an effect, in the values that the set has.
 
@@ -99,28 +99,28 @@ def estimate(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
     Parameters
     ----------
     fits : FittedSets
-    found : CandidateSet
+    fitted : CandidateSet
     candidate : EffectCandidate
         Of the set.
     are_drives_known : bool
         It is on these drives for certain: somebody chose them.
     """
-    slopes = dict(fits.slopes(found))
-    elsewhere = [] if are_drives_known else _told_elsewhere(fits, found, candidate)
-    fit = fits.regression.stated(found.fit, [*slopes.values(), *elsewhere])
+    slopes = dict(fits.slopes(fitted))
+    elsewhere = [] if are_drives_known else _told_elsewhere(fits, fitted, candidate)
+    fit = fits.regression.stated(fitted.fit, [*slopes.values(), *elsewhere])
     parameters: dict[str, Estimate] = {}
     bound: list[str] = []
     moments: dict[str, Estimate] = {}
     for component in candidate.components:
         index = _places(fits, fit, component, slopes.get(component))
-        c, covariance = found.coefficients(component), _covariance(
+        c, covariance = fitted.coefficients(component), _covariance(
             fits, fit, component, len(index), index)
-        some, held = _of_component(fits, component, c, covariance, moved=found.fit.coefficients)
+        some, held = _of_component(fits, component, c, covariance, moved=fitted.fit.coefficients)
         parameters.update(some)
         bound += held
-        moments.update(_moments(_moved(fits, component, found.fit.coefficients), c, covariance))
-    for key, one in _left_out(fits, found, candidate).items():
-        parameters[key] = replace(parameters[key], std=one.std)
+        moments.update(_moments(_moved(fits, component, fitted.fit.coefficients), c, covariance))
+    for key, changed in _left_out(fits, fitted, candidate).items():
+        parameters[key] = replace(parameters[key], std=changed.std)
     return Estimates(parameters, tuple(bound), moments)
 
 
@@ -137,14 +137,14 @@ def averaged(own: Estimates, others: Sequence[tuple[float, Estimates]]) -> Estim
     weights = np.array([1.0, *(np.exp(-0.5 * max(more, 0.0)) for more, _ in others)])
     share = weights / weights.sum()
     parameters = {}
-    for key, one in own.parameters.items():
-        there = [one, *(said.parameters.get(key, one) for _, said in others)]
-        squares = [other.std ** 2 + (other.value - one.value) ** 2 for other in there]
-        parameters[key] = replace(one, std=float(np.sqrt(share @ squares)))
+    for key, estimate in own.parameters.items():
+        there = [estimate, *(said.parameters.get(key, estimate) for _, said in others)]
+        squares = [other.std ** 2 + (other.value - estimate.value) ** 2 for other in there]
+        parameters[key] = replace(estimate, std=float(np.sqrt(share @ squares)))
     return replace(own, parameters=parameters)
 
 
-def _told_elsewhere(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
+def _told_elsewhere(fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
                     ) -> list[Block]:
     """Return an effect's columns on the drives that it was not found on, where these are told.
 
@@ -154,19 +154,19 @@ def _told_elsewhere(fits: FittedSets, found: CandidateSet, candidate: EffectCand
     drive alone.
     """
     effect, drives = candidate.effect, candidate.drives
-    if drives is None or effect.shape or found.blocks[candidate.components[0]].mean is not None:
+    if drives is None or effect.shape or fitted.blocks[candidate.components[0]].mean is not None:
         return []
     names = candidate.components[0].names
-    blocks = [fits.library.block(placed(fits.design, effect, d, {}, names))
+    blocks = [fits.components.block(placed(fits.design, effect, d, {}, names))
               for d in fits.regression.drives
               if d not in drives and fits.design.acts_on(effect, d)]
-    fit = fits.regression.at((*found.fit.blocks, *blocks), found.fit.amplitudes)
+    fit = fits.regression.at((*fitted.fit.blocks, *blocks), fitted.fit.amplitudes)
     return [block for block in blocks if np.all(
         np.diag(fit.covariance[fit.places[block], fit.places[block]])
         < TOLD * np.diag(np.linalg.inv(block.precision)))]
 
 
-def _left_out(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
+def _left_out(fits: FittedSets, other: CandidateSet, candidate: EffectCandidate,
               ) -> dict[str, Estimate]:
     """Return how well the numbers are known that a set leaves at 0, where they may be others.
 
@@ -180,14 +180,14 @@ def _left_out(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
         rest = tuple(name for name in every if name not in component.names)
         if not component.names or not rest:
             continue
-        block = fits.library.block(replace(component, names=rest))
-        fit = fits.regression.stated(found.fit, [block])
+        block = fits.components.block(replace(component, names=rest))
+        fit = fits.regression.stated(other.fit, [block])
         others = replace(component, names=rest, given=())
         index = _places(fits, fit, replace(component, names=rest))
         some, _ = _of_component(fits, others, np.zeros(len(rest)), _covariance(
             fits, fit, others, len(rest), index), with_shape=False)
         prefix = '' if component.drive is None else f'{fits.design.drives[component.drive]}.'
-        changed = replace(component, given=()).values(found.coefficients(component))
+        changed = replace(component, given=()).values(other.coefficients(component))
         fitted = {prefix + p.name for p in candidate.effect.linear if changed[p.name]}
         # Of what the recordings do not show at all no more is known than its bounds.
         widest = {prefix + p.name: p.widest.upper - p.widest.lower
@@ -200,7 +200,8 @@ def _left_out(fits: FittedSets, found: CandidateSet, candidate: EffectCandidate,
 def _places(fits: FittedSets, fit: JointFit, component: Component, slopes: Block | None = None,
             ) -> list[int]:
     """Return the places of a component's coefficients in a fit, then of its shape."""
-    places = fit.index_of([fits.library.block(component)])[:max(len(component.names), 1)].tolist()
+    index = fit.index_of([fits.components.block(component)])
+    places = index[:max(len(component.names), 1)].tolist()
     return places if slopes is None else [*places, *fit.index_of([slopes]).tolist()]
 
 
@@ -291,7 +292,7 @@ def _of_component(
         found[prefix + parameter.name] = Estimate(
             within(parameter, value, units), parameter.spread(amount, value),
             unit_of(parameter.unit))
-    return found, [prefix + name for name in fits.library.at_edge(
+    return found, [prefix + name for name in fits.components.at_edge(
         component, fits.decisions.edge_share)]
 
 
@@ -312,13 +313,13 @@ def _moments(component: Component, c: Array, covariance: Array) -> dict[str, Est
     if not issubclass(component.effect, AddedBody):
         return {}
     about_links = component.effect.moments_about_links()
-    total = dict(zip((one.name for one in component.effect.coefficients), component.total(c),
-                     strict=True))
-    units = {one.name: one.unit for one in component.effect.coefficients}
+    total = dict(zip((coefficient.name for coefficient in component.effect.coefficients),
+                     component.total(c), strict=True))
+    units = {coefficient.name: coefficient.unit for coefficient in component.effect.coefficients}
     found = {}
     for name, weights in about_links.items():
         if name in component.names:
-            slope = np.array([weights.get(one, 0.0) for one in component.names])
+            slope = np.array([weights.get(name, 0.0) for name in component.names])
             variance = slope @ covariance[:len(slope), :len(slope)] @ slope
             value = sum(float(total[one]) * weight for one, weight in weights.items())
             found[name] = Estimate(value, float(np.sqrt(max(variance, 0.0))), units[name])
@@ -333,7 +334,7 @@ def _units(design: Design, drive: int | str | None) -> Callable[[str], str]:
     return design.residuals.units_of(name).of
 
 
-def estimate_present(fits: FittedSets, found: CandidateSet, effect: CatalogueEffect,
+def estimate_present(fits: FittedSets, fitted: CandidateSet, effect: CatalogueEffect,
                      ) -> dict[str, Estimate]:
     """Return the parameters of an effect of the given model, as base columns move them.
 
@@ -341,7 +342,7 @@ def estimate_present(fits: FittedSets, found: CandidateSet, effect: CatalogueEff
     and how well after the fit.
     """
     kind, parameters = type(effect), dict[str, Estimate]()
-    fit = fits.regression.stated(found.fit)
+    fit = fits.regression.stated(fitted.fit)
     for name in effect.drives if isinstance(effect, DriveEffect) else (None,):
         drive = None if name is None else fits.design.drives.index(name)
         values = present_values(effect, name)
@@ -355,14 +356,14 @@ def estimate_present(fits: FittedSets, found: CandidateSet, effect: CatalogueEff
     return parameters
 
 
-def calibrations(fits: FittedSets, found: CandidateSet, widths: Mapping[int, float],
+def calibrations(fits: FittedSets, fitted: CandidateSet, widths: Mapping[int, float],
                  ) -> list[Calibration]:
     """Return the numbers as the fit moves them within their tolerances, and reversal widths.
 
     Parameters
     ----------
     fits : FittedSets
-    found : CandidateSet
+    fitted : CandidateSet
     widths : mapping of drive to float
         Widths of reversal that differ from the given model's for certain [m/s].
     """
@@ -371,10 +372,10 @@ def calibrations(fits: FittedSets, found: CandidateSet, widths: Mapping[int, flo
     for k, column in enumerate(design.base):
         if isinstance(column, ModelNumber):
             number = column.number
-            std = float(np.sqrt(found.fit.covariance[k, k])) * number.deviation
+            std = float(np.sqrt(fitted.fit.covariance[k, k])) * number.deviation
             calibrated.append(Calibration(
                 number.key, number.element, number.value,
-                column.value(float(found.fit.coefficients[k])), std, number.unit))
+                column.value(float(fitted.fit.coefficients[k])), std, number.unit))
     before = design.given.reversal.widths(len(design.drives))
     # Widths are told without an uncertainty: the fits allow for all of them anyway.
     return calibrated + [

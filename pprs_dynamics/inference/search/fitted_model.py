@@ -27,16 +27,17 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
 
 
-def parts_of(fits: FittedSets, found: CandidateSet) -> tuple[Array, tuple[PlacedEffect, ...]]:
+def parts_of(fits: FittedSets, fitted: CandidateSet) -> tuple[Array, tuple[PlacedEffect, ...]]:
     """Return coefficients of the base columns, 0 for nuisances, and effects with theirs."""
-    base = found.fit.coefficients[:len(fits.design.base)].copy()
+    base = fitted.fit.coefficients[:len(fits.design.base)].copy()
     base[[not column.in_model for column in fits.design.base]] = 0.0
     effects = []
-    for one in found.blocks:
-        every = one.every(found.coefficients(one)).tolist()
+    for component in fitted.blocks:
+        every = component.every(fitted.coefficients(component)).tolist()
         effects.append(PlacedEffect(
-            one.effect, one.drive, one.parameters,
-            {c.name: value for c, value in zip(one.effect.coefficients, every, strict=False)}))
+            component.effect, component.drive, component.parameters,
+            {c.name: value
+             for c, value in zip(component.effect.coefficients, every, strict=False)}))
     return base, tuple(effects)
 
 
@@ -52,13 +53,13 @@ def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> Fo
     move_numbers(values, design.base, base)
     move_present(values, design.given, design.base, base)
     names = list(values.get('effects.active', []))
-    for one in effects:
-        kind = one.effect
+    for effect in effects:
+        kind = effect.effect
         if kind.name not in names:
             names.append(kind.name)
-        drive = '' if one.drive is None else f'{design.drives[one.drive]}.'
-        coefficients, shape = one.coefficients, one.shape
-        if (given := design.present(kind, one.drive)) is not None:
+        drive = '' if effect.drive is None else f'{design.drives[effect.drive]}.'
+        coefficients, shape = effect.coefficients, effect.shape
+        if (given := design.present(kind, effect.drive)) is not None:
             # What is there already has been moved within its uncertainty.
             moved = {name: float(values.get(f'effects.{kind.name}.{drive}{name}', value))
                      for name, value in given.items()}
@@ -71,13 +72,13 @@ def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> Fo
             if kind.is_of_one_place and every[parameter.name] == parameter.default:
                 continue  # of all the links or joints that it is not on
             values[f'effects.{kind.name}.{drive}{parameter.name}'] = within(
-                parameter, every[parameter.name], units_of(design.given, one.drive))
+                parameter, every[parameter.name], units_of(design.given, effect.drive))
     if names:
         values['effects.active'] = names
     return replace(build_model(values), source=design.given.source)
 
 
-def fitted_model(fits: FittedSets, found: CandidateSet) -> ForceModel:
+def fitted_model(fits: FittedSets, fitted: CandidateSet) -> ForceModel:
     """Return the given model with the effects of a set, and its numbers as the fit moves them.
 
     Raises
@@ -85,39 +86,39 @@ def fitted_model(fits: FittedSets, found: CandidateSet) -> ForceModel:
     ModelError
         For values that no model may have.
     """
-    return model_at(fits.design, *parts_of(fits, found))
+    return model_at(fits.design, *parts_of(fits, fitted))
 
 
-def squared(fits: FittedSets, found: CandidateSet, forces: Array) -> float:
+def squared(fits: FittedSets, fitted: CandidateSet, forces: Array) -> float:
     """Return the whitened squares of forces (M, D) under the noise of a set."""
     total = 0.0
     for d in fits.regression.drives:
-        white = fits.regression.whitened(found.fit, d, np.nan_to_num(forces[:, d]))
+        white = fits.regression.whitened(fitted.fit, d, np.nan_to_num(forces[:, d]))
         total += float(white @ white)
     return total
 
 
-def linear_prediction(fits: FittedSets, found: CandidateSet) -> Array:
+def linear_prediction(fits: FittedSets, fitted: CandidateSet) -> Array:
     """Return the forces that the linear fit predicts, reversals as the model has them, (M, D)."""
     design = fits.design
     prediction = design.residuals.model.copy()
-    for column, c in zip(design.base, found.fit.coefficients, strict=False):
+    for column, c in zip(design.base, fitted.fit.coefficients, strict=False):
         if column.in_model:
             for d, row in column.rows.items():
                 prediction[:, d] += c * row
-    for candidate in found.effects:
-        prediction += fits.library.force(found, candidate, prediction.shape)
+    for candidate in fitted.effects:
+        prediction += fits.components.force(fitted, candidate, prediction.shape)
     return prediction
 
 
-def linear_residual(fits: FittedSets, found: CandidateSet) -> Array:
+def linear_residual(fits: FittedSets, fitted: CandidateSet) -> Array:
     """Return measured minus what the linear fit predicts, (M, D) [N]."""
-    return fits.regression.residuals.measured - linear_prediction(fits, found)
+    return fits.regression.residuals.measured - linear_prediction(fits, fitted)
 
 
-def linear_error(fits: FittedSets, found: CandidateSet) -> float:
+def linear_error(fits: FittedSets, fitted: CandidateSet) -> float:
     """Return the rms of `linear_residual` over all drives [N]."""
-    return root_mean_square(linear_residual(fits, found))
+    return root_mean_square(linear_residual(fits, fitted))
 
 
 def exact_forces(design: Design, model: ForceModel) -> Array:
@@ -128,5 +129,5 @@ def exact_forces(design: Design, model: ForceModel) -> Array:
     PprsError
         Where the model cannot follow them.
     """
-    return np.concatenate([treated_forces(model, one)['total']
-                           for one in design.reconstructed(model)])
+    return np.concatenate([treated_forces(model, table)['total']
+                           for table in design.reconstructed(model)])

@@ -24,13 +24,13 @@ from pprs_dynamics.inference.search.candidates import (
     CandidateSet,
     Component,
     EffectCandidate,
-    Prices,
+    PriorCosts,
     UnknownCandidate,
     set_key,
 )
+from pprs_dynamics.inference.search.components import Components
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
-from pprs_dynamics.inference.search.library import Library
 from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
 from pprs_dynamics.inference.search.possible_bodies import with_possible_bodies
 from pprs_dynamics.inference.search.possible_totals import with_possible_totals
@@ -71,8 +71,8 @@ class FittedSets:
         self.regression = Regression(
             design.residuals, design.base, error_scale=error_scale,
             open_forces={} if design.carried is None else design.carried.open_forces)
-        self.prices = Prices.of(self.regression, decisions, design.given)
-        self.library = Library(design, self.regression, self.prices)
+        self.prior_costs = PriorCosts.of(self.regression, decisions, design.given)
+        self.components = Components(design, self.regression, self.prior_costs)
         self.settled: dict[Hashable, Any] = {}
         self._evaluated: dict[Hashable, CandidateSet] = {}
         self._nuisance: dict[Hashable, tuple[Block, ...]] = {}
@@ -89,7 +89,7 @@ class FittedSets:
     @property
     def best(self) -> CandidateSet:
         """The set of lowest cost so far."""
-        return min(self._evaluated.values(), key=lambda found: found.cost)
+        return min(self._evaluated.values(), key=lambda fitted: fitted.cost)
 
     def evaluate(self, candidates: Candidates) -> CandidateSet:
         """Return a set, fitted; one that was fitted before is not fitted again.
@@ -108,71 +108,74 @@ class FittedSets:
             return CandidateSet((), fit, self._terms(fit))
         start = self.evaluate(()).fit.amplitudes
         nuisance: Nuisance = {}
-        if any(self.library.leaves_open(one) for c in candidates for one in c.components):
+        if any(self.components.leaves_open(component) for c in candidates
+               for component in c.components):
             # The size of its forces, in proportion to which friction is in doubt, need not be
             # exact: the noise of the empty set does, and steps of it, whose columns are kept.
             nuisance = self._nuisance_blocks(candidates, self.regression.at(
                 self.blocks(candidates), start))
         fit = self.regression.fit(self.blocks(candidates, nuisance), start)
-        bodies = {one: self.library.block(one) for c in candidates for one in c.components
-                  if issubclass(one.effect, AddedBody) and one.effect.has_extent}
+        bodies = {component: self.components.block(component) for c in candidates
+                  for component in c.components
+                  if issubclass(component.effect, AddedBody) and component.effect.has_extent}
         possible = with_possible_bodies(self.design.given, self.regression, fit, bodies)
-        found = self._set(candidates, fit, nuisance)
+        fitted = self._set(candidates, fit, nuisance)
         if possible is None:
-            return replace(found, barred='no body that can be comes near')
+            return replace(fitted, barred='no body that can be comes near')
         possible = with_possible_totals(self.design, self.regression, possible,
-                                        found.blocks.items())
+                                        fitted.blocks.items())
         if possible is not fit:
             # What possible values cost is told as such, not as a worse fit.
             feasible = CostTerms(feasibility=possible.deviance - fit.deviance)
             held = self._set(candidates, possible, nuisance)
-            signs = CostTerms(signs=held.terms.signs - found.terms.signs)
-            found = replace(held, terms=found.terms + signs + feasible)
-        return replace(found, barred=self._barred(found))
+            signs = CostTerms(signs=held.terms.signs - fitted.terms.signs)
+            fitted = replace(held, terms=fitted.terms + signs + feasible)
+        return replace(fitted, barred=self._barred(fitted))
 
-    def pruned(self, found: CandidateSet) -> CandidateSet:
+    def pruned(self, fitted: CandidateSet) -> CandidateSet:
         """Return a set without the candidates that do not pay in it."""
-        while found.candidates:
-            less = min((self.evaluate(found.without(gone)) for gone in found.candidates),
-                       key=lambda one: one.total)
-            if less.total > found.total:
+        while fitted.candidates:
+            less = min((self.evaluate(fitted.without(gone)) for gone in fitted.candidates),
+                       key=lambda fitted: fitted.total)
+            if less.total > fitted.total:
                 break
-            found = less
-        return found
+            fitted = less
+        return fitted
 
     def release(self) -> None:
         """Let go of what only further scans and fits would need."""
-        self.library.release()
+        self.components.release()
         self.regression.release()
 
     def blocks(self, candidates: Candidates, nuisance: Nuisance = MappingProxyType({}),
                ) -> list[Block]:
         """Return the columns of candidates, then those of what they leave open."""
         return [*(block for c in candidates for block in (
-            c.blocks if isinstance(c, UnknownCandidate) else map(self.library.block, c.components)
-        )), *chain(*nuisance.values())]
+            c.blocks if isinstance(c, UnknownCandidate)
+            else map(self.components.block, c.components))), *chain(*nuisance.values())]
 
     def _set(self, candidates: Candidates, fit: JointFit, nuisance: Nuisance) -> CandidateSet:
-        blocks = {one: self.library.block(one) for c in candidates for one in c.components}
+        blocks = {component: self.components.block(component) for c in candidates
+                  for component in c.components}
         found = CandidateSet(candidates, fit, self._terms(fit), blocks, nuisance)
-        return replace(found, terms=found.terms + self.price(found))
+        return replace(found, terms=found.terms + self.prior_cost(found))
 
     def _terms(self, fit: JointFit) -> CostTerms:
         left = self.regression.misfit(fit)
         return CostTerms(fit=left, coefficients=fit.deviance - left)
 
-    def _barred(self, found: CandidateSet) -> str:
+    def _barred(self, fitted: CandidateSet) -> str:
         """Return why a set may not be: a value beyond its bounds, or a pattern that is none.
 
         A pattern has to be more than the lack of fit of the effects beside it.
         """
-        beyond = sorted({one.effect.name for one in found.blocks
-                         if not one.is_within(found.coefficients(one),
-                                              units_of(self.design.given, one.drive))})
+        beyond = sorted({component.effect.name for component in fitted.blocks
+                         if not component.is_within(fitted.coefficients(component),
+                                                    units_of(self.design.given, component.drive))})
         if beyond:
             return f'a value of {", ".join(beyond)} is beyond its bounds'
-        for candidate in found.unknowns:
-            ratio, names = discrepancy_ratio(self.design, self.regression, self.decisions, found,
+        for candidate in fitted.unknowns:
+            ratio, names = discrepancy_ratio(self.design, self.regression, self.decisions, fitted,
                                              candidate)
             if ratio < 1:
                 return f'the pattern is within the model error of {", ".join(names)}'
@@ -185,92 +188,94 @@ class FittedSets:
         real forms depart from the catalogue's. Each has a coefficient of unit prior.
         """
         found = {}
-        for one in (one for c in candidates for one in c.components):
-            size = _stepped(fit.of(self.library.block(one))[:max(len(one.names), 1)])
-            key = (one, tuple(size.tolist()))
+        for component in (component for c in candidates for component in c.components):
+            size = _stepped(fit.of(self.components.block(component))[:max(len(component.names), 1)])
+            key = (component, tuple(size.tolist()))
             if key not in self._nuisance:
-                self._nuisance[key] = self._nuisance_of(one, size)
+                self._nuisance[key] = self._nuisance_of(component, size)
             if self._nuisance[key]:
-                found[one] = self._nuisance[key]
+                found[component] = self._nuisance[key]
         return found
 
     def _nuisance_of(self, component: Component, c: Array) -> tuple[Block, ...]:
         """Return the columns of one component, for its coefficients (k,)."""
         blocks = []
-        unloaded = self.library.unloaded(component)
+        unloaded = self.components.unloaded(component)
         if unloaded is not None:
             blocks.append(Block({d: (c @ rows)[None] for d, rows in unloaded.items()}, np.eye(1)))
         left_open = {d: np.tensordot(c, rows, 1)
-                     for d, rows in self.library.nuisance_rows(component).items()}
+                     for d, rows in self.components.nuisance_rows(component).items()}
         if left_open:
             blocks.append(Block(left_open, np.eye(len(next(iter(left_open.values()))))))
         return tuple(blocks)
 
-    def at_noise_of(self, found: CandidateSet, candidates: Candidates) -> CandidateSet:
+    def at_noise_of(self, fitted: CandidateSet, candidates: Candidates) -> CandidateSet:
         """Return a smaller set under the noise of a larger one: what a replacement starts from."""
-        kept = {one for c in candidates for one in c.components}
-        nuisance = {one: blocks for one, blocks in found.nuisance.items() if one in kept}
-        fit = self.regression.at(self.blocks(candidates, nuisance), found.fit.amplitudes)
+        kept = {component for c in candidates for component in c.components}
+        nuisance = {component: blocks for component, blocks in fitted.nuisance.items()
+                    if component in kept}
+        fit = self.regression.at(self.blocks(candidates, nuisance), fitted.fit.amplitudes)
         return self._set(candidates, fit, nuisance)
 
-    def price(self, found: CandidateSet) -> CostTerms:
-        """Return the price of all that was chosen, and of signs that are unphysical."""
+    def prior_cost(self, fitted: CandidateSet) -> CostTerms:
+        """Return the prior cost of all that was chosen, and of signs that are unphysical."""
         wrong = CostTerms(signs=sum(
-            self.prices.of_wrong_signs(one, one.values(found.coefficients(one)))
-            for one in found.blocks))
-        return sum(map(self.library.price, found.candidates), wrong)
+            self.prior_costs.of_wrong_signs(
+                component, component.values(fitted.coefficients(component)))
+            for component in fitted.blocks))
+        return sum(map(self.components.prior_cost, fitted.candidates), wrong)
 
-    def drop_cost(self, found: CandidateSet, component: Component) -> float:
+    def drop_cost(self, fitted: CandidateSet, component: Component) -> float:
         """Return by how much the deviance rises without a component, at the noise of a fit.
 
         By the Savage-Dickey ratio of prior and posterior density at 0.
         """
-        block = found.blocks[component]
+        block = fitted.blocks[component]
         if block.mean is not None:  # without it the shape goes, too
             return np.inf
-        place = found.fit.places[block]
-        c, covariance = found.fit.coefficients[place], found.fit.covariance[place, place]
+        place = fitted.fit.places[block]
+        c, covariance = fitted.fit.coefficients[place], fitted.fit.covariance[place, place]
         return float(c @ np.linalg.solve(covariance, c) + np.linalg.slogdet(covariance)[1]
                      + np.linalg.slogdet(block.precision)[1])
 
-    def held(self, found: CandidateSet, index: Integers, values: Array) -> CandidateSet:
+    def held(self, fitted: CandidateSet, index: Integers, values: Array) -> CandidateSet:
         """Return a set with some coefficients (k,) as given, all else fitted beside them.
 
         At the noise of the set, so that a bad value cannot hide in it.
         """
-        fit = self.regression.held(self.regression.stated(found.fit), index, values)
-        return replace(found, fit=fit, terms=found.terms + CostTerms(
-            fit=fit.deviance - found.fit.deviance))
+        fit = self.regression.held(self.regression.stated(fitted.fit), index, values)
+        return replace(fitted, fit=fit, terms=fitted.terms + CostTerms(
+            fit=fit.deviance - fitted.fit.deviance))
 
-    def refined(self, found: CandidateSet) -> CandidateSet:
+    def refined(self, fitted: CandidateSet) -> CandidateSet:
         """Return the set with all shapes moved by Gauss-Newton steps that lower the cost.
 
         Each may be twice as long as the one before.
         """
         for number in range(SHAPE_ROUNDS):
-            moved = self._moved(found, 2.0 ** number)
+            moved = self._moved(fitted, 2.0 ** number)
             if moved is None:
-                return found
+                return fitted
             after = self.evaluate(moved)
-            if after.cost > found.cost - LEAST_IMPROVEMENT:
-                return found
-            found = after
-        return found
+            if after.cost > fitted.cost - LEAST_IMPROVEMENT:
+                return fitted
+            fitted = after
+        return fitted
 
-    def _moved(self, found: CandidateSet, longest: float) -> Candidates | None:
+    def _moved(self, fitted: CandidateSet, longest: float) -> Candidates | None:
         """Return candidates after a Gauss-Newton step in shapes, of `longest` reaches at most."""
-        slopes = self.slopes(found)
+        slopes = self.slopes(fitted)
         moved: dict[Component, Component] = {}
-        for component in found.blocks:
+        for component in fitted.blocks:
             if component.centre:
                 centre = centre_of(component.effect, component.names,
-                                   found.coefficients(component), self.design.given)
+                                   fitted.coefficients(component), self.design.given)
                 if max(abs(a - b) for a, b in zip(centre, component.centre, strict=True)) > NEAR:
                     moved[component] = replace(component, centre=centre)
         if not slopes and not moved:
             return None
-        fit = self.regression.at((*found.fit.blocks, *(block for _, block in slopes)),
-                                 found.fit.amplitudes)
+        fit = self.regression.at((*fitted.fit.blocks, *(block for _, block in slopes)),
+                                 fitted.fit.amplitudes)
         for component, block in slopes:
             effect, shape, reach = component.effect, component.parameters, self._reach(component)
             for parameter, step in zip(effect.shape, fit.of(block), strict=True):
@@ -280,16 +285,17 @@ class FittedSets:
                 shape[parameter.name] = float(np.clip(value, bounded.lower, bounded.upper))
             moved[component] = replace(component, shape=tuple(sorted(shape.items())))
         return tuple(
-            EffectCandidate.of(moved.get(one, one) for one in c.components)
-            if isinstance(c, EffectCandidate) else c for c in found.candidates)
+            EffectCandidate.of(moved.get(component, component) for component in c.components)
+            if isinstance(c, EffectCandidate) else c for c in fitted.candidates)
 
-    def slopes(self, found: CandidateSet) -> list[tuple[Component, Block]]:
+    def slopes(self, fitted: CandidateSet) -> list[tuple[Component, Block]]:
         """Return derivatives by the shapes of a set, of unit prior, for the components with any."""
         slopes = []
-        for one in (one for one in found.blocks if one.effect.shape):
-            rows = self.design.slope_rows(self.library.term(one),
-                                          one.total(found.coefficients(one)))
-            slopes.append((one, self.regression.block(rows, np.eye(len(one.effect.shape)))))
+        for component in (component for component in fitted.blocks if component.effect.shape):
+            rows = self.design.slope_rows(self.components.term(component),
+                                          component.total(fitted.coefficients(component)))
+            slopes.append((component,
+                           self.regression.block(rows, np.eye(len(component.effect.shape)))))
         return slopes
 
     def _reach(self, component: Component) -> dict[str, float]:
@@ -297,7 +303,7 @@ class FittedSets:
         reach = {}
         for parameter in component.effect.shape:
             value = component.parameters[parameter.name]
-            known = self.library.tried(component, parameter.name)
+            known = self.components.tried(component, parameter.name)
             if len(known) < 2:
                 reach[parameter.name] = 0.5
                 continue

@@ -50,9 +50,9 @@ class HeldOut:
             np.array([(a - b) @ (a - b) for a, b in pairs]))
 
 
-def hold_out(fits: FittedSets, found: CandidateSet) -> HeldOut:
+def hold_out(fits: FittedSets, fitted: CandidateSet) -> HeldOut:
     """Return how well blocks of the recordings are predicted from the others."""
-    regression, fit = fits.regression, found.fit
+    regression, fit = fits.regression, fitted.fit
     size = len(fit.coefficients)
     total = len(regression.residuals)
     edges = np.linspace(0, total, BLOCKS + 1)
@@ -73,10 +73,10 @@ def hold_out(fits: FittedSets, found: CandidateSet) -> HeldOut:
             b[k, index] += part[:-1] @ part[-1]
     prior = Prior.of(regression.columns, fit.blocks)
     others = [prior.posterior(H.sum(axis=0) - H[k], b.sum(axis=0) - b[k]) for k in range(BLOCKS)]
-    coefficients = np.stack([one.coefficients for one in others])
+    coefficients = np.stack([fit.coefficients for fit in others])
     plain = coefficients.copy()
     plain[:, [k for k, column in enumerate(fits.design.base) if not column.in_model]] = 0.0
-    plain[:, fit.index_of(chain(*found.nuisance.values()))] = 0.0
+    plain[:, fit.index_of(chain(*fitted.nuisance.values()))] = 0.0
     left: list[list[Array]] = [[] for _ in range(BLOCKS)]
     squares, count = 0.0, 0
     for d, (index, stacked, rows) in white.items():
@@ -88,4 +88,4 @@ def hold_out(fits: FittedSets, found: CandidateSet) -> HeldOut:
             rest = rows[-1, block] - plain[k, index] @ rows[:-1, block]
             squares, count = squares + float(rest @ rest), count + len(rest)
     return HeldOut(float(np.sqrt(squares / max(count, 1))),
-                   np.array([one.penalty for one in others]), tuple(map(np.concatenate, left)))
+                   np.array([fit.penalty for fit in others]), tuple(map(np.concatenate, left)))

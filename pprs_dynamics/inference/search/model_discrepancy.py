@@ -21,20 +21,20 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 
 def discrepancy_ratio(design: Design, regression: Regression, decisions: Decisions,
-                      found: CandidateSet, candidate: Candidate,
+                      fitted: CandidateSet, candidate: Candidate,
                       ) -> tuple[float, tuple[str, ...]]:
     """Return a candidate's force beyond the others over what their lack of fit may leave."""
     # Masses, gravity and sensors are exact: nothing else's lack of fit looks like them by much.
     exact = isinstance(candidate, EffectCandidate) and not (
         candidate.effect.idealised or candidate.effect.shows_at_reversals)
     share = decisions.exact_share if exact else decisions.form_share
-    drives = {d for block in found.blocks_of(candidate) for d in block.rows}
+    drives = {d for block in fitted.blocks_of(candidate) for d in block.rows}
     allowed, names = 0.0, []
-    for other in found.effects:
+    for other in fitted.effects:
         if other is candidate or not other.effect.idealised:
             continue
-        size = sum(whitened_square(regression, found, block, drives)
-                   for block in found.blocks_of(other))
+        size = sum(whitened_square(regression, fitted, block, drives)
+                   for block in fitted.blocks_of(other))
         if size > 0:
             allowed += share ** 2 * size
             names.append(other.name)
@@ -42,52 +42,52 @@ def discrepancy_ratio(design: Design, regression: Regression, decisions: Decisio
     if design.carried is None:  # else what the model's own forces lack of real ones is known
         for effect in design.given.effects:
             if isinstance(effect, CatalogueEffect) and effect.idealised:
-                allowed += share ** 2 * _square_of_part(regression, found, effect.name, drives)
+                allowed += share ** 2 * _square_of_part(regression, fitted, effect.name, drives)
                 names.append(effect.name)
         own = 0.0 if exact else decisions.own_form_share ** 2 * _own_friction(
-            design, regression, found, drives)
+            design, regression, fitted, drives)
     if own > allowed:
         names = ["the model's own friction"]
-    square = beyond_others(regression, found, candidate)
+    square = beyond_others(regression, fitted, candidate)
     return float(np.sqrt(square / max(allowed + own, 1e-300))), tuple(names)
 
 
-def beyond_others(regression: Regression, found: CandidateSet, candidate: Candidate) -> float:
+def beyond_others(regression: Regression, fitted: CandidateSet, candidate: Candidate) -> float:
     """Return the whitened square of what no refit of the others makes good."""
-    blocks = found.blocks_of(candidate)
+    blocks = fitted.blocks_of(candidate)
     if any(block.mean is not None for block in blocks):
-        return sum(whitened_square(regression, found, block, set(block.rows))
+        return sum(whitened_square(regression, fitted, block, set(block.rows))
                    for block in blocks)
-    index = found.fit.index_of(blocks)
-    c = found.fit.coefficients[index]
-    return float(c @ np.linalg.solve(found.fit.covariance[np.ix_(index, index)], c))
+    index = fitted.fit.index_of(blocks)
+    c = fitted.fit.coefficients[index]
+    return float(c @ np.linalg.solve(fitted.fit.covariance[np.ix_(index, index)], c))
 
 
-def whitened_square(regression: Regression, found: CandidateSet, block: Block,
+def whitened_square(regression: Regression, fitted: CandidateSet, block: Block,
                     drives: set[int]) -> float:
     """Return the whitened square of a block's force on some drives."""
     total = 0.0
-    c = found.fit.of(block)
+    c = fitted.fit.of(block)
     for d in drives & set(block.rows):
-        gram = np.tensordot(regression.weights(found.fit, d),
+        gram = np.tensordot(regression.weights(fitted.fit, d),
                             regression.products(block, [block], d)[0], 1)
         total += float(c @ gram @ c)
     return total
 
 
-def _own_friction(design: Design, regression: Regression, found: CandidateSet,
+def _own_friction(design: Design, regression: Regression, fitted: CandidateSet,
                   drives: set[int]) -> float:
     """Return the whitened square of the friction that the given model has on some drives."""
     own = [effect.name for effect in design.given.effects
            if not isinstance(effect, CatalogueEffect) and effect.name.endswith('friction')]
-    return sum(_square_of_part(regression, found, name, drives) for name in own)
+    return sum(_square_of_part(regression, fitted, name, drives) for name in own)
 
 
-def _square_of_part(regression: Regression, found: CandidateSet, name: str,
+def _square_of_part(regression: Regression, fitted: CandidateSet, name: str,
                     drives: set[int]) -> float:
     """Return the whitened square of a part of the given model's force on some drives."""
     force = regression.residuals.parts.get(name)
     if force is None:
         return 0.0
-    white = [regression.whitened(found.fit, d, force[:, d]) for d in drives]
+    white = [regression.whitened(fitted.fit, d, force[:, d]) for d in drives]
     return sum(float(one @ one) for one in white)

@@ -13,58 +13,62 @@ from pprs_dynamics.inference.search.candidates import (
     Component,
     EffectCandidate,
 )
+from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
-from pprs_dynamics.inference.search.library import placed
 
 
 def with_instead(candidate: EffectCandidate, gone: Component, *instead: Component,
                  ) -> EffectCandidate:
     """Return the candidate with something else, or nothing, for one of its components."""
-    return EffectCandidate.of([*(one for one in candidate.components if one is not gone),
+    return EffectCandidate.of([*(component for component in candidate.components
+                                 if component is not gone),
                                *instead])
 
 
-def exchanged(found: CandidateSet, old: Candidate, new: Candidate) -> Candidates:
+def exchanged(fitted: CandidateSet, old: Candidate, new: Candidate) -> Candidates:
     """Return the candidates of a set with another one for one of them."""
-    return tuple(new if c is old else c for c in found.candidates)
+    return tuple(new if c is old else c for c in fitted.candidates)
 
 
-def simplified(fits: FittedSets, found: CandidateSet) -> CandidateSet:
+def simplified(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
     """Return a set without candidates and drives, and in variants, as long as that costs less."""
-    return _descended(fits, found, lambda one: [*_with_fewer(one), *_otherwise(fits, one)])
+    return _descended(fits, fitted,
+                      lambda fitted: [*_with_fewer(fitted), *_otherwise(fits, fitted)])
 
 
-def of_same_claims(fits: FittedSets, found: CandidateSet) -> CandidateSet:
-    """Return the set of least cost that claims the same: on other drives, in other variants.
+def of_same_names(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
+    """Return the set of least cost of the same effects: on other drives, in other variants.
 
     Where it is barred, also without its patterns of no catalogue: around their own model its
     effects may explain what these stood for. A pattern that may be there is not dropped here,
     where no other may join for it: a bump came out as ripple at one scale of a robot and as none
     at another.
     """
-    return _descended(fits, found, lambda one: [
-        *_otherwise(fits, one), *_on_more_drives(fits, one),
-        *[one.effects] * bool(one.barred and one.unknowns)])
+    return _descended(fits, fitted, lambda fitted: [
+        *_otherwise(fits, fitted), *_on_more_drives(fits, fitted),
+        *[fitted.effects] * bool(fitted.barred and fitted.unknowns)])
 
 
-def _descended(fits: FittedSets, found: CandidateSet,
+def _descended(fits: FittedSets, fitted: CandidateSet,
                neighbours: Callable[[CandidateSet], Iterable[Candidates]]) -> CandidateSet:
     while True:
-        best = min(map(fits.evaluate, neighbours(found)), key=lambda one: one.cost, default=found)
-        if not best.cost < found.cost - LEAST_IMPROVEMENT:  # both may be inadmissible: inf
-            return found
-        found = fits.refined(best)
+        best = min(map(fits.evaluate, neighbours(fitted)), key=lambda fitted: fitted.cost,
+                   default=fitted)
+        if not best.cost < fitted.cost - LEAST_IMPROVEMENT:  # both may be inadmissible: inf
+            return fitted
+        fitted = fits.refined(best)
 
 
-def _on_more_drives(fits: FittedSets, found: CandidateSet) -> Iterator[Candidates]:
+def _on_more_drives(fits: FittedSets, fitted: CandidateSet) -> Iterator[Candidates]:
     """Yield a set with one of its effects on another drive more, as it is where it is strongest."""
-    for candidate in found.effects:
+    for candidate in fitted.effects:
         if candidate.drives is None:
             continue
-        strongest = max(candidate.components, key=lambda one: fits.drop_cost(found, one))
+        strongest = max(candidate.components,
+                        key=lambda component: fits.drop_cost(fitted, component))
         for d in fits.regression.drives:
             if d not in candidate.drives and fits.design.acts_on(candidate.effect, d):
-                yield exchanged(found, candidate, EffectCandidate.of([
+                yield exchanged(fitted, candidate, EffectCandidate.of([
                     *candidate.components, placed(fits.design, candidate.effect, d,
                                                   strongest.parameters, strongest.names)]))
 
@@ -79,18 +83,20 @@ def _otherwise(fits: FittedSets, best: CandidateSet) -> Iterator[Candidates]:
     for candidate in best.effects:
         effect = candidate.effect
         # The drives where it matters most; fewer of them may be better though one less is not.
-        strength = {one: fits.drop_cost(best, one) for one in candidate.components}
-        ranked = sorted(candidate.components, key=lambda one: -strength[one])
+        strength = {component: fits.drop_cost(best, component)
+                    for component in candidate.components}
+        ranked = sorted(candidate.components, key=lambda component: -strength[component])
         most = 3 * fits.decisions.rival_margin
         for count in range(1, len(ranked)):
-            if sum(strength[one] for one in ranked[count:]) < most:
+            if sum(strength[component] for component in ranked[count:]) < most:
                 yield exchanged(best, candidate, EffectCandidate.of(ranked[:count]))
-        if len({one.names for one in candidate.components}) > 1:
+        if len({component.names for component in candidate.components}) > 1:
             for names in effect.variants:
                 yield exchanged(best, candidate, EffectCandidate.of(
-                    fits.library.variant(one, names) for one in candidate.components))
+                    fits.components.variant(component, names)
+                    for component in candidate.components))
         for component in candidate.components:
-            for other in fits.library.variants(component):
+            for other in fits.components.variants(component):
                 # The others take part in every scan.
                 if other.names != component.names and not set(other.names) <= set(effect.scanned):
                     yield exchanged(best, candidate, with_instead(candidate, component, other))

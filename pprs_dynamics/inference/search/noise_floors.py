@@ -109,11 +109,11 @@ def measure_columns(
 
 def catalogue_blocks(fits: FittedSets) -> list[Block]:
     """Return columns of every effect that the catalogue offers, in all its shapes."""
-    regression, library = fits.regression, fits.library
+    regression, components = fits.regression, fits.components
     blocks = [regression.block(dict(term.rows)) for term in fits.design.structure
               if any(np.any(rows) for rows in term.rows.values())]
-    blocks += [library.block(one) for one in library.spanning]
-    for d, local in library.local.items():
+    blocks += [components.block(component) for component in components.spanning]
+    for d, local in components.local.items():
         blocks += [regression.transformed_block({d: rows})
                    for rows in (_directions(fits, effect, d) for effect in local.effects)
                    if len(rows)]

@@ -73,7 +73,7 @@ class Family:
     weights : (P, C) array
         Each pattern's combination of the columns; for pairs (`paired`) unused.
     patterns : tuple of Pattern
-    rivals : int
+    alike : int
         How many variables of this sort there are; their choice is paid for too.
     paired : bool
         Columns 2 k and 2 k + 1 are the cosine and sine of pattern k.
@@ -83,7 +83,7 @@ class Family:
     columns: Array
     weights: Array
     patterns: tuple[Pattern, ...]
-    rivals: int = 1
+    alike: int = 1
     paired: bool = False
     edges: Array = field(default_factory=lambda: np.zeros(0))
 
@@ -149,11 +149,11 @@ def speed_edges(velocity: Array) -> Array:
 
 def _maybe(
     build: Callable[[str, Array, Array | None, int], Family], name: str, values: Array | None,
-    sign: Array | None, rivals: int,
+    sign: Array | None, alike: int,
 ) -> list[Family]:
     if values is None or np.ptp(values) <= 1e-9 * max(1e-9, float(np.abs(values).max())):
         return []
-    return [build(name, values, sign, rivals)]
+    return [build(name, values, sign, alike)]
 
 
 def _offset(samples: int) -> Family:
@@ -177,7 +177,7 @@ def _turned(velocity: Array, width: float) -> Array:
     return turned
 
 
-def _scalar(name: str, values: Array, sign: Array | None, rivals: int) -> Family:
+def _scalar(name: str, values: Array, sign: Array | None, alike: int) -> Family:
     edges = bin_edges(values, TIME_BINS if name == 'time' else BINS)
     bins = _indicators(values, edges)
     low, high = float(values.min()), float(values.max())
@@ -201,7 +201,7 @@ def _scalar(name: str, values: Array, sign: Array | None, rivals: int) -> Family
         weights.append(np.eye(len(bumps)))
         patterns += where
     return Family(name, np.concatenate(columns).astype(np.float32), _diagonal(weights),
-                  tuple(patterns), rivals, edges=edges)
+                  tuple(patterns), alike, edges=edges)
 
 
 def _bumps(values: Array) -> tuple[Array, list[Pattern]]:
@@ -221,7 +221,7 @@ def _bumps(values: Array) -> tuple[Array, list[Pattern]]:
     return np.stack(columns), patterns
 
 
-def _velocity(name: str, values: Array, sign: Array | None, rivals: int) -> Family:
+def _velocity(name: str, values: Array, sign: Array | None, alike: int) -> Family:
     speeds = speed_edges(values)
     edges = populated_edges(values, np.concatenate((-speeds[:0:-1], speeds)))
     edges[0], edges[-1] = min(edges[0], values.min()), max(edges[-1], values.max())
@@ -255,7 +255,7 @@ def _velocity(name: str, values: Array, sign: Array | None, rivals: int) -> Fami
                 weights.append(np.eye(len(turned)))
                 patterns += [Pattern('fading', (0.0, float(edge)))] * len(turned)
     return Family(name, np.concatenate(columns).astype(np.float32), _diagonal(weights),
-                  tuple(patterns), rivals, edges=edges)
+                  tuple(patterns), alike, edges=edges)
 
 
 def _ripple(position: Array) -> Family:

@@ -58,8 +58,8 @@ def with_possible_bodies(model: ForceModel, regression: Regression, fit: JointFi
     for component, block in bodies.items():
         place = fit.places[block]
         # What is changed of a body that the model has is none: all of it has to be one.
-        there = [one for one in model.effects
-                 if not (component.given and one.name == component.effect.name)]
+        there = [effect for effect in model.effects
+                 if not (component.given and effect.name == component.effect.name)]
         before = given_body(component)
         robot = with_bodies(model.robot, there)
         found = nearest_possible(robot, component, before + fit.of(block),

@@ -88,17 +88,17 @@ def least_values(design: Design, component: Component, c: Array) -> dict[str, fl
     c : (k,) array
         Of its names, or more.
     """
-    given = dict(zip((one.name for one in component.effect.coefficients), component.given,
-                     strict=False))
+    given = dict(zip((coefficient.name for coefficient in component.effect.coefficients),
+                     component.given, strict=False))
     return {name: -_own_total(design, component.drive, ADDS_TO[component.effect.name, name])
             - given.get(name, 0.0) for name, value in zip(component.names, c, strict=False)
             if component.drive is not None and (component.effect.name, name) in ADDS_TO
             and value + given.get(name, 0.0) < 0}
 
 
-def left_at_nothing(design: Design, found: CandidateSet, component: Component) -> tuple[str, ...]:
+def left_at_nothing(design: Design, fitted: CandidateSet, component: Component) -> tuple[str, ...]:
     """Return of what a set leaves nothing at all in a drive with a component of it."""
-    c = found.coefficients(component)
+    c = fitted.coefficients(component)
     return tuple(ADDS_TO[component.effect.name, name]
                  for name, least in least_values(design, component, c).items()
                  if np.isclose(c[component.names.index(name)], least, rtol=1e-9, atol=0.0))
@@ -108,8 +108,8 @@ def _own_total(design: Design, drive: int, of: str) -> float:
     """Return what the given model itself has in a drive of inertia or friction."""
     if of == INERTIA:
         return _own_inertia(design, drive)
-    friction = next((one for one in design.given.effects
-                     if isinstance(one, ActiveFriction | AxisFriction)), None)
+    friction = next((effect for effect in design.given.effects
+                     if isinstance(effect, ActiveFriction | AxisFriction)), None)
     if friction is None:
         return 0.0
     if of == VISCOUS_FRICTION:

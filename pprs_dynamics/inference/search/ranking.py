@@ -19,9 +19,9 @@ from pprs_dynamics.inference.search.absorbed import Absorbed, without_absorbed
 from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
-    Claims,
     Component,
     EffectCandidate,
+    PlacedNames,
 )
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
@@ -30,7 +30,7 @@ from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.relinearisation import search_around_fitted
 from pprs_dynamics.inference.search.scan import Place
 from pprs_dynamics.inference.search.search import Search, patterns_of
-from pprs_dynamics.inference.search.unknown import PatternLibrary
+from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -45,13 +45,13 @@ class Rival:
 
     Parameters
     ----------
-    found : CandidateSet
+    fitted : CandidateSet
     missing, instead : tuple of str
         Names of adopted effects that it lacks, and what it has instead; neither is empty. An
         adopted effect on another link or joint is `NAME:PLACE`.
     """
 
-    found: CandidateSet
+    fitted: CandidateSet
     missing: tuple[str, ...]
     instead: tuple[str, ...]
 
@@ -64,7 +64,7 @@ class Ranking:
     ----------
     first, last : FittedSets
         Around the model as given, and around the last operating point: for looking closer.
-    patterns : tuple of PatternLibrary
+    patterns : tuple of DrivePatterns
         Of no catalogue, around the last.
     of_first, of_last : tuple of CandidateSet
         Their sets, by cost.
@@ -80,13 +80,13 @@ class Ranking:
         From the patterns of the reported set to all of it, an effect more in each in that order.
     refuted : frozenset of Place
         What took no part in the search, as held-out data did not confirm it.
-    exact : mapping of claims to float
+    exact : mapping of PlacedNames to float
         What the sets of the shortlist cost by the exact forces of their own fitted models.
     """
 
     first: FittedSets = field(repr=False)
     last: FittedSets = field(repr=False)
-    patterns: tuple[PatternLibrary, ...] = field(repr=False)
+    patterns: tuple[DrivePatterns, ...] = field(repr=False)
     of_first: tuple[CandidateSet, ...] = field(repr=False)
     of_last: tuple[CandidateSet, ...] = field(repr=False)
     map_set: CandidateSet
@@ -96,7 +96,7 @@ class Ranking:
     order: tuple[EffectCandidate, ...] = field(repr=False)
     path: tuple[CandidateSet, ...] = field(repr=False)
     refuted: frozenset[Place]
-    exact: Mapping[Claims, float] = field(
+    exact: Mapping[PlacedNames, float] = field(
         default_factory=lambda: MappingProxyType({}), repr=False)
 
     @classmethod
@@ -108,7 +108,7 @@ class Ranking:
                               refuted)
 
     @classmethod
-    def _reporting(cls, first: FittedSets, last: FittedSets, patterns: tuple[PatternLibrary, ...],
+    def _reporting(cls, first: FittedSets, last: FittedSets, patterns: tuple[DrivePatterns, ...],
                    map_set: CandidateSet, reported: CandidateSet, absorbed: tuple[Absorbed, ...],
                    refuted: frozenset[Place]) -> Ranking:
         without = {gone: last.evaluate(reported.without(gone)) for gone in reported.candidates}
@@ -122,7 +122,7 @@ class Ranking:
         Where that one bent the columns, everything was found around it: the search begins again.
         Else what paid only beside it goes with it.
         """
-        places = {(one.effect, one.drive) for one in gone.components}
+        places = {(component.effect, component.drive) for component in gone.components}
         refuted = self.refuted | places
         if gone.effect.nonlinear and not places <= self.refuted:
             return _searched(FittedSets(self.first.design, self.first.decisions), refuted)
@@ -130,7 +130,7 @@ class Ranking:
         return replace(self._reporting(self.first, self.last, self.patterns, self.map_set, reported,
                                        self.absorbed, refuted), exact=self.exact)
 
-    def claiming_nothing(self) -> Ranking:
+    def reporting_nothing(self) -> Ranking:
         """Return the ranking with nothing reported, under the noise that the best set leaves."""
         return self._reporting(self.first, self.last, self.patterns, self.map_set,
                                self.last.evaluate(()), (), self.refuted)
@@ -157,40 +157,40 @@ class Ranking:
         """
         found = list(self.of_last)
         if self.first is not self.last:
-            found = [one for one in self.of_last if one.is_nonlinear] + [
-                one for one in self.of_first if not one.is_nonlinear]
+            found = [fitted for fitted in self.of_last if fitted.is_nonlinear] + [
+                fitted for fitted in self.of_first if not fitted.is_nonlinear]
         return (self.map_set, *_by_cost([
-            one for one in found if one is not self.map_set and one.is_admissible]))
+            other for other in found if other is not self.map_set and other.is_admissible]))
 
     def barred(self, margin: float) -> tuple[CandidateSet, ...]:
         """Return the sets that would cost less than a margin more than the best, and may not be."""
-        found = [one for one in (*self.of_last, *(
-            self.of_first if self.first is not self.last else ())) if one.barred
-            and one.total < self.map_set.total + margin]
-        return tuple(sorted(found, key=lambda one: one.total))
+        found = [fitted for fitted in (*self.of_last, *(
+            self.of_first if self.first is not self.last else ())) if fitted.barred
+            and fitted.total < self.map_set.total + margin]
+        return tuple(sorted(found, key=lambda fitted: fitted.total))
 
     @property
     def nothing(self) -> CandidateSet:
         """The empty set around the model as given."""
-        return next(one for one in self.of_first if not one.candidates)
+        return next(fitted for fitted in self.of_first if not fitted.candidates)
 
     @property
     def alone(self) -> dict[str, CandidateSet]:
         """The best set of each effect that was fitted as the only one, by its name."""
         found: dict[str, CandidateSet] = {}
-        for one in self.of_first:
-            if len(one.candidates) == 1 and one.effects and one.is_admissible:
-                found.setdefault(one.effects[0].name, one)
+        for fitted in self.of_first:
+            if len(fitted.candidates) == 1 and fitted.effects and fitted.is_admissible:
+                found.setdefault(fitted.effects[0].name, fitted)
         return found
 
-    def fits_of(self, found: CandidateSet) -> FittedSets:
+    def fits_of(self, fitted: CandidateSet) -> FittedSets:
         """Return the fitted sets that a set is of."""
-        return self.last if any(one is found for one in self.of_last) else self.first
+        return self.last if any(other is fitted for other in self.of_last) else self.first
 
     def best_with(self, candidate: EffectCandidate) -> CandidateSet:
         """Return the set of lowest cost with an effect of the reported set."""
-        return min((self.reported, *(one for one in self._judged if _has(one, candidate))),
-                   key=lambda one: self.difference(one, self.map_set).total)
+        return min((self.reported, *(fitted for fitted in self._judged if _has(fitted, candidate))),
+                   key=lambda fitted: self.difference(fitted, self.map_set).total)
 
     def best_without(self, candidate: EffectCandidate) -> CandidateSet:
         """Return the set of lowest cost without an effect of the reported set, whatever is in it.
@@ -198,54 +198,55 @@ class Ranking:
         An effect on other drives or in another shape is the same one; a body on another link is
         another.
         """
-        # Of one claim that was ranked by exact forces, these stand for all its sets.
-        others = [one for one in self._judged if not _has(one, candidate)
-                  and (one.claims not in self.exact or one in self._exact_costs)]
+        # Of one choice of effects that was ranked by exact forces, these stand for all its sets.
+        others = [fitted for fitted in self._judged if not _has(fitted, candidate)
+                  and (fitted.placed_names not in self.exact or fitted in self._exact_costs)]
         return min((self.without[candidate], *others),
-                   key=lambda one: self.difference(one, self.map_set).total)
+                   key=lambda fitted: self.difference(fitted, self.map_set).total)
 
-    def difference(self, found: CandidateSet, other: CandidateSet) -> CostTerms:
+    def difference(self, fitted: CandidateSet, other: CandidateSet) -> CostTerms:
         """Return the terms of what a set costs more than another, exactly where both are known."""
-        terms, exact = found.terms - other.terms, self._exact_costs
-        if found not in exact or other not in exact:
+        terms, exact = fitted.terms - other.terms, self._exact_costs
+        if fitted not in exact or other not in exact:
             return terms
-        return terms + CostTerms(linearisation=(exact[found] - found.total)
+        return terms + CostTerms(linearisation=(exact[fitted] - fitted.total)
                                  - (exact[other] - other.total))
 
     @cached_property
     def _exact_costs(self) -> Mapping[CandidateSet, float]:
-        """What the sets of the shortlist cost: of each claim the first."""
-        first: dict[Claims, CandidateSet] = {}
-        for one in self.sets:
-            first.setdefault(one.claims, one)
-        return {first[claims]: cost for claims, cost in self.exact.items() if claims in first}
+        """What the sets of the shortlist cost: of each choice of effects the first."""
+        first: dict[PlacedNames, CandidateSet] = {}
+        for fitted in self.sets:
+            first.setdefault(fitted.placed_names, fitted)
+        return {first[names]: cost for names, cost in self.exact.items() if names in first}
 
     @property
     def _judged(self) -> list[CandidateSet]:
         """Sets without what is within the model error of others, which pays but is not reported."""
-        ignored = {one.candidate.name for one in self.absorbed}
-        return [one for one in self.sets
-                if not ignored & {candidate.name for candidate in one.candidates}]
+        ignored = {absorbed.candidate.name for absorbed in self.absorbed}
+        return [fitted for fitted in self.sets
+                if not ignored & {candidate.name for candidate in fitted.candidates}]
 
     def near(self, margin: float) -> tuple[CandidateSet, ...]:
         """Return the sets of the last search within a margin of the best."""
-        return tuple(one for one in self.of_last if one.cost < self.map_set.cost + margin)
+        return tuple(fitted for fitted in self.of_last if fitted.cost < self.map_set.cost + margin)
 
     def nearly(self, margin: float) -> list[tuple[float, CandidateSet]]:
         """Return other sets of the last search within a margin, and what they cost more.
 
-        What exact forces cost more than linear ones is that of the first set of the same claims,
+        What exact forces cost more than linear ones is that of the first set of the same effects,
         and as much as of the reported set where it is not known.
         """
-        departs = {one.claims: cost - one.total for one, cost in self._exact_costs.items()}
-        mine = departs.get(self.reported.claims, 0.0)
+        departs = {fitted.placed_names: cost - fitted.total
+                   for fitted, cost in self._exact_costs.items()}
+        mine = departs.get(self.reported.placed_names, 0.0)
 
-        def more(one: CandidateSet) -> float:
-            return one.cost - self.reported.cost + departs.get(one.claims, mine) - mine
+        def more(fitted: CandidateSet) -> float:
+            return fitted.cost - self.reported.cost + departs.get(fitted.placed_names, mine) - mine
 
-        costs = [(more(one), one) for one in self.of_last if one is not self.reported]
+        costs = [(more(fitted), fitted) for fitted in self.of_last if fitted is not self.reported]
         least = more(self.map_set) + margin
-        return sorted(((cost, one) for cost, one in costs if cost < least),
+        return sorted(((cost, fitted) for cost, fitted in costs if cost < least),
                       key=lambda pair: pair[0])
 
     def rivals(self, margin: float) -> list[Rival]:
@@ -253,17 +254,19 @@ class Ranking:
 
         To have what is within the model error of others makes no rival.
         """
-        mine = {candidate.claim: candidate.name for candidate in self.reported.effects}
-        ignored = {one.candidate.name for one in self.absorbed}
+        mine = {candidate.placed_name: candidate.name for candidate in self.reported.effects}
+        ignored = {absorbed.candidate.name for absorbed in self.absorbed}
         rivals = []
         for other in self.sets:
             if other.cost > self.map_set.cost + margin:
                 break
-            theirs = {candidate.claim: candidate.name for candidate in other.effects
+            theirs = {candidate.placed_name: candidate.name for candidate in other.effects
                       if candidate.name not in ignored}
-            missing = sorted(name for claim, name in mine.items() if claim not in theirs)
-            instead = sorted(claim if name in mine.values() else name
-                             for claim, name in theirs.items() if claim not in mine)
+            missing = sorted(name for placed_name, name in mine.items()
+                             if placed_name not in theirs)
+            instead = sorted(placed_name if name in mine.values() else name
+                             for placed_name, name in theirs.items()
+                             if placed_name not in mine)
             if (missing and instead and not self._is_freer(other, missing, instead)
                     and not self._is_beaten(other, margin)):
                 rivals.append(Rival(other, tuple(missing), tuple(instead)))
@@ -271,7 +274,7 @@ class Ranking:
 
     def _is_beaten(self, other: CandidateSet, margin: float) -> bool:
         """Return whether a set is no rival by the exact forces of its own model."""
-        mine, theirs = (self.exact.get(one.claims) for one in (self.map_set, other))
+        mine, theirs = (self.exact.get(fitted.placed_names) for fitted in (self.map_set, other))
         return mine is not None and theirs is not None and theirs > mine + margin
 
     def _at_one_load(self) -> Iterator[Rival]:
@@ -280,20 +283,20 @@ class Ranking:
         However exact one of them fits: where the load hardly varies, friction that varies as
         little along its guide does the same.
         """
-        design, names = self.last.design, {one.name for one in self.reported.effects}
-        for one in self.reported.effects:
-            other = catalogue().get(one.effect.at_one_load)
+        design, names = self.last.design, {candidate.name for candidate in self.reported.effects}
+        for candidate in self.reported.effects:
+            other = catalogue().get(candidate.effect.at_one_load)
             if (other is None or other.name in names or not issubclass(other, DriveEffect)
-                    or not one.drives or any(
+                    or not candidate.drives or any(
                         not design.acts_on(other, d)
                         or design.load_variation(d) > self.last.decisions.one_load
-                        for d in one.drives)):
+                        for d in candidate.drives)):
                 continue
             instead = EffectCandidate.of(
-                Component.of(other, d, {}, other.variants[0]) for d in one.drives)
-            found = self.last.evaluate((*self.reported.without(one), instead))
-            if found.is_admissible:
-                yield Rival(found, (one.name,), (other.name,))
+                Component.of(other, d, {}, other.variants[0]) for d in candidate.drives)
+            fitted = self.last.evaluate((*self.reported.without(candidate), instead))
+            if fitted.is_admissible:
+                yield Rival(fitted, (candidate.name,), (other.name,))
 
     def _is_freer(self, other: CandidateSet, missing: Sequence[str], instead: Sequence[str],
                   ) -> bool:
@@ -303,14 +306,15 @@ class Ranking:
         that costs more is no other explanation. Of friction only: what else is one thing in a
         recording (a spring and a mass along one sine) is one thing on no other motion.
         """
-        for one in (one for c in self.reported.effects if c.name in missing
-                    for one in c.components):
-            theirs = [other.blocks[two].rows[one.drive] for c in other.effects
+        for component in (component for c in self.reported.effects if c.name in missing
+                          for component in c.components):
+            theirs = [other.blocks[two].rows[component.drive] for c in other.effects
                       if c.name in instead and c.effect.is_friction for two in c.components
-                      if one.drive is not None and two.drive == one.drive]
-            if one.drive is None or not one.effect.is_friction or not theirs:
+                      if component.drive is not None and two.drive == component.drive]
+            if component.drive is None or not component.effect.is_friction or not theirs:
                 return False
-            mine, columns = self.reported.blocks[one].rows[one.drive], np.concatenate(theirs)
+            mine = self.reported.blocks[component].rows[component.drive]
+            columns = np.concatenate(theirs)
             if len(columns) <= len(mine):
                 return False
             left = mine - np.linalg.lstsq(columns.T, mine.T, rcond=None)[0].T @ columns
@@ -323,11 +327,11 @@ class Ranking:
         mine = {c.key for c in self.map_set.candidates}
         names = {c.name for c in self.map_set.effects}
         found: dict[str, tuple[EffectCandidate, CandidateSet]] = {}
-        for one in self.near(margin):
-            more = [c for c in one.effects if c.key not in mine]
-            if (len(more) == 1 and len(one.candidates) == len(mine) + 1
-                    and one.cost > self.map_set.cost and more[0].name not in names):
-                found.setdefault(more[0].name, (more[0], one))
+        for fitted in self.near(margin):
+            more = [c for c in fitted.effects if c.key not in mine]
+            if (len(more) == 1 and len(fitted.candidates) == len(mine) + 1
+                    and fitted.cost > self.map_set.cost and more[0].name not in names):
+                found.setdefault(more[0].name, (more[0], fitted))
         return list(found.values())
 
 
@@ -372,12 +376,12 @@ def _searched(first: FittedSets, refuted: frozenset[Place],
     return found
 
 
-def _has(found: CandidateSet, candidate: EffectCandidate) -> bool:
-    return any(one.claim == candidate.claim for one in found.effects)
+def _has(fitted: CandidateSet, candidate: EffectCandidate) -> bool:
+    return any(effect.placed_name == candidate.placed_name for effect in fitted.effects)
 
 
 def _by_cost(sets: Sequence[CandidateSet]) -> tuple[CandidateSet, ...]:
-    return tuple(sorted(sets, key=lambda one: one.cost))
+    return tuple(sorted(sets, key=lambda fitted: fitted.cost))
 
 
 def _falling(fits: FittedSets, map_set: CandidateSet, reported: CandidateSet,
@@ -390,8 +394,8 @@ def _falling(fits: FittedSets, map_set: CandidateSet, reported: CandidateSet,
     order: list[EffectCandidate] = []
     left = list(reported.effects)
     while left:
-        following = left[0] if len(left) == 1 else min(left, key=lambda one: _over_noise(
-            fits, map_set, linear_residual(fits, fits.evaluate((*order, one)))))
+        following = left[0] if len(left) == 1 else min(left, key=lambda candidate: _over_noise(
+            fits, map_set, linear_residual(fits, fits.evaluate((*order, candidate)))))
         order.append(following)
         left.remove(following)
     path = [fits.evaluate((*order[:count], *reported.unknowns)) for count in range(len(order))]

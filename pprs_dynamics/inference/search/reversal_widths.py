@@ -49,7 +49,7 @@ def with_widths(model: ForceModel, design: Design, widths: Mapping[int, float]) 
     return replace(build_model(values), source=model.source)
 
 
-def estimate_widths(fits: FittedSets, found: CandidateSet) -> dict[int, float]:
+def estimate_widths(fits: FittedSets, fitted: CandidateSet) -> dict[int, float]:
     """Return the widths [m/s] of the drives on which they differ from the model's for certain."""
     design, regression = fits.design, fits.regression
     friction = design.friction()
@@ -63,15 +63,15 @@ def estimate_widths(fits: FittedSets, found: CandidateSet) -> dict[int, float]:
             continue
         width = float(design.model.reversal.widths(len(design.drives))[d])
         series = regression.series[d]
-        rest = regression.remaining(found.fit, d)
+        rest = regression.remaining(fitted.fit, d)
         for k in columns:
-            rest = rest + found.fit.coefficients[k] * series.transform(design.base[k].rows[d])
-        for blocks in found.nuisance.values():
+            rest = rest + fitted.fit.coefficients[k] * series.transform(design.base[k].rows[d])
+        for blocks in fitted.nuisance.values():
             for block in blocks:
                 if set(block.rows) == {d}:
-                    rest = rest + found.fit.of(block) @ block.rows[d]
-        root = np.sqrt(series.spread(regression.weights(found.fit, d)))
-        turning = _turning(design, found, d)
+                    rest = rest + fitted.fit.of(block) @ block.rows[d]
+        root = np.sqrt(series.spread(regression.weights(fitted.fit, d)))
+        turning = _turning(design, fitted, d)
 
         def column(trial: float, d: int = d, turning: list[Turning] = turning) -> Array:
             def change(recording: FullRate) -> Array:
@@ -96,18 +96,19 @@ def estimate_widths(fits: FittedSets, found: CandidateSet) -> dict[int, float]:
 
         refined = minimize_scalar(loss, bounds=(low, high), method='bounded',
                                   options={'maxiter': 15})
-        if -float(refined.fun) > fits.prices.of_width(TRIALS):
+        if -float(refined.fun) > fits.prior_costs.of_width(TRIALS):
             widths[d] = rounded(width * float(np.exp(refined.x)))
     return widths
 
 
-def _turning(design: Design, found: CandidateSet, d: int) -> list[Turning]:
+def _turning(design: Design, fitted: CandidateSet, d: int) -> list[Turning]:
     """Return the friction on a drive: of the set's effects, and of the given model's."""
     turning: list[Turning] = []
-    for one in found.blocks:
-        kind = one.effect
-        if one.drive == d and issubclass(kind, DriveEffect) and _may_turn(kind):
-            turning.append((kind, one.parameters, one.every(found.coefficients(one))))
+    for component in fitted.blocks:
+        kind = component.effect
+        if component.drive == d and issubclass(kind, DriveEffect) and _may_turn(kind):
+            turning.append((kind, component.parameters,
+                            component.every(fitted.coefficients(component))))
     for effect in design.given.effects:
         if (isinstance(effect, DriveEffect) and _may_turn(type(effect))
                 and design.drives[d] in effect.drives):

@@ -25,7 +25,7 @@ SLOW_LEFT = 1e-3  # of the power of slow noise, where fast noise alone proposes
 
 
 Place = tuple[type[CatalogueEffect], int | None]  # an effect, and the drive that it acts on alone
-Scored = tuple[float, Component]  # its gain less its price
+Scored = tuple[float, Component]  # its gain less its prior cost
 
 
 class Scan:
@@ -72,32 +72,32 @@ class Scan:
                     kept = tuple(c for c in base.candidates if c is not old)
                     scored.append((score, (*kept, EffectCandidate.of(
                         [*(old.components if old else ()), *chosen]))))
-        scored.sort(key=lambda one: -one[0])
+        scored.sort(key=lambda scored: -scored[0])
         return [candidates for _, candidates in scored[:count]]
 
     def offers(self, base: CandidateSet, drive: int | None = None,
                ) -> dict[type[CatalogueEffect], list[Scored]]:
-        """Return gains less prices of components, by effect; one for each drive or place."""
-        library, fit = self.fits.library, base.fit
-        taken = {(one.effect, one.drive) for one in base.blocks}
-        drives = tuple(library.local) if drive is None else (drive,)
+        """Return gains less prior costs of components, by effect; one for each drive or place."""
+        components, fit = self.fits.components, base.fit
+        taken = {(component.effect, component.drive) for component in base.blocks}
+        drives = tuple(components.local) if drive is None else (drive,)
 
         def of_drive(d: int) -> list[tuple[Component, float]]:
-            found = list(library.local[d].offers(fit).values())
+            found = list(components.local[d].offers(fit).values())
             self.fits.stepped()
             return found
 
         offered = each(of_drive, drives)
         offers = [offer for found_there in offered for offer in found_there]
-        offers += library.shared_offers(fit) if drive is None else []
+        offers += components.shared_offers(fit) if drive is None else []
         best: dict[Hashable, Scored] = {}
-        for one, gain in offers:
-            place = (one.effect, one.drive)
-            key = (*place, one.effect.places_of(one.names))
-            net = gain - library.component_price(one).total
+        for component, gain in offers:
+            place = (component.effect, component.drive)
+            key = (*place, component.effect.places_of(component.names))
+            net = gain - components.component_prior_cost(component).total
             if place not in taken and place not in self.refuted and (
                     key not in best or net > best[key][0]):
-                best[key] = (net, one)
+                best[key] = (net, component)
         found: dict[type[CatalogueEffect], list[Scored]] = {}
         for scored in best.values():
             found.setdefault(scored[1].effect, []).append(scored)
@@ -108,21 +108,22 @@ class Scan:
         old: EffectCandidate | None,
     ) -> tuple[float, list[Component]]:
         """Return the drives on which an effect pays, and the score of all together."""
-        prices = self.fits.prices
-        found = sorted(found, key=lambda one: -one[0])
+        prior_costs = self.fits.prior_costs
+        found = sorted(found, key=lambda scored: -scored[0])
         if not issubclass(effect, DriveEffect):
-            return found[0][0] - prices.of_name(), [found[0][1]]
+            return found[0][0] - prior_costs.of_name(), [found[0][1]]
         there = len(old.components) if old else 0
-        before = prices.of_drives(there) if there else -prices.of_name()
+        before = prior_costs.of_drives(there) if there else -prior_costs.of_name()
         nets = np.cumsum([net for net, _ in found])
-        scores = [nets[m] + before - prices.of_drives(there + m + 1) for m in range(len(found))]
+        scores = [nets[m] + before - prior_costs.of_drives(there + m + 1)
+                  for m in range(len(found))]
         best = int(np.argmax(scores))
-        return float(scores[best]), [one for _, one in found[:best + 1]]
+        return float(scores[best]), [component for _, component in found[:best + 1]]
 
 
 def _by_place(effect: type[CatalogueEffect], found: Sequence[Scored]) -> list[Sequence[Scored]]:
     """Return one list for each link or joint of an effect that is on one, else one of all."""
-    return [[one] for one in found] if effect.is_of_one_place else [found]
+    return [[scored] for scored in found] if effect.is_of_one_place else [found]
 
 
 def with_fast_noise(regression: Regression, fit: JointFit) -> JointFit:

@@ -3,10 +3,10 @@
 
 """Search for the set of effects with the lowest cost.
 
-The cost of a set is its penalised deviance (`regression.joint_fit`) plus the prices of what was
-chosen (`Prices`). From the best set, effects are added, placed on other drives, dropped, replaced
-and merged, until no neighbour is better. A scan at the noise of a fit proposes, a fit with its own
-noise decides.
+The cost of a set is its penalised deviance (`regression.joint_fit`) plus the prior costs of what
+was chosen (`PriorCosts`). From the best set, effects are added, placed on other drives, dropped,
+replaced and merged, until no neighbour is better. A scan at the noise of a fit proposes, a fit
+with its own noise decides.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from pprs_dynamics.inference.search.candidates import (
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
 from pprs_dynamics.inference.search.neighbours import exchanged, simplified, with_instead
 from pprs_dynamics.inference.search.scan import Place, Scan, with_fast_noise
-from pprs_dynamics.inference.search.unknown import PatternLibrary, Shared, best_patterns
+from pprs_dynamics.inference.search.unknown import DrivePatterns, Shared, best_patterns
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
@@ -45,7 +45,7 @@ class Search:
     Parameters
     ----------
     fits : FittedSets
-    patterns : sequence of PatternLibrary, optional
+    patterns : sequence of DrivePatterns, optional
         Patterns of no catalogue that take part, see `patterns_of`; by default none do.
     refuted : frozenset of Place
         See `Scan`.
@@ -53,7 +53,7 @@ class Search:
         Called with the share of the work that is done.
     """
 
-    def __init__(self, fits: FittedSets, patterns: Sequence[PatternLibrary] = (),
+    def __init__(self, fits: FittedSets, patterns: Sequence[DrivePatterns] = (),
                  refuted: frozenset[Place] = frozenset(),
                  progress: Callable[[float], None] | None = None) -> None:
         self.fits, self.patterns = fits, tuple(patterns)
@@ -115,35 +115,35 @@ class Search:
 
     def _fit(self, sets: Iterable[Candidates]) -> None:
         """Fit sets, and bring those that may be the best to where they cost least."""
-        new = [self.fits.evaluate(one) for one in sets
-               if not self.fits.has(one) and self._is_bounded(one)]
+        new = [self.fits.evaluate(candidates) for candidates in sets
+               if not self.fits.has(candidates) and self._is_bounded(candidates)]
         new += self._with_constants(new)
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
-        shaped = [found for found in new if any(one.effect.shape or one.centre
-                                                for one in found.blocks)]
-        for number, found in enumerate(sorted(shaped, key=lambda one: one.cost)):
+        shaped = [fitted for fitted in new if any(component.effect.shape or component.centre
+                                                  for component in fitted.blocks)]
+        for number, fitted in enumerate(sorted(shaped, key=lambda shaped: shaped.cost)):
             # The first effect decides which way the search goes.
-            if number < REFINED or len(found.candidates) == 1:
-                self.fits.refined(found)
+            if number < REFINED or len(fitted.candidates) == 1:
+                self.fits.refined(fitted)
         # A scan puts it where each drive pays by itself: beside others that is seldom right.
-        for found in new:
-            if len(found.candidates) == len(found.effects) == 1:
-                simplified(self.fits, found)
+        for fitted in new:
+            if len(fitted.candidates) == len(fitted.effects) == 1:
+                simplified(self.fits, fitted)
 
     def _with_constants(self, sets: Iterable[CandidateSet]) -> list[CandidateSet]:
         """Return sets with one effect more, where they would be the best but for constants.
 
         No noise takes a constant: what lacks nothing else is judged once it has it.
         """
-        near = [one for one in sets if self._all_but_constants(one) < self.best.cost]
-        return [self.fits.evaluate(more) for found in near
-                for more in self.scan.proposals(found, 1) if self._is_bounded(more)]
+        near = [fitted for fitted in sets if self._all_but_constants(fitted) < self.best.cost]
+        return [self.fits.evaluate(more) for fitted in near
+                for more in self.scan.proposals(fitted, 1) if self._is_bounded(more)]
 
-    def _all_but_constants(self, found: CandidateSet) -> float:
+    def _all_but_constants(self, fitted: CandidateSet) -> float:
         """Return the cost of a set if its drives' constants were what their noise expects."""
-        squares = found.fit.squares[:, 0] / found.fit.spectra[:, 0]
+        squares = fitted.fit.squares[:, 0] / fitted.fit.spectra[:, 0]
         counts = self.fits.regression.counts[:, 0]
-        return found.cost - float(np.sum(np.maximum(squares - counts, 0)))
+        return fitted.cost - float(np.sum(np.maximum(squares - counts, 0)))
 
     @staticmethod
     def _is_bounded(candidates: Candidates) -> bool:
@@ -153,7 +153,7 @@ class Search:
     def _additions(self, with_patterns: bool) -> list[Candidates]:
         """Return sets with one candidate more, or on more drives, from the best few sets."""
         found: list[Candidates] = []
-        ranked = sorted(self.fits.sets, key=lambda one: one.cost)
+        ranked = sorted(self.fits.sets, key=lambda fitted: fitted.cost)
         for rank, base in enumerate(ranked[:BEAM]):
             count = PROPOSALS if rank == 0 else 2
             found += self.scan.proposals(base, count)
@@ -178,55 +178,56 @@ class Search:
             if drives is None:
                 chosen = self.scan.best_drives(effect, found, None)[1] if found else []
             else:
-                chosen = [one for _, one in found if one.drive in drives]
+                chosen = [component for _, component in found if component.drive in drives]
             if chosen:
                 self.fits.refined(self.fits.evaluate((EffectCandidate.of(chosen),)))
         while True:
-            alone = [one for one in self.fits.sets if one.candidates]
+            alone = [fitted for fitted in self.fits.sets if fitted.candidates]
             if not alone:
                 return None
-            best = min(alone, key=lambda one: one.cost)
+            best = min(alone, key=lambda fitted: fitted.cost)
             for candidate in (*self._alternatives(best.effects[0]),
                               *(self._variants(best.effects[0]))):
                 self.fits.evaluate((candidate,))
-            after = min((one for one in self.fits.sets if one.candidates),
-                        key=lambda one: one.cost)
+            after = min((fitted for fitted in self.fits.sets if fitted.candidates),
+                        key=lambda fitted: fitted.cost)
             if after.cost > best.cost - LEAST_IMPROVEMENT:
                 return best
             self.fits.refined(after)
 
-    def rescanned(self, found: CandidateSet) -> CandidateSet:
+    def rescanned(self, fitted: CandidateSet) -> CandidateSet:
         """Return the set on all drives where its effects pay, in shapes that scans find."""
-        for candidates in self.scan.proposals(found, effects={c.effect for c in found.effects}):
-            found = min(found, self.fits.evaluate(candidates), key=lambda one: one.cost)
-        for effect, d in [(one.effect, one.drive) for one in found.blocks
-                          if one.effect.shape and one.drive is not None]:
-            candidate = next(c for c in found.effects if c.effect is effect)
-            others = [one for one in candidate.components if one.drive != d]
-            rest = found.without(candidate)
+        for candidates in self.scan.proposals(fitted, effects={c.effect for c in fitted.effects}):
+            fitted = min(fitted, self.fits.evaluate(candidates), key=lambda fitted: fitted.cost)
+        for effect, d in [(component.effect, component.drive) for component in fitted.blocks
+                          if component.effect.shape and component.drive is not None]:
+            candidate = next(c for c in fitted.effects if c.effect is effect)
+            others = [component for component in candidate.components if component.drive != d]
+            rest = fitted.without(candidate)
             less = (*rest, EffectCandidate.of(others)) if others else rest
-            offers = self.fits.library.local[d].offers(self.fits.at_noise_of(found, less).fit)
+            offers = self.fits.components.local[d].offers(self.fits.at_noise_of(fitted, less).fit)
             if effect.name in offers:
-                found = min(found, self.fits.evaluate((*rest, EffectCandidate.of(
-                    [*others, offers[effect.name][0]]))), key=lambda one: one.cost)
-        return self.fits.refined(found)
+                fitted = min(fitted, self.fits.evaluate((*rest, EffectCandidate.of(
+                    [*others, offers[effect.name][0]]))), key=lambda fitted: fitted.cost)
+        return self.fits.refined(fitted)
 
     def _variants(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
         """Yield the candidate with other coefficients of one component."""
         for component in candidate.components:
-            for other in self.fits.library.variants(component):
+            for other in self.fits.components.variants(component):
                 if other.names != component.names:
                     yield with_instead(candidate, component, other)
 
-    def replaced(self, found: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
+    def replaced(self, fitted: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
                  ) -> CandidateSet:
         """Return the best of a set and those in which something else stands for one or two."""
         before = len(self.fits.sets)
-        self._fit(self._replacements(found))
-        better = [one for one in self.fits.sets[before:]
-                  if one.cost < found.total - LEAST_IMPROVEMENT]
-        return next((one for one in sorted(better, key=lambda one: one.cost) if is_allowed(one)),
-                    found)
+        self._fit(self._replacements(fitted))
+        better = [other for other in self.fits.sets[before:]
+                  if other.cost < fitted.total - LEAST_IMPROVEMENT]
+        return next((fitted for fitted in sorted(better, key=lambda fitted: fitted.cost)
+                     if is_allowed(fitted)),
+                    fitted)
 
     def _replacements(self, best: CandidateSet) -> Iterator[Candidates]:
         """Yield sets in which something else stands for candidates, or for one on a drive.
@@ -237,7 +238,7 @@ class Search:
             # Whatever stands for one effect as well is a rival: all of them are fitted.
             yield from self._instead(best, best.without(candidate), None)
         for pair in combinations(best.candidates, 2):
-            if any(isinstance(one, EffectCandidate) for one in pair):
+            if any(isinstance(candidate, EffectCandidate) for candidate in pair):
                 yield from self._instead(best, best.without(*pair), REPLACEMENTS)
         for candidate in best.effects:
             yield from self._instead_on_a_drive(best, candidate)
@@ -253,7 +254,7 @@ class Search:
         There it, or some of its coefficients, may stand for the other one.
         """
         for component in candidate.components if len(candidate.components) > 1 else ():
-            fewer = [(other,) for other in self.fits.library.variants(component)
+            fewer = [(other,) for other in self.fits.components.variants(component)
                      if set(other.names) < set(component.names)]
             for kept in ((), *fewer):
                 rest = exchanged(best, candidate, with_instead(candidate, component, *kept))
@@ -267,11 +268,12 @@ class Search:
                                    RECOVERED * (base.total - best.total) - REPLACED)
 
     def _two_for(self, best: CandidateSet, gone: EffectCandidate) -> Iterable[Candidates]:
-        """Yield sets in which two other effects stand for one that claims more than one thing."""
+        """Yield sets in which two other effects stand for one that is more than one hypothesis."""
         def with_another(candidates: Candidates) -> list[Candidates]:
             found = self.scan.proposals(self.fits.at_noise_of(best, candidates), REPLACEMENTS + 1)
             return [more for more in found if all(
-                one.effect is not gone.effect for one in more if isinstance(one, EffectCandidate))]
+                candidate.effect is not gone.effect for candidate in more
+                if isinstance(candidate, EffectCandidate))]
         for first in with_another(best.without(gone)):
             yield from with_another(first)[:REPLACEMENTS]
 
@@ -280,15 +282,15 @@ class Search:
         effect = candidate.effect
         if not issubclass(effect, DriveEffect) or not effect.shape:
             return
-        shapes = [effect.alternatives(one.parameters) for one in candidate.components]
+        shapes = [effect.alternatives(component.parameters) for component in candidate.components]
         for number in range(min(map(len, shapes))):
             yield EffectCandidate.of(
-                replace(one, shape=tuple(sorted(others[number].items())))
-                for one, others in zip(candidate.components, shapes, strict=True))
+                replace(component, shape=tuple(sorted(others[number].items())))
+                for component, others in zip(candidate.components, shapes, strict=True))
 
 
-def patterns_of(fits: FittedSets) -> list[PatternLibrary]:
+def patterns_of(fits: FittedSets) -> list[DrivePatterns]:
     """Return the patterns of no catalogue of all drives."""
     shared = Shared()
-    return [PatternLibrary(fits.regression, fits.prices, d, shared=shared)
+    return [DrivePatterns(fits.regression, fits.prior_costs, d, shared=shared)
             for d in fits.regression.drives]

@@ -24,7 +24,7 @@ from pprs_dynamics.inference.regression.joint_fit import Columns, JointFit, Regr
 from pprs_dynamics.inference.regression.normal_equations import Block, term_gains
 from pprs_dynamics.inference.residuals.bins import LEAST_SHARE, MOST_SHARE
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.candidates import Prices, UnknownCandidate
+from pprs_dynamics.inference.search.candidates import PriorCosts, UnknownCandidate
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.patterns import (
     Family,
@@ -121,13 +121,13 @@ class _Scanned:
         return found
 
 
-class PatternLibrary:
+class DrivePatterns:
     """Patterns of one drive.
 
     Parameters
     ----------
     regression : Regression
-    prices : Prices
+    prior_costs : PriorCosts
     d : int
     with_plain_forms : bool
         Also what effects of the catalogue are exactly: a constant, friction, a ripple.
@@ -135,9 +135,9 @@ class PatternLibrary:
         With libraries of other drives of the same residuals.
     """
 
-    def __init__(self, regression: Regression, prices: Prices, d: int,
+    def __init__(self, regression: Regression, prior_costs: PriorCosts, d: int,
                  with_plain_forms: bool = False, shared: Shared | None = None) -> None:
-        self.regression, self.prices, self.d = regression, prices, d
+        self.regression, self.prior_costs, self.d = regression, prior_costs, d
         self._shared = shared or Shared()
         self.series = regression.series[d]
         self.with_plain_forms = with_plain_forms
@@ -149,11 +149,11 @@ class PatternLibrary:
             {name: values[index] for name, values in residuals.variables.items()},
             residuals.period, residuals.units)
 
-    def around(self, regression: Regression) -> PatternLibrary:
+    def around(self, regression: Regression) -> DrivePatterns:
         """Return the same patterns for the same samples around another operating point."""
         series = regression.series[self.d]
         if not np.array_equal(series.index, self.series.index):
-            return PatternLibrary(regression, self.prices, self.d, self.with_plain_forms)
+            return DrivePatterns(regression, self.prior_costs, self.d, self.with_plain_forms)
         found = copy(self)
         found.regression, found.series = regression, series
         vars(found).pop('_scanned', None)
@@ -175,9 +175,10 @@ class PatternLibrary:
     @lazy
     def _scanned(self) -> list[_Scanned]:
         scale = len(self.series) * max(self.regression.error_scale[self.d], 1e-12) ** 2
-        return [_Scanned(one.family, Columns(self.regression, {self.d: one.rows}), one.gram,
-                         _Scanned.of_patterns(one.family, one.gram.sum(axis=0)) / scale)
-                for one in self._transformed]
+        return [_Scanned(scanned.family, Columns(self.regression, {self.d: scanned.rows}),
+                         scanned.gram,
+                         _Scanned.of_patterns(scanned.family, scanned.gram.sum(axis=0)) / scale)
+                for scanned in self._transformed]
 
     def release(self) -> None:
         """Let go of products that only further scans would need."""
@@ -193,10 +194,10 @@ class PatternLibrary:
         return self.regression.transformed_block(
             {self.d: self.series.transform(family.columns.astype(float))})
 
-    def price(self, family: Family, drives: int = 1) -> CostTerms:
-        """Return the price of a pattern of a family: that it is unknown, where, and which."""
-        return self.prices.of_pattern(max(len(self._scanned), 1) * family.rivals,
-                                      max(len(family.patterns), 1), drives)
+    def prior_cost(self, family: Family, drives: int = 1) -> CostTerms:
+        """Return the prior cost of a pattern of a family: that it is unknown, where, and which."""
+        return self.prior_costs.of_pattern(max(len(self._scanned), 1) * family.alike,
+                                           max(len(family.patterns), 1), drives)
 
     def candidate(self, family: Family, pattern: Pattern, rows: Array) -> UnknownCandidate:
         """Return a pattern with its columns (1 or 2, M at the series' samples)."""
@@ -204,7 +205,7 @@ class PatternLibrary:
         full[:, self.series.index] = rows
         block = self.regression.transformed_block({self.d: self.series.transform(rows)})
         return UnknownCandidate(family, pattern, {self.d: full}, {self.d: block},
-                                self.price(family))
+                                self.prior_cost(family))
 
     def on_more_drives(self, candidate: UnknownCandidate, fit: JointFit) -> UnknownCandidate:
         """Return the candidate on all drives on which it pays, if all share its variable."""
@@ -220,18 +221,18 @@ class PatternLibrary:
                 gains[d] = block, self.regression.gain(fit, block)
         for d in sorted(gains, key=lambda d: -gains[d][1]):
             block, gain = gains[d]
-            more = self.price(candidate.family, len(parts) + 1) - self.price(
+            more = self.prior_cost(candidate.family, len(parts) + 1) - self.prior_cost(
                 candidate.family, len(parts))
             if gain > more.total:
                 rows[d], parts[d] = candidate.rows[self.d], block
         order = sorted(parts)
         return UnknownCandidate(candidate.family, candidate.pattern, {d: rows[d] for d in order},
                                 {d: parts[d] for d in order},
-                                self.price(candidate.family, len(parts)))
+                                self.prior_cost(candidate.family, len(parts)))
 
     def proposals(self, fit: JointFit, count: int, always: bool = False,
                   ) -> list[tuple[UnknownCandidate, float]]:
-        """Return the best patterns of different variables with their gains less their prices.
+        """Return the best patterns of different variables with their gains less their prior costs.
 
         Parameters
         ----------
@@ -246,8 +247,9 @@ class PatternLibrary:
         for scanned in self._scanned:
             gains = scanned.gains(fit, weights)
             best = int(np.argmax(gains))
-            scored.append((float(gains[best]) - self.price(scanned.family).total, scanned, best))
-        scored.sort(key=lambda one: -one[0])
+            net = float(gains[best]) - self.prior_cost(scanned.family).total
+            scored.append((net, scanned, best))
+        scored.sort(key=lambda scored: -scored[0])
         found = []
         for rank, (score, scanned, best) in enumerate(scored):
             family = scanned.family
@@ -257,8 +259,8 @@ class PatternLibrary:
                                          family.pattern_columns(best)), score))
         line = self.line(fit)
         if line is not None:
-            found.append((line, self.regression.gain(fit, line.blocks[0]) - line.price))
-        return sorted(found, key=lambda one: -one[1])
+            found.append((line, self.regression.gain(fit, line.blocks[0]) - line.prior_cost))
+        return sorted(found, key=lambda scored: -scored[1])
 
     def line(self, fit: JointFit) -> UnknownCandidate | None:
         """Return the strongest spectral line of what a fit leaves."""
@@ -266,7 +268,7 @@ class PatternLibrary:
         white = self.regression.innovations(fit, self.d)[longest]
         at = self.series.index[longest] - self.series.index[longest.start]
         n, period = int(at[-1]) + 1, self.residuals.period
-        lowest = self.prices.decisions.line_periods
+        lowest = self.prior_costs.decisions.line_periods
         if n < 16 * lowest:
             return None
         even = np.zeros(n)
@@ -285,7 +287,7 @@ class PatternLibrary:
         pattern = Pattern('line', scale=frequency)
         rows = np.stack((np.cos(phase), np.sin(phase)))
         # As many frequencies as the stretch resolves were tried.
-        family = Family('frequency', rows, np.zeros((0, 0)), (pattern,), rivals=n // 2,
+        family = Family('frequency', rows, np.zeros((0, 0)), (pattern,), alike=n // 2,
                         paired=True)
         return self.candidate(family, pattern, rows)
 
@@ -360,12 +362,12 @@ class PatternLibrary:
         return values
 
 
-def best_patterns(libraries: Sequence[PatternLibrary], fit: JointFit, count: int,
+def best_patterns(libraries: Sequence[DrivePatterns], fit: JointFit, count: int,
                   ) -> list[UnknownCandidate]:
     """Return the best patterns of any drive at the noise of a fit, their limits refined."""
-    proposed = each(lambda library: library.proposals(fit, count), libraries)
-    found = [(candidate, gain, library) for library, offers in zip(
+    proposed = each(lambda components: components.proposals(fit, count), libraries)
+    found = [(candidate, gain, components) for components, offers in zip(
         libraries, proposed, strict=True) for candidate, gain in offers]
-    found.sort(key=lambda one: -one[1])
-    return [library.on_more_drives(library.refined(candidate, fit), fit)
-            for candidate, gain, library in found[:count] if gain > 0]
+    found.sort(key=lambda scored: -scored[1])
+    return [components.on_more_drives(components.refined(candidate, fit), fit)
+            for candidate, gain, components in found[:count] if gain > 0]

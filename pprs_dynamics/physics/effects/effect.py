@@ -346,7 +346,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
 
     @classmethod
     def hypotheses(cls, names: tuple[str, ...]) -> frozenset[Hashable]:
-        """Return what is claimed with these coefficients; each is priced as a name."""
+        """Return what is claimed with these coefficients; each costs the prior odds of a name."""
         return frozenset({names})
 
     @classmethod

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Prices are -2 ln of prior probabilities: they add up to one, over what this robot can have."""
+"""Prior costs are -2 ln of prior probabilities: they add up to one over what a robot can have."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ import pytest
 import pprs_dynamics.inference as inference
 from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.search import candidates as candidates_module
-from pprs_dynamics.inference.search.candidates import Component, Prices, names_of
+from pprs_dynamics.inference.search.candidates import Component, PriorCosts, names_of
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 
 MODEL = DriveModel.load()
-PRICES = Prices(25, 6, 4000, DECISIONS)
+COSTS = PriorCosts(25, 6, 4000, DECISIONS)
 SIGNED = [effect for effect in CATALOGUE.values() if effect.unphysical_below]
 SIZE = (Parameter('size', 's', 'N', 'size', -1e3, 1e3),)
 
@@ -36,9 +36,9 @@ def test_the_odds_of_all_signs_add_up_to_one(effect: type[CatalogueEffect]) -> N
     odds = []
     for signs in product((1.0, -1.0), repeat=len(component.signed)):
         values = dict(zip(component.signed, signs, strict=True))
-        price = PRICES.of_right_signs(component) + PRICES.of_wrong_signs(component, values)
+        prior_cost = COSTS.of_right_signs(component) + COSTS.of_wrong_signs(component, values)
         # A symmetric prior gives each choice of signs as much.
-        odds.append(np.exp(-price / 2) / 2 ** len(signs))
+        odds.append(np.exp(-prior_cost / 2) / 2 ** len(signs))
     assert sum(odds) == pytest.approx(1.0)
     assert sum(odds[1:]) == pytest.approx(DECISIONS.wrong_sign_odds)
     assert max(odds) == odds[0]
@@ -46,8 +46,8 @@ def test_the_odds_of_all_signs_add_up_to_one(effect: type[CatalogueEffect]) -> N
 
 def test_an_effect_without_a_sign_pays_none() -> None:
     component = Component(CATALOGUE['effort_offset'], 0, ('force',))
-    assert PRICES.of_right_signs(component) == 0
-    assert PRICES.of_wrong_signs(component, {'force': -1.0}) == 0
+    assert COSTS.of_right_signs(component) == 0
+    assert COSTS.of_wrong_signs(component, {'force': -1.0}) == 0
 
 
 def test_names_are_those_that_the_robot_can_have(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,7 +28,7 @@ from pprs_dynamics.inference.search.candidates import (
     CandidateSet,
     Component,
     Course,
-    Prices,
+    PriorCosts,
     UnknownCandidate,
 )
 from pprs_dynamics.inference.search.cost_terms import CostTerms
@@ -58,7 +58,7 @@ def shapes_of(design: Design, effect: type[DriveEffect], drive: int,
         *trials, {p.name: values[p.name] for p in effect.shape}]
 
 
-class DriveLibrary:
+class DriveComponents:
     """Effects on one drive alone, in every shape tried.
 
     Parameters
@@ -126,25 +126,25 @@ class DriveLibrary:
         return best
 
 
-class Library:
-    """Columns and prices of the components of a design.
+class Components:
+    """Columns and prior costs of the components of a design.
 
     Parameters
     ----------
     design : Design
     regression : Regression
         Of its residuals and base columns.
-    prices : Prices
+    prior_costs : PriorCosts
     """
 
-    def __init__(self, design: Design, regression: Regression, prices: Prices) -> None:
-        self.design, self.regression, self.prices = design, regression, prices
+    def __init__(self, design: Design, regression: Regression, prior_costs: PriorCosts) -> None:
+        self.design, self.regression, self.prior_costs = design, regression, prior_costs
         self._terms: dict[Hashable, Term] = {}
         self._centres: dict[Hashable, tuple[float, ...]] = {}
         self._blocks: dict[Component, Block] = {}
         self._nuisance: dict[Component, dict[int, Array]] = {}
-        self._prices: dict[Component, CostTerms] = {}
-        self.local = {d: DriveLibrary(design, regression, d) for d in regression.drives}
+        self._prior_costs: dict[Component, CostTerms] = {}
+        self.local = {d: DriveComponents(design, regression, d) for d in regression.drives}
         self.spanning = [placed(design, effect, d, shape, names)
                          for effect in searched_in_drives(design) if effect.shifts_positions()
                          for d in regression.drives if design.acts_on(effect, d)
@@ -178,10 +178,10 @@ class Library:
         """All that more than one drive feels; computed when asked for."""
         series = self.regression.series
         entries, parts, first = [], [], 0
-        for one in (*self.structure, *self.spanning):
-            block = self.block(one)
-            entries.append(Entry(one, tuple(range(first, first + block.size)), block.precision,
-                                 block.mean))
+        for component in (*self.structure, *self.spanning):
+            block = self.block(component)
+            entries.append(Entry(component, tuple(range(first, first + block.size)),
+                                 block.precision, block.mean))
             parts.append({d: block.rows[d] if d in block.rows
                           else np.zeros((block.size, len(series[d]))) for d in series})
             first += block.size
@@ -193,8 +193,8 @@ class Library:
         """Return what more than one drive feels, with its gains at the noise of a fit."""
         if not self.structure and not self.spanning:
             return []
-        return [(one, float(gain)) for components, gains in self.score_test.gains(fit)
-                for one, gain in zip(components, gains, strict=True)]
+        return [(component, float(gain)) for components, gains in self.score_test.gains(fit)
+                for component, gain in zip(components, gains, strict=True)]
 
     def term(self, component: Component) -> Term:
         """Return the rows in time of a component, of all of its effect's coefficients."""
@@ -252,7 +252,7 @@ class Library:
     def windups(self) -> dict[int, Windup]:
         """What second encoders tell of the drives whose wind-up follows their load."""
         return {d: windup for d, windup in self.design.windups.items()
-                if windup.explained > self.prices.decisions.explained}
+                if windup.explained > self.prior_costs.decisions.explained}
 
     def _seen(self, component: Component) -> Mapping[str, float]:
         """Return sizes of coefficients that a further sensor shows, by name."""
@@ -315,44 +315,44 @@ class Library:
         """Return whether there are columns for what a component's form leaves open."""
         return self.term(component).bare is not None or bool(self.nuisance_rows(component))
 
-    def price(self, candidate: Candidate) -> CostTerms:
-        """Return the price of everything that was chosen."""
-        return self.prices.of_candidate(candidate, self.component_price)
+    def prior_cost(self, candidate: Candidate) -> CostTerms:
+        """Return the prior cost of everything that was chosen."""
+        return self.prior_costs.of_candidate(candidate, self.component_prior_cost)
 
-    def component_price(self, component: Component) -> CostTerms:
-        """Return the price of a component beside that of its candidate's hypotheses and drives.
+    def component_prior_cost(self, component: Component) -> CostTerms:
+        """Return the prior cost of a component beside that of its hypotheses and drives.
 
         With signs that are physical; what others cost more is known once they are fitted.
         That an effect is usually small makes large values unlikely, and small ones no likelier:
         it costs by how much that narrows the prior, and the odds that it is otherwise at all, which
         a further sensor settles.
         """
-        if component not in self._prices:
+        if component not in self._prior_costs:
             usual, narrowed, odds = self._expected(component), 0.0, 0.0
             if np.any(usual):
-                decisions, both = self.prices.decisions, self.block(component).precision
+                decisions, both = self.prior_costs.decisions, self.block(component).precision
                 both = both[:len(usual), :len(usual)]
                 narrowed = float(np.linalg.slogdet(both)[1] - np.linalg.slogdet(both - usual)[1])
                 if component.drive is not None and not self._seen(component):
                     odds = -2 * float(np.log(
                         decisions.zero_odds if component.effect.shifts_positions()
                         else decisions.gain_odds))
-            self._prices[component] = CostTerms(
-                coefficients=narrowed, names=odds, shapes=self.prices.of_component(
+            self._prior_costs[component] = CostTerms(
+                coefficients=narrowed, names=odds, shapes=self.prior_costs.of_component(
                     component.effect, len(self.trials(component))),
-                signs=self.prices.of_right_signs(component))
-        return self._prices[component]
+                signs=self.prior_costs.of_right_signs(component))
+        return self._prior_costs[component]
 
-    def force(self, found: CandidateSet, candidate: Candidate, shape: tuple[int, ...]) -> Array:
+    def force(self, fitted: CandidateSet, candidate: Candidate, shape: tuple[int, ...]) -> Array:
         """Return what a candidate of a set contributes, in the shape (M, D) [N]."""
         force = np.zeros(shape)
         if isinstance(candidate, UnknownCandidate):
             for d, block in candidate.parts.items():
-                force[:, d] = found.fit.of(block) @ candidate.rows[d]
+                force[:, d] = fitted.fit.of(block) @ candidate.rows[d]
             return force
-        for one in candidate.components:
-            c = one.every(found.coefficients(one))
-            term = self.term(one)
+        for component in candidate.components:
+            c = component.every(fitted.coefficients(component))
+            term = self.term(component)
             for d, rows in term.rows.items():
                 force[:, d] += c @ rows
             for d, row in self.design.known_change(term).items():
