@@ -47,7 +47,11 @@ from pprs_dynamics.inference.regression.design import CarriedOver, Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.residuals.bands import LEAST_OPEN, DriveSeries, OpenForces
 from pprs_dynamics.inference.residuals.measuring import MOTION, join_tables, treated_table
-from pprs_dynamics.inference.residuals.reconstruction import Reconstruction, reconstruct
+from pprs_dynamics.inference.residuals.reconstruction import (
+    CHUNK,
+    Reconstruction,
+    reconstruct,
+)
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.explained_effort import little_explained
@@ -72,6 +76,7 @@ OWN_LENGTHS = tuple((position, speed) for position in (0.3, 1.0, 3.0) for speed 
 # of what is left sine and cosine explain: by chance one in 25 000 that are tried does.
 MOST_WAVES, LONGEST_WAVE, FINEST_WAVE, LEAST_WAVE = 6, 10.0, 400.0, 20.0
 WAVE_STEP, FINE_STEP = 0.5, 0.02  # of a wave over the stroke, between those that are tried
+FEW_WHOLE = 10.0  # waves over the stroke between whole numbers for a turn, for one to be meant
 FIRST_SIZE = 0.4  # of a process, over the error: from which its size is fitted
 LEAST_SIZE = 1e-9  # [N, N m], of a process that does nothing
 ROUNDS = 3  # of the size of the process
@@ -119,9 +124,8 @@ class States:
         q, v = _motion(residuals)
         return np.concatenate(((q - self.centre) / self.spread, v / self.speed * SLOW), axis=1)
 
-    def at(self, residuals: Residuals, drive: int | None = None) -> Array:
-        """Return the states of all drives in a recording, or of one, (M, k)."""
-        q, v = _motion(residuals)
+    def at(self, q: Array, v: Array, drive: int | None = None) -> Array:
+        """Return the states of all drives in a motion (M, D), or of one, (M, k)."""
         position, direction = (q - self.centre) / self.spread, np.tanh(v / self.speed)
         one = slice(None) if drive is None else [drive]
         return np.concatenate((position[:, one] / self.lengths[0],
@@ -194,21 +198,21 @@ class Process:
     def of(cls, residuals: Residuals, states: States, drive: int | None = None,
            ) -> tuple[Process, Array]:
         """Return that of a recording, and its features there, (M, R)."""
-        at = states.at(residuals, drive)
+        at = states.at(*_motion(residuals), drive)
         rows, factor = factor_of(at, MOST_STATES if drive is None else MOST_OWN)
         return cls(drive, states, at[rows], factor[rows]), factor
 
-    def known(self, residuals: Residuals) -> Array:
-        """Return its features in another recording, (M, R)."""
+    def known(self, q: Array, v: Array, _: float) -> Array:
+        """Return its features in a motion, (M, R); see `Waves.known`."""
         from scipy.linalg import solve_triangular  # here: commands start without it
 
-        at = self.states.at(residuals, self.drive)
+        at = self.states.at(q, v, self.drive)
         known: Array = solve_triangular(self.root, kernel(self.chosen, at), lower=True).T
         return known
 
-    def new(self, residuals: Residuals) -> Array:
+    def new(self, q: Array, v: Array) -> Array:
         """Return features of states that it does not know, (M, r)."""
-        return factor_of(self.states.at(residuals, self.drive), MOST_NEW, self.known(residuals))[1]
+        return factor_of(self.states.at(q, v, self.drive), MOST_NEW, self.known(q, v, 0.0))[1]
 
 
 @dataclass(frozen=True)
@@ -229,10 +233,12 @@ class Waves:
         return 4 * len(self.numbers)
 
     @classmethod
-    def of(cls, residuals: Residuals, drive: int, left: Array) -> Waves:
+    def of(cls, residuals: Residuals, drive: int, left: Array, gear: float) -> Waves:
         """Return those that what is left of a drive's error, (M,), shows.
 
-        The strongest first, each beside those before it.
+        The strongest first, each beside those before it. One stroke tells a number by less than
+        a wave, and where another path goes that is out of phase: what may be a whole number for
+        each turn of the motor, `gear` times the drive's, is.
         """
         q, known = _motion(residuals)[0][:, drive], np.isfinite(left)
         found, stroke = cls(drive, np.empty(0)), float(np.ptp(q))
@@ -249,26 +255,35 @@ class Waves:
             near = tried[int(np.argmax(power))] + 2 * np.pi / stroke * np.arange(
                 -WAVE_STEP, WAVE_STEP, FINE_STEP)
             at = near[int(np.argmax(np.abs(np.exp(1j * np.outer(near, q[known])) @ rest)))]
+            apart, whole = 2 * np.pi / stroke, gear * np.round(at / gear)
+            if abs(whole - at) < apart < gear / FEW_WHOLE:
+                at = whole
             found = cls(drive, np.append(found.numbers, at))
-            features = found.known(residuals)[known]
+            features = found.known(*_motion(residuals), residuals.period)[known]
             rest = left - features @ np.linalg.lstsq(features, left)[0]
         return found
 
-    def known(self, residuals: Residuals) -> Array:
-        """Return its features in a recording, (M, 4 K).
+    def known(self, q: Array, v: Array, period: float) -> Array:
+        """Return its features in a motion, (M, 4 K).
 
         Means over a sample, in which the wave turns on.
+
+        Parameters
+        ----------
+        q, v : (M, D) array
+        period : float
+            Of a sample [s]; 0 where it is no mean.
         """
-        q, v = (one[:, self.drive, None] for one in _motion(residuals))
+        q, v = q[:, self.drive, None], v[:, self.drive, None]
         numbers = np.concatenate((self.numbers, 2 * self.numbers))
-        mean = np.sinc(numbers * v * residuals.period / (2 * np.pi))
+        mean = np.sinc(numbers * v * period / (2 * np.pi))
         phase = numbers * q
         found: Array = np.concatenate((mean * np.sin(phase), mean * np.cos(phase)), axis=1)
         return found
 
-    def new(self, residuals: Residuals) -> Array:
+    def new(self, q: Array, _: Array) -> Array:
         """Return none: it knows every position."""
-        return np.zeros((len(residuals), 0))
+        return np.zeros((len(q), 0))
 
 
 @dataclass(frozen=True)
@@ -361,8 +376,8 @@ class Reference:
         columns, base, told = _base(model, numbers, residuals, kept)
         drives = range(len(residuals.drives))
         measured = Regression(residuals).drives
-        processes = _processes(residuals, columns, measured)
-        shown = [one.known(residuals) for one in processes]
+        processes = _processes(residuals, columns, measured, model.gear_ratios)
+        shown = [one.known(*_motion(residuals), residuals.period) for one in processes]
         features = [(shown[0], *shown[1 + d::len(drives)]) for d in drives]
         fits = {d: _sized(residuals, columns, d, features[d]) for d in measured}
         nothing = np.full(len(features[0]), LEAST_SIZE)
@@ -434,7 +449,9 @@ class Reference:
                       ) -> CarriedOver:
         drives, told = range(len(self.size)), self.told
         samples = len(residuals)
-        shared, *own = ((one.known(residuals), one.new(residuals)) for one in self.processes)
+        q, v = _motion(residuals)
+        shared, *own = ((one.known(q, v, residuals.period), one.new(q, v))
+                        for one in self.processes)
         numbers = (np.concatenate([_numbers(self.model, one) for one in reconstructions])
                    @ self.base if self.base.size else np.zeros((samples, len(drives), 0)))
         of_base = numbers[..., :told] @ self.coefficients[:told]
@@ -454,17 +471,18 @@ class Reference:
             apart.append(np.concatenate((
                 np.sqrt(1 - repeats ** 2) * sizes * known, new), axis=1))
 
-        def shown(read: Residuals) -> Array:
-            return of_base + self._repeating(read)
+        shown = of_base + self._repeating(q, v, residuals.period)
+        return CarriedOver(of_base, self._repeating, *self._open(replace(
+            residuals, measured=residuals.measured - shown), together, apart), float(np.mean(
+                (shared[0] ** 2).sum(axis=1) > self.decisions.reference_known)))
 
-        return CarriedOver(shown, *self._open(replace(
-            residuals, measured=residuals.measured - shown(residuals)), together, apart),
-            float(np.mean((shared[0] ** 2).sum(axis=1) > self.decisions.reference_known)))
-
-    def _repeating(self, residuals: Residuals) -> Array:
-        """Return what repeats in a recording beside the base, (M, D) [N]."""
-        shared, *own = (one.known(residuals) for one in self.processes)
-        found, at = np.zeros((len(residuals), len(self.size))), self.told
+    def _repeating(self, q: Array, v: Array, period: float) -> Array:
+        """Return what repeats in a motion beside the base, (M, D) [N]; see `Waves.known`."""
+        if len(q) > CHUNK:
+            return np.concatenate([self._repeating(q[at:at + CHUNK], v[at:at + CHUNK], period)
+                                   for at in range(0, len(q), CHUNK)])
+        shared, *own = (one.known(q, v, period) for one in self.processes)
+        found, at = np.zeros_like(q), self.told
         for d in range(len(self.size)):
             known = np.concatenate((shared, *own[d::len(self.size)]), axis=1)
             found[:, d] = self.repeats[d] * (known @ self.coefficients[at:at + known.shape[1]])
@@ -671,7 +689,7 @@ def _parts(residuals: Residuals) -> Integers:
 
 
 def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
-               ) -> tuple[Process | Waves, ...]:
+               gears: Sequence[float]) -> tuple[Process | Waves, ...]:
     """Return the process over all drives, those of each, and waves.
 
     Lengths are those of the largest evidence, of one drive after another beside the base alone,
@@ -695,7 +713,7 @@ def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
             explained = np.concatenate((columns[:, d], shared[1], own[d][1]), axis=1)
             left = left - explained @ fits[d][1].coefficients
             left = left - np.nanmean(left)
-        waves.append(Waves.of(residuals, d, left))
+        waves.append(Waves.of(residuals, d, left, gears[d]))
     return (shared[0], *(one for one, _ in own), *waves)
 
 
