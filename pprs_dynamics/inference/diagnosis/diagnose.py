@@ -341,8 +341,10 @@ class _Answer:
         for d, series in self.fits.regression.series.items():
             self.remaining[:, d] -= series.open_forces(self.remaining[:, d])
         # Before a constant form is believed.
-        self.dated_fits, self.dated = self._with_courses() if try_courses else (
-            self.fits, self.reported)
+        # What held-out data refute is not tried again with a beginning.
+        self.dated_fits, self.dated = with_courses(
+            self.fits, self.reported, [] if ranking.refuted else ranking.alone.values()
+        ) if try_courses else (self.fits, self.reported)
         self.is_dated, self.adopted = self.dated is not self.reported, self.final.model
         if self.is_dated:
             self.remaining = linear_residual(self.dated_fits, self.dated)
@@ -385,23 +387,6 @@ class _Answer:
             tuple(name for name in floors if name not in seen),
             'validation' if self.validate else 'blocks', selection=self.ranking,
             decisions=self.decisions)
-
-    def _with_courses(self) -> tuple[FittedSets, CandidateSet]:
-        """Return the best set in which effects may begin, end or grow, as `with_courses` does.
-
-        Where what was found bends the columns, around the model as given, too: an effect that is
-        there all the time may be none, and does not show what is there for a part of it. What
-        held-out data refute is not tried again with a beginning.
-        """
-        ranking = self.ranking
-        alone = [] if ranking.refuted else list(ranking.alone.values())
-        fits, found = with_courses(self.fits, self.reported, alone)
-        if found is self.reported and ranking.first is not self.fits:
-            kept = ranking.first.evaluate(self.reported.candidates)
-            other, there = with_courses(ranking.first, kept, alone)
-            if there is not kept and there.cost < self.map_set.cost - self.decisions.rival_margin:
-                return other, there
-        return fits, found
 
     def _effects_reported(self) -> list[FoundEffect]:
         """Return the effects of the reported set, with the errors as one after another joins."""
