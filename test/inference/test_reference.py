@@ -24,6 +24,7 @@ from pprs_dynamics.inference.regression.design import CarriedOver, Design
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
+from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
 from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_file import build_model, load_model
 from pprs_dynamics.physics.model.model_writer import write_model
@@ -133,6 +134,36 @@ def test_what_is_carried_over_is_as_uncertain_as_it_is_wrong(
     for d in range(3):
         # A single run allows for 14 % that differ; none do, or 5 %, on one path of it or another.
         assert 0.25 < np.nanmean(left[:, d] ** 2 / (noise + variance(carried, d))) < 2
+
+
+def test_a_delay_moves_what_is_carried_over(machine: tuple[MechanismModel, Reference]) -> None:
+    model, _ = machine
+    moved, late = arm.motion(20.0, seed=0), 0.005
+
+    def recorded(delay: float, noise: float, seed: int) -> Recording:
+        clean = arm.record(model, moved, noise, seed)
+        effort = clean.effort + finer(moved)
+        assert moved.time is not None
+        return Recording.from_arrays('late', clean.time, clean.position, None, np.stack(
+            [np.interp(moved.time - delay, moved.time, one) for one in effort.T], axis=1),
+            clean.drives)
+
+    reference = Reference.of(model, [recorded(0.0, NOISE, 1)])
+    design = Design.of(model, [recorded(0.0, 0.0, 2)])
+    efforts = [measure_residuals(model, [recorded(delay, 0.0, 2)])[0].measured
+               for delay in (0.0, late)]
+
+    def left(one: Design) -> Array:
+        rows = [one.drive_rows(TimeDelay, d, {'delay': late})[0] for d in range(3)]
+        change = np.subtract(*reversed(efforts))
+        share: Array = np.nanstd(change - np.transpose(rows), axis=0) / np.nanstd(change, axis=0)
+        return share
+
+    # Ripple goes with the machine, of which the model's own forces tell nothing.
+    without, beside = (left(one) for one in (design, design.beside(
+        reference.carried_over(design))))
+    assert np.all(without > 0.15)
+    assert np.all(beside < 0.1)
 
 
 @pytest.mark.parametrize(('path', 'day'), [(0, 0.1), (5, 0.0)])

@@ -17,15 +17,12 @@ delta(s_l) is Gaussian: its mean is carried over, and the principal directions o
 are columns of unit prior. Near the states of the reference the errors of the base cancel; far from
 them what is known is what the prior says.
 
-The process is a finite sum, Phi(s) w, over states of the reference that a pivoted Cholesky factor
-of the kernel chooses. States of the recording that they do not reach get features of their own,
-of which the reference says nothing.
+The processes are those of `repeating_forces`; of features of states that the reference does not
+know it says nothing.
 
 References
 ----------
 M. C. Kennedy, A. O'Hagan, Bayesian calibration of computer models, J. R. Stat. Soc. B 63 (2001).
-S. Fine, K. Scheinberg, Efficient SVM training using low-rank kernel representations, J. Mach.
-Learn. Res. 2 (2001) (pivoted Cholesky factor).
 """
 
 from __future__ import annotations
@@ -42,12 +39,23 @@ from scipy.spatial import cKDTree
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.fit.arm_fit import ArmColumns, base_prior, numbers_at
+from pprs_dynamics.inference.fit.repeating_forces import (
+    Integers,
+    Process,
+    States,
+    Waves,
+    motion_of,
+)
 from pprs_dynamics.inference.regression.base_columns import BaseColumn, ReferenceDirection
 from pprs_dynamics.inference.regression.design import CarriedOver, Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.residuals.bands import LEAST_OPEN, DriveSeries, OpenForces
 from pprs_dynamics.inference.residuals.measuring import MOTION, join_tables, treated_table
-from pprs_dynamics.inference.residuals.reconstruction import Reconstruction, reconstruct
+from pprs_dynamics.inference.residuals.reconstruction import (
+    CHUNK,
+    Reconstruction,
+    reconstruct,
+)
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.explained_effort import little_explained
@@ -58,20 +66,10 @@ from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.reference_keys import DIRECTIONS, RESIDUAL
 from pprs_dynamics.system.plain_text import displayed
 
-Integers = np.typing.NDArray[np.int_]
-
-# States that a process is told by, over all drives and over one, and of a recording beyond them.
-MOST_STATES, MOST_OWN, MOST_NEW = 100, 40, 50
-LEAST_VARIANCE = 0.05  # of the kernel, that a further state must bring
-SLOW = 0.3  # of the rms speed of a drive: within it direction turns over
 # Tried: in standard deviations of the positions, and in turns of the directions.
 LENGTHS = tuple((position, speed) for position in (0.5, 1.5) for speed in (0.7, 2.0))
 # The same of what is of one drive's own state.
 OWN_LENGTHS = tuple((position, speed) for position in (0.3, 1.0, 3.0) for speed in (0.5, 1.5))
-# Waves of a drive: at most; from and to how many over the whole stroke; and how often the variance
-# of what is left sine and cosine explain: by chance one in 25 000 that are tried does.
-MOST_WAVES, LONGEST_WAVE, FINEST_WAVE, LEAST_WAVE = 6, 10.0, 400.0, 20.0
-WAVE_STEP, FINE_STEP = 0.5, 0.02  # of a wave over the stroke, between those that are tried
 FIRST_SIZE = 0.4  # of a process, over the error: from which its size is fitted
 LEAST_SIZE = 1e-9  # [N, N m], of a process that does nothing
 ROUNDS = 3  # of the size of the process
@@ -88,187 +86,6 @@ MOST_DIRECTIONS = 24  # that become columns of all drives together
 
 class ReferenceRunError(PprsError, ValueError):
     """A reference that says nothing of a model or a recording."""
-
-
-@dataclass(frozen=True)
-class States:
-    """Where drives are and which way they move, in lengths over which forces are alike.
-
-    Parameters
-    ----------
-    centre, spread, speed : (D,) array
-        [rad, m], [rad/s, m/s].
-    lengths : tuple of float
-        Of positions in spreads, and of directions.
-    """
-
-    centre: Array
-    spread: Array
-    speed: Array
-    lengths: tuple[float, float] = (1.0, 1.0)
-
-    @classmethod
-    def of(cls, residuals: Residuals) -> States:
-        """Return the scales of a recording."""
-        q, v = _motion(residuals)
-        return cls(q.mean(axis=0), np.maximum(q.std(axis=0), 1e-9),
-                   np.maximum(SLOW * np.sqrt((v ** 2).mean(axis=0)), 1e-9))
-
-    def path(self, residuals: Residuals) -> Array:
-        """Return positions and velocities of a recording in standard deviations, (M, 2 D)."""
-        q, v = _motion(residuals)
-        return np.concatenate(((q - self.centre) / self.spread, v / self.speed * SLOW), axis=1)
-
-    def at(self, residuals: Residuals, drive: int | None = None) -> Array:
-        """Return the states of all drives in a recording, or of one, (M, k)."""
-        q, v = _motion(residuals)
-        position, direction = (q - self.centre) / self.spread, np.tanh(v / self.speed)
-        one = slice(None) if drive is None else [drive]
-        return np.concatenate((position[:, one] / self.lengths[0],
-                               direction[:, one] / self.lengths[1]), axis=1)
-
-
-def _motion(residuals: Residuals) -> tuple[Array, Array]:
-    return residuals.variables['position'], residuals.variables['velocity']
-
-
-def kernel(a: Array, b: Array) -> Array:
-    """Return the correlation of forces at states (n, k) and (m, k), (n, m).
-
-    Matern's of order 3/2: continuous forces with kinks that are no steps.
-    """
-    squares = (a ** 2).sum(axis=1)[:, None] + (b ** 2).sum(axis=1) - 2 * a @ b.T
-    r = np.sqrt(3 * np.maximum(squares, 0.0))
-    correlation: Array = (1 + r) * np.exp(-r)
-    return correlation
-
-
-def factor_of(states: Array, most: int, known: Array | None = None) -> tuple[Integers, Array]:
-    """Return rows and factor (M, R) of a pivoted Cholesky factorisation of the kernel.
-
-    Parameters
-    ----------
-    states : (M, k) array
-    most : int
-    known : (M, r) array, optional
-        Factor of what is known of it already.
-    """
-    before = np.zeros((len(states), 0)) if known is None else known
-    left = 1 - (before ** 2).sum(axis=1)
-    factor = np.zeros((len(states), most))
-    chosen: list[int] = []
-    while len(chosen) < most and left.max() > LEAST_VARIANCE:
-        k, row = len(chosen), int(np.argmax(left))
-        column = (kernel(states, states[row:row + 1])[:, 0] - before @ before[row]
-                  - factor[:, :k] @ factor[row, :k])
-        factor[:, k] = column / np.sqrt(column[row])
-        left = left - factor[:, k] ** 2
-        chosen.append(row)
-    return np.array(chosen, dtype=int), factor[:, :len(chosen)]
-
-
-@dataclass(frozen=True)
-class Process:
-    """A process of unit size, told by some states.
-
-    Parameters
-    ----------
-    drive : int or None
-        Over whose state; None: over those of all.
-    states : States
-    chosen : (R, k) array
-        States that it is told by.
-    root : (R, R) array
-        Lower factor of their kernel.
-    """
-
-    drive: int | None
-    states: States
-    chosen: Array
-    root: Array
-
-    def __len__(self) -> int:
-        return len(self.chosen)
-
-    @classmethod
-    def of(cls, residuals: Residuals, states: States, drive: int | None = None,
-           ) -> tuple[Process, Array]:
-        """Return that of a recording, and its features there, (M, R)."""
-        at = states.at(residuals, drive)
-        rows, factor = factor_of(at, MOST_STATES if drive is None else MOST_OWN)
-        return cls(drive, states, at[rows], factor[rows]), factor
-
-    def known(self, residuals: Residuals) -> Array:
-        """Return its features in another recording, (M, R)."""
-        from scipy.linalg import solve_triangular  # here: commands start without it
-
-        at = self.states.at(residuals, self.drive)
-        known: Array = solve_triangular(self.root, kernel(self.chosen, at), lower=True).T
-        return known
-
-    def new(self, residuals: Residuals) -> Array:
-        """Return features of states that it does not know, (M, r)."""
-        return factor_of(self.states.at(residuals, self.drive), MOST_NEW, self.known(residuals))[1]
-
-
-@dataclass(frozen=True)
-class Waves:
-    """Waves of a drive's force over its own position and their first overtones, of unit size.
-
-    Parameters
-    ----------
-    drive : int
-    numbers : (K,) array
-        Radians of a wave for each unit of the position [1, rad/m].
-    """
-
-    drive: int
-    numbers: Array
-
-    def __len__(self) -> int:
-        return 4 * len(self.numbers)
-
-    @classmethod
-    def of(cls, residuals: Residuals, drive: int, left: Array) -> Waves:
-        """Return those that what is left of a drive's error, (M,), shows.
-
-        The strongest first, each beside those before it.
-        """
-        q, known = _motion(residuals)[0][:, drive], np.isfinite(left)
-        found, stroke = cls(drive, np.empty(0)), float(np.ptp(q))
-        finest = max(float(np.median(np.abs(np.diff(q)))), stroke / FINEST_WAVE)
-        if not stroke or not np.any(left[known]):
-            return found
-        tried = 2 * np.pi / stroke * np.arange(LONGEST_WAVE, stroke / finest, WAVE_STEP)
-        turns = np.exp(1j * np.outer(tried, q[known]))
-        left = rest = left[known]
-        while len(found.numbers) < MOST_WAVES:
-            power = 2 * np.abs(turns @ rest) ** 2 / (rest @ rest)
-            if power.max(initial=0.0) < LEAST_WAVE:
-                break
-            near = tried[int(np.argmax(power))] + 2 * np.pi / stroke * np.arange(
-                -WAVE_STEP, WAVE_STEP, FINE_STEP)
-            at = near[int(np.argmax(np.abs(np.exp(1j * np.outer(near, q[known])) @ rest)))]
-            found = cls(drive, np.append(found.numbers, at))
-            features = found.known(residuals)[known]
-            rest = left - features @ np.linalg.lstsq(features, left)[0]
-        return found
-
-    def known(self, residuals: Residuals) -> Array:
-        """Return its features in a recording, (M, 4 K).
-
-        Means over a sample, in which the wave turns on.
-        """
-        q, v = (one[:, self.drive, None] for one in _motion(residuals))
-        numbers = np.concatenate((self.numbers, 2 * self.numbers))
-        mean = np.sinc(numbers * v * residuals.period / (2 * np.pi))
-        phase = numbers * q
-        found: Array = np.concatenate((mean * np.sin(phase), mean * np.cos(phase)), axis=1)
-        return found
-
-    def new(self, residuals: Residuals) -> Array:
-        """Return none: it knows every position."""
-        return np.zeros((len(residuals), 0))
 
 
 @dataclass(frozen=True)
@@ -361,8 +178,8 @@ class Reference:
         columns, base, told = _base(model, numbers, residuals, kept)
         drives = range(len(residuals.drives))
         measured = Regression(residuals).drives
-        processes = _processes(residuals, columns, measured)
-        shown = [one.known(residuals) for one in processes]
+        processes = _processes(residuals, columns, measured, model.gear_ratios)
+        shown = [one.known(*motion_of(residuals), residuals.period) for one in processes]
         features = [(shown[0], *shown[1 + d::len(drives)]) for d in drives]
         fits = {d: _sized(residuals, columns, d, features[d]) for d in measured}
         nothing = np.full(len(features[0]), LEAST_SIZE)
@@ -434,7 +251,9 @@ class Reference:
                       ) -> CarriedOver:
         drives, told = range(len(self.size)), self.told
         samples = len(residuals)
-        shared, *own = ((one.known(residuals), one.new(residuals)) for one in self.processes)
+        q, v = motion_of(residuals)
+        shared, *own = ((one.known(q, v, residuals.period), one.new(q, v))
+                        for one in self.processes)
         numbers = (np.concatenate([_numbers(self.model, one) for one in reconstructions])
                    @ self.base if self.base.size else np.zeros((samples, len(drives), 0)))
         of_base = numbers[..., :told] @ self.coefficients[:told]
@@ -454,17 +273,18 @@ class Reference:
             apart.append(np.concatenate((
                 np.sqrt(1 - repeats ** 2) * sizes * known, new), axis=1))
 
-        def shown(read: Residuals) -> Array:
-            return of_base + self._repeating(read)
+        shown = of_base + self._repeating(q, v, residuals.period)
+        return CarriedOver(of_base, self._repeating, *self._open(replace(
+            residuals, measured=residuals.measured - shown), together, apart), float(np.mean(
+                (shared[0] ** 2).sum(axis=1) > self.decisions.reference_known)))
 
-        return CarriedOver(shown, *self._open(replace(
-            residuals, measured=residuals.measured - shown(residuals)), together, apart),
-            float(np.mean((shared[0] ** 2).sum(axis=1) > self.decisions.reference_known)))
-
-    def _repeating(self, residuals: Residuals) -> Array:
-        """Return what repeats in a recording beside the base, (M, D) [N]."""
-        shared, *own = (one.known(residuals) for one in self.processes)
-        found, at = np.zeros((len(residuals), len(self.size))), self.told
+    def _repeating(self, q: Array, v: Array, period: float) -> Array:
+        """Return what repeats in a motion beside the base, (M, D) [N]; see `Waves.known`."""
+        if len(q) > CHUNK:
+            return np.concatenate([self._repeating(q[at:at + CHUNK], v[at:at + CHUNK], period)
+                                   for at in range(0, len(q), CHUNK)])
+        shared, *own = (one.known(q, v, period) for one in self.processes)
+        found, at = np.zeros_like(q), self.told
         for d in range(len(self.size)):
             known = np.concatenate((shared, *own[d::len(self.size)]), axis=1)
             found[:, d] = self.repeats[d] * (known @ self.coefficients[at:at + known.shape[1]])
@@ -671,7 +491,7 @@ def _parts(residuals: Residuals) -> Integers:
 
 
 def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
-               ) -> tuple[Process | Waves, ...]:
+               gears: Sequence[float]) -> tuple[Process | Waves, ...]:
     """Return the process over all drives, those of each, and waves.
 
     Lengths are those of the largest evidence, of one drive after another beside the base alone,
@@ -695,7 +515,7 @@ def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
             explained = np.concatenate((columns[:, d], shared[1], own[d][1]), axis=1)
             left = left - explained @ fits[d][1].coefficients
             left = left - np.nanmean(left)
-        waves.append(Waves.of(residuals, d, left))
+        waves.append(Waves.of(residuals, d, left, gears[d]))
     return (shared[0], *(one for one, _ in own), *waves)
 
 

@@ -95,9 +95,11 @@ class CarriedOver:
 
     Parameters
     ----------
-    shown : callable
-        Gives the forces that the model lacks there as well, (M, D) [N], of residuals of the same
-        samples whose positions may be read otherwise.
+    of_base : (M, D) array
+        Forces that the model lacks there as well by the numbers of its base [N].
+    repeating : callable
+        Gives those that no number explains, (N, D), of positions and velocities (N, D) and the
+        time over which they are means [s].
     directions : tuple of ReferenceDirection
         In which they are uncertain most.
     open_forces : mapping of drive to OpenForces
@@ -106,23 +108,36 @@ class CarriedOver:
         Share of the samples whose states the reference knows.
     """
 
-    shown: Callable[[Residuals], Array]
+    of_base: Array
+    repeating: Callable[[Array, Array, float], Array]
     directions: tuple[ReferenceDirection, ...]
     open_forces: Mapping[int, OpenForces]
     covered: float
 
+    def shown(self, residuals: Residuals) -> Array:
+        """Return the forces that the model lacks there as well, (M, D) [N].
+
+        Of residuals of the same samples, whose positions may be read otherwise.
+        """
+        q, v = (residuals.variables[name] for name in ('position', 'velocity'))
+        return self.of_base + self.repeating(q, v, residuals.period)
+
     def per_position(self, residuals: Residuals) -> Array:
         """Return how the forces change with the position of each drive, (D, M, D) [N/m]."""
-        q = residuals.variables['position']
+        q, v = (residuals.variables[name] for name in ('position', 'velocity'))
+        return np.stack([
+            (self.repeating(q + step, v, residuals.period)
+             - self.repeating(q - step, v, residuals.period)) / (2 * MOVED)
+            for step in MOVED * np.eye(q.shape[1])])
 
-        def moved(drive: int, step: float) -> Array:
-            position = q.copy()
-            position[:, drive] += step
-            return self.shown(replace(residuals, variables={
-                **residuals.variables, 'position': position}))
-
-        return np.stack([(moved(d, MOVED) - moved(d, -MOVED)) / (2 * MOVED)
-                         for d in range(q.shape[1])])
+    def at_full_rate(self, recordings: Sequence[FullRate], time: Array) -> list[Array]:
+        """Return the forces at every sample of recordings, (N, D) [N]; `time` (M,) of means."""
+        found, end = [], 0
+        for one in recordings:
+            part = slice(end, end := end + len(one.treat))
+            found.append(self.repeating(one.position, one.velocity, 0.0) + np.stack(
+                [np.interp(one.time, time[part], row) for row in self.of_base[part].T], axis=1))
+        return found
 
 
 @dataclass
@@ -249,11 +264,7 @@ class Design:
         homing = self.homing and tuple(
             {d: row - slope[:, d] for d, row in rows.items()}
             for rows, slope in zip(self.homing, carried.per_position(self.residuals), strict=True))
-        alone, end = [], 0
-        for one in self.recordings:
-            part = slice(end, end := end + len(one.treat))
-            alone.append(np.stack([np.interp(one.time, self.residuals.time[part], row)
-                                   for row in forces[part].T], axis=1))
+        alone = carried.at_full_rate(self.recordings, self.residuals.time)
         recordings = tuple(replace(one, effort=one.effort + more)
                            for one, more in zip(self.recordings, alone, strict=True))
         late = replace(self, recordings=tuple(
