@@ -34,7 +34,7 @@ def test_info_tells_of_bodies_joints_loops_and_mobility(
     found, page = tmp_path / 'info.json', tmp_path / 'info.html'
     assert main(['info', '--model', HEXAPOD, '--json', str(found), '--report', str(page)]) == 0
     said = capsys.readouterr().out
-    assert '13 bodies of 10.2 kg' in said
+    assert '13 bodies, 10.2 kg in total' in said
     assert '6 degrees of freedom, 6 drives' in said
     robot = json.loads(found.read_text())['robot']
     assert [loop['name'] for loop in robot['loops']] == [f'ball_{k}' for k in range(1, 7)]

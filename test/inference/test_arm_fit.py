@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import gzip
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -261,3 +262,33 @@ def test_commands_speak_of_torques(tmp_path: Path, capsys: pytest.CaptureFixture
     assert 'held out' in said
     assert main(['compare', run, '--model', base, '--json', str(tmp_path / 'c.json')]) == 0
     assert 'noise accounts for it' in ' '.join(capsys.readouterr().out.split())
+
+
+def test_a_fault_in_the_run_that_is_fitted_is_hidden_by_the_fit_which_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv('COLUMNS', '400')
+    healthy, described = arm.real_arm(tmp_path), MechanismModel.load(tmp_path / 'arm.yaml')
+    loaded = build_model({**healthy.values, 'effects.active': ['payload_mass'],
+                          'effects.payload_mass.mass': 1.5}, healthy.source)
+    assert isinstance(loaded, MechanismModel)
+    for name, real, seed in (('healthy', healthy, 0), ('loaded', loaded, 1)):
+        write_recording(tmp_path / f'{name}.csv', arm.record(real, arm.motion(20.0, seed=seed),
+                                                             NOISE, seed))
+    weight = float(described.robot.masses.sum())
+    model, warning = str(tmp_path / 'arm.yaml'), 'the model was fitted to'
+    for fitted, hides in (('loaded', True), ('healthy', False)):
+        base = str(tmp_path / f'{fitted}.yaml')
+        assert main(['fit', str(tmp_path / f'{fitted}.csv'), '--model', model, '--output',
+                     base]) == 0
+        said = capsys.readouterr().out
+        assert f'{weight:.4g} kg in the description' in said
+        assert 'is part of the model now' in said
+        told = tmp_path / 'told.json'
+        assert main(['diagnose', str(tmp_path / 'loaded.csv'), '--model', base, '--json',
+                     str(told)]) == 0
+        answer = json.loads(told.read_text())
+        found = {one['name'] for one in answer['effects']}
+        assert ('payload_mass' in found) != hides
+        assert any(warning in one for one in answer['warnings']) == hides
+        assert (warning in capsys.readouterr().out) == hides

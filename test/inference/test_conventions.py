@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -15,11 +16,13 @@ from typing import Any
 import made_up_arm as arm
 import numpy as np
 import pytest
+import yaml
 from pprs_command import pprs
 from short_recordings import short_recordings
 
 from benchmarks.hidden import recordings
 from pprs_dynamics import DriveModel, JointMotion, MechanismModel
+from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.residuals.conventions import find_mistakes
@@ -326,6 +329,29 @@ def test_efforts_in_percent_of_the_largest_are_told(tmp_path: Path) -> None:
     assert "percent of the drives' largest" in finding.what
     assert columns_line([finding]) == (
         'columns: {turn: {scale: 4}, swing: {scale: 0.8}, reach: {scale: 0.3}}')
+
+
+def test_beside_columns_the_line_that_is_told_is_added_to_theirs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str],
+) -> None:
+    columns = {joint: {'position': f'{joint}/position', 'effort': f'{joint}/effort'}
+               for joint in arm.JOINTS}
+    path = arm.write_arm(tmp_path)
+    plain = path.read_text()
+
+    def with_columns(more: dict[str, dict[str, float]]) -> None:
+        block = json.dumps({joint: {**one, **more.get(joint, {})}
+                            for joint, one in columns.items()})
+        path.write_text(f'{plain}    columns: {block}\n')
+
+    write_recording(tmp_path / 'run.csv', arm_recording(MechanismModel.load(path), effort=-1.0))
+    with_columns({})
+    assert main(['info', str(tmp_path / 'run.csv'), '--model', str(path)]) == 0
+    told = ' '.join(capsys.readouterr().out.split())
+    _, _, entries = told.partition('under columns, beside what stands there: ')
+    with_columns(yaml.safe_load(f'{{{entries}}}'))
+    assert main(['info', str(tmp_path / 'run.csv'), '--model', str(path)]) == 0
+    assert 'looks like' not in capsys.readouterr().out
 
 
 def test_a_joint_that_stands_is_no_reason_to_doubt_a_unit(tmp_path: Path) -> None:

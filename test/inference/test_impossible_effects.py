@@ -5,11 +5,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import made_up_arm as arm
 import numpy as np
 import pytest
 
 from pprs_dynamics import JointMotion, MechanismModel
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.possible import why_impossible, why_nothing
 from pprs_dynamics.inference.regression.design import Design
@@ -137,3 +140,19 @@ def test_less_inertia_than_none_is_no_effect() -> None:
     found = diagnose(MODEL, [recorded(effort)], as_it_is=True)
     assert found.verdict != 'effect'
     assert 'drive_inertia' not in [one.name for one in found.effects]
+
+
+@pytest.mark.parametrize('seed', [0, 1, 2])
+def test_an_answer_with_which_the_error_rises_is_none(tmp_path: Path, seed: int) -> None:
+    """Radians that are called degrees: next to no motion, which linear forces are far from."""
+    real = arm.real_arm(tmp_path)
+    run = arm.record(real, arm.motion(12.0, seed=seed), 0.2, seed)
+    radians = np.array([np.pi / 180, np.pi / 180, 1.0])
+    found = diagnose(MechanismModel.load(tmp_path / 'arm.yaml'), [Recording.from_arrays(
+        'run', run.time, run.position * radians, None, run.effort, run.drives)], as_it_is=True)
+    if found.effects:
+        assert root_mean_square(found.remaining) < root_mean_square(found.residuals.error)
+    else:
+        assert found.verdict == 'unknown'
+        assert all('larger than without' in one.objection for one in found.unconfirmed)
+    assert all(one.cost >= 0 for one in found.sets)

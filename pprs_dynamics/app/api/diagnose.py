@@ -21,6 +21,7 @@ from pprs_dynamics.app.api.result import Result, data_frame
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose as diagnose_recordings
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
+from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.diagnosis.what_if import what_if
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -136,6 +137,11 @@ def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,
     inputs = Inputs.of(
         model, recordings, validate, topic, progress, as_it_is=as_it_is).require_recordings().since(
             reference)
-    return DiagnosisResult(inputs, diagnose_recordings(
+    found = diagnose_recordings(
         inputs.model, inputs.fitted, inputs.held_out, stage(progress, 'diagnosing'),
-        as_it_is=inputs.as_it_is, reference=inputs.reference))
+        as_it_is=inputs.as_it_is, reference=inputs.reference)
+    if own := inputs.fitted_to:
+        found = replace(found, warnings=(
+            f'the model was fitted to {listed(own)}: what was wrong with the robot then is part of '
+            'the model, and cannot be found in it; diagnose another run', *found.warnings))
+    return DiagnosisResult(inputs, found)

@@ -471,7 +471,7 @@ def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, ba
     lines += [
         f'    effort_kind: {"current" if currents else "measured"}  # not known from the files: '
         f'what efforts are, one of {", ".join(EFFORT_KINDS)}',
-        '    # Friction is not known yet: `pprs fit` finds it and writes it here.']
+        '    # `pprs fit` finds friction and masses, and writes them into a copy of this file.']
     if names.prefix:
         lines.append(f'    joint_prefix: {scalar(names.prefix)}  # recordings call {drives[0]} '
                      f'{names.prefix}{drives[0]}')

@@ -15,11 +15,13 @@ from pprs_dynamics.errors import MisreadError, PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.conventions import with_mistakes
 from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
 from pprs_dynamics.inference.residuals.mistakes import no_measurements
+from pprs_dynamics.measurement.files.fingerprint import fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
+from pprs_dynamics.physics.model.reference_keys import reference_files
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
@@ -201,6 +203,13 @@ class Inputs:
             self, reference=read_reference(model or self.model, runs,
                                            [*self.fitted, *self.held_out], self.as_it_is),
             reference_paths=tuple(str(one) for one in runs if not isinstance(one, Recording)))
+
+    @property
+    def fitted_to(self) -> tuple[str, ...]:
+        """Those of the recordings that the model was fitted to, by what its file says."""
+        hashes = {one.sha256 for one in reference_files(self.model.values, self.model.source)}
+        return tuple(displayed(name) for name in self.recordings
+                     if hashes and name in self.paths and fingerprint(name) in hashes)
 
     def require_recordings(self) -> Inputs:
         """Return this, or raise InputError where there is no recording to fit to."""

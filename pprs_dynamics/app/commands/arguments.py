@@ -60,7 +60,8 @@ def add_topic(parser: argparse.ArgumentParser) -> None:
 def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> None:
     """Declare RECORDING… and --topic."""
     parser.add_argument('recordings', metavar='RECORDING', nargs='+' if required else '*',
-                        help='rosbag2 folder, .mcap, .db3, .csv or .csv.gz')
+                        help='bag (rosbag2 folder, .mcap, .db3, ROS 1) or table (.csv, .csv.gz, '
+                        '.parquet, .mat, .npz)')
     add_topic(parser)
 
 

@@ -21,7 +21,11 @@ from pprs_dynamics.app.report.mechanism_description import (
 )
 from pprs_dynamics.app.report.tables import recording_table
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
-from pprs_dynamics.inference.residuals.mistakes import effort_looks_like
+from pprs_dynamics.inference.residuals.mistakes import (
+    OtherReading,
+    columns_line,
+    effort_looks_like,
+)
 from pprs_dynamics.measurement.files.recording import Summary, describe
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -73,6 +77,9 @@ def show_recordings(model: ForceModel, paths: Sequence[str], topic: str | None, 
             screen.print(table)
         for finding in summary.findings:
             screen.print(f'[yellow]![/] {shown(finding.text)}')
+        others = [one for one in summary.findings if isinstance(one, OtherReading)]
+        if line := columns_line(others, model.recorded.columns is not None):
+            screen.print(f'  if so, write into the model file  {shown(line)}')
         if not summary.findings:
             screen.print('[green]nothing wrong found[/]')
     repeat = find_repeat(recordings)

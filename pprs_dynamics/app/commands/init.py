@@ -64,6 +64,8 @@ def run(options: argparse.Namespace) -> int:
     if first.has_efforts:
         screen.print(f'[bold]Next[/] pprs fit {names} --model {model} --output base.yaml')
         screen.print(f'then pprs diagnose {names} --model base.yaml')
+        screen.print('What is wrong with the robot in a run becomes part of the model that is '
+                     'fitted to it: fit a healthy run without load, and diagnose another one.')
     else:
         screen.print(f'[bold]Next[/] pprs info {names} --model {model}')
     if options.json:

@@ -97,7 +97,7 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
         yield ('May be left by the forms of what was found, no finding: '
                f'{escape(_within_model_error(diagnosis))}')
     if words.warnings:
-        yield f'[yellow]![/] {escape(words.warnings[0].partition(";")[0])}'
+        yield f'[yellow]![/] {escape(words.warnings[0])}'
 
 
 def _room(line: str) -> int:
@@ -273,7 +273,7 @@ def diagnosis_markdown(diagnosis: Diagnosis, words: Sentences) -> str:
     rows = [f'**{diagnosis.verdict}**: {words.headline}']
     if diagnosis.effects:
         heads = _headings(diagnosis)
-        cells = [[re.sub(r'\[/?\w+\]', '', cell) for cell in row]
+        cells = [[re.sub(r'\[/?\w*\]', '', cell) for cell in row]
                  for row in _effect_rows(diagnosis)]
         table = (heads, ['---'] * len(heads), *cells)
         rows.append('\n'.join(f'| {" | ".join(cell.replace("|", "/") for cell in row)} |'

@@ -53,7 +53,7 @@ def mechanism_lines(model: MechanismModel) -> list[str]:
     s = model.robot.structure
     held = f': {", ".join(found["held"])} held' if found['held'] else ''
     lines = [
-        f'{counted(len(found["bodies"]), "body")} of {model.robot.masses.sum():.4g} kg, '
+        f'{counted(len(found["bodies"]), "body")}, {model.robot.masses.sum():.4g} kg in total, '
         f'{counted(len(s.rows), "joint")}, {counted(len(s.loops), "loop")}',
         f'{counted(found["degrees_of_freedom"], "degree of freedom")}, '
         f'{counted(len(s.drives), "drive")} ({", ".join(s.drives)}){held}']

@@ -299,9 +299,9 @@ def diagnose(
     since = None if reference is None else SinceReference.of(
         reference, answer.ranking.first.design)
     unconfirmed: list[FoundEffect] = []
-    if any(effect.is_impossible for effect in answer.effects):
+    if answer.raises_the_error or any(effect.is_impossible for effect in answer.effects):
         # Whatever stands for what cannot be, or beside it, would be as wrong.
-        found = _all_objected(answer.effects)
+        found = _all_objected(answer.effects, answer.raises_the_error)
         answer = _Answer(answer.ranking.reporting_nothing(), validate, decisions,
                          try_courses=False)
         report(1.0)
@@ -316,8 +316,12 @@ def diagnose(
     return replace(diagnosis, since=since)
 
 
-def _all_objected(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
+def _all_objected(effects: Sequence[FoundEffect], raise_the_error: bool,
+                  ) -> tuple[FoundEffect, ...]:
     """Return effects of which one cannot be: that first, and the others as found beside it."""
+    if raise_the_error:
+        return tuple(replace(effect, objection='the error of a model with what was found is '
+                             'larger than without') for effect in effects)
     impossible = [effect for effect in effects if effect.is_impossible]
     beside = listed([one.name for one in impossible])
     return (*impossible,
@@ -349,6 +353,15 @@ class _Answer:
             self.remaining = linear_residual(self.dated_fits, self.dated)
             self.adopted = self._dated_model()
         self.effects = self._dated_effects() if self.is_dated else self._effects_reported()
+
+    @property
+    def raises_the_error(self) -> bool:
+        """Whether a model with what is reported is clearly worse than the given one.
+
+        Where the linear forces of a set mean nothing, as of a recording in other units.
+        """
+        given = root_mean_square(self.ranking.first.design.residuals.error)
+        return root_mean_square(self.remaining) > (1 + self.decisions.noise_accuracy) * given
 
     def diagnosis(self, unconfirmed: tuple[FoundEffect, ...]) -> Diagnosis:
         first, final, effects = self.ranking.first.design, self.final, self.effects
@@ -617,9 +630,11 @@ class _Answer:
             # Those of the search are of constant forms.
             return (RankedSet(tuple((c.name, self.design.named(c.drives))
                                     for c in self.dated.candidates), CostTerms()),)
-        # Of a linear set the cost is that in the first design.
+        # Of a linear set the cost is that in the first design. Less than the best, of which the
+        # exact one is known, it is where that design means nothing any more.
         best, *others = self._of_each_name(self.ranking.sets, MOST_SETS)
-        return (best, *sorted(others, key=lambda fitted: fitted.cost))
+        return (best, *sorted((fitted for fitted in others if fitted.cost >= 0),
+                              key=lambda fitted: fitted.cost))
 
     def _barred(self) -> tuple[RankedSet, ...]:
         """Return the sets that would be rivals, or better, and may not be."""

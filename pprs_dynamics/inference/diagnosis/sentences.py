@@ -209,7 +209,10 @@ def runner_up(diagnosis: Diagnosis) -> str:
     untold = within & {name for fitted in diagnosis.sets[:1] for name, _ in fitted.names}
     sets = [(fitted, {pair for pair in fitted.names if pair[0] not in untold})
             for fitted in diagnosis.sets]
-    following = next(((one, names) for one, names in sets[1:] if names != sets[0][1]), None)
+    # What could stand instead says more than what could join.
+    differing = [(one, names) for one, names in sets[1:] if names != sets[0][1]]
+    following = next((pair for pair in differing if sets[0][1] - pair[1]),
+                     differing[0] if differing else None)
     if following is None:
         return ''
     best, (second, others) = sets[0][1], following

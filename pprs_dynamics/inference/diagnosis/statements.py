@@ -230,8 +230,8 @@ def _sentence(
     if kind in ('growth', 'directed_growth'):
         opposed = ' in the direction of motion' if kind == 'directed_growth' else ''
         low, high = _ends(drive_patterns, variable, shape, kind == 'directed_growth')
-        return (f'its error changes with {word}: {with_sign(low)} {effort} at its least, '
-                f'{with_sign(high)} {effort} at its greatest{opposed}; this is '
+        return (f'its error changes with {word}: {with_sign(low)} {effort} where it is lowest, '
+                f'{with_sign(high)} {effort} where it is highest{opposed}; this is '
                 f'{share:.0%} of its squared error')
     place = _place(variable, pattern, drive_patterns)
     where = f'{share:.0%} of its squared error lies {place}, in {time:.0%} of the time'

@@ -56,6 +56,10 @@ class FittedNumber:
                 'std': self.std if np.isfinite(self.std) else None, 'unit': self.unit}
 
 
+PART_OF_IT = ('what was wrong with the robot in these runs is part of the model now: fit healthy '
+              'runs without load, and diagnose others')
+
+
 @dataclass(frozen=True)
 class BaseFit:
     """A fitted base model.
@@ -135,7 +139,8 @@ def fit_base(model: ForceModel, recordings: Sequence[Recording],
         held_out = _rms(model, np.concatenate(squares))
     report(0.9)
     before, after = (measure_residuals(one, recordings)[0] for one in (model, fitted))
-    return BaseFit(fitted, numbers, told, rms_by_drive(before), rms_by_drive(after), held_out, on,
+    return BaseFit(fitted, numbers, (*told, PART_OF_IT), rms_by_drive(before),
+                   rms_by_drive(after), held_out, on,
                    explained_shares(before), explained_shares(after),
                    little_explained(fitted, after))
 
@@ -212,11 +217,13 @@ def _numbers(model: MechanismModel, fit: ArmFit) -> tuple[FittedNumber, ...]:
 
 
 def _told(model: MechanismModel, fit: ArmFit) -> tuple[str, ...]:
-    told = [f'the motion determines {fit.determined} combinations of the {fit.total} inertial '
+    before, after = (float(np.sum(one)) for one in (model.robot.masses, fit.model.robot.masses))
+    told = [f'all links together have {after:.4g} kg, {before:.4g} kg in the description',
+            f'the motion determines {fit.determined} combinations of the {fit.total} inertial '
             'parameters of the links; all others stay near those of the URDF']
     if fit.weak_links:
-        told.append('masses of single links that it does not determine: what '
-                    f'{", ".join(fit.weak_links)} move')
+        told.append('it cannot tell the masses of the links that '
+                    f'{", ".join(fit.weak_links)} move one by one')
     if fit.standing:
         told.append(f'{", ".join(fit.standing)} hardly moves: its friction stays as it was')
     if model.efforts_in_amperes:

@@ -442,7 +442,8 @@ def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False)
     mistakes = find_mistakes(model, recording)
     others = [one for one in mistakes if isinstance(one, OtherReading)]
     if refuse and others:
-        raise MisreadError(recording.name, [one.what for one in others], [columns_line(others)])
+        raise MisreadError(recording.name, [one.what for one in others], [
+            columns_line(others, model.recorded.columns is not None)])
     return replace(recording, findings=(*mistakes, *recording.findings))
 
 

@@ -78,11 +78,16 @@ class OtherReading(Mistake):
     scales: Scales = ()
 
 
-def columns_line(findings: Iterable[OtherReading]) -> str:
-    """Return the line of a model file with which a recording is read as it looks; '' for none."""
+def columns_line(findings: Iterable[OtherReading], has_columns: bool = False) -> str:
+    """Return the line of a model file with which a recording is read as it looks; '' for none.
+
+    Where the file has `columns` already, what is to be added to the columns of each drive.
+    """
     blocks: dict[str, list[str]] = {}
     for drive, key, value in (scale for one in findings for scale in one.scales):
         blocks.setdefault(drive, []).append(f'{key}: {value:.7g}')
     entries = [entry if not drive else f'{drive}: {{{entry}}}' for drive, entry in (
         (drive, ', '.join(keys)) for drive, keys in blocks.items())]
+    if has_columns and entries:
+        return f'under columns, beside what stands there: {", ".join(entries)}'
     return f'columns: {{{", ".join(entries)}}}' if entries else ''

@@ -63,7 +63,7 @@ POLICY = {
     'saturated_effort': 'they are left out of every comparison and fit',
     'no_effort': 'compare, diagnose, fit and adopt need them and will refuse it',
     'effort_not_measured': 'the motion is kept and these efforts count as not measured',
-    'missing_velocity': 'velocities must come from the positions',
+    'missing_velocity': 'they are computed from the positions',
     'constant_position': 'it is kept',
     'constant_velocity': 'it is kept',
     'constant_effort': 'it is kept',

@@ -410,7 +410,8 @@ def _require_joints(description: Description, drives: tuple[str, ...], block: st
     for name, joint in joints.items():
         if block == 'arm' and joint.kind == FLOATING:
             raise ModelError('arm.urdf', description.path, 'be of a robot with a fixed base, of '
-                             f'revolute and prismatic joints: {name} is floating')
+                             f'revolute and prismatic joints: {name} is floating (where '
+                             'loops hold it, describe the robot by a robot block: docs/robots.md)')
     for name in drives:
         if name not in joints:
             raise ModelError(listed, name, 'be joints of the URDF: '

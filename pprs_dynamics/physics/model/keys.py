@@ -255,16 +255,16 @@ def mechanism_keys(block: str, count: int) -> dict[str, Key]:
                'the URDF says, else 1', '', positive=True, **described),
         Key(f'{block}.effort_unit', f'unit of the efforts of recordings; A: times {block}.gain',
             choices=EFFORT_UNITS, default=EFFORT_UNITS[0]),
-        Key(f'{block}.gravity', 'gravity in the base; without it, as the MJCF says, else -9.81 '
+        Key(f'{block}.gravity', 'gravity in the base; without it, as an MJCF says, else -9.81 '
             'along z', 'm/s^2', size=3, **described),
         drives(f'{block}.armature', 'inertia of the rotor, seen at the joint; without it, as the '
                'MJCF says, else 0', 'kg m^2, kg', lower=0, **described),
         links('links.mass', 'mass of what each joint moves up to the next', 'kg'),
         links('links.moment', 'x y z of mass times centre, in the frame of each joint', 'kg m'),
         links('links.inertia', 'xx yy zz xy xz yz about the origin of each joint', 'kg m^2'),
-        drives('friction.viscous', 'F_v, viscous friction; without it, as the MJCF says, else 0',
+        drives('friction.viscous', 'F_v, viscous friction; without it, as an MJCF says, else 0',
                'N m s/rad, N s/m', lower=0, **described),
-        drives('friction.coulomb', 'F_c, dry friction; without it, as the MJCF says, else 0',
+        drives('friction.coulomb', 'F_c, dry friction; without it, as an MJCF says, else 0',
                'N m, N', lower=0, **described),
         drives('friction.offset', 'constant effort beside weight and friction', 'N m, N'),
         Key('friction.reversal_velocity', 'width in which sgn turns over', 'rad/s, m/s',
