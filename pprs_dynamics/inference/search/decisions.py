@@ -164,8 +164,8 @@ FIXED = (
     ('LEAST_SAMPLES', float(LEAST_SAMPLES), '1', 'samples of a drive that takes part',
      'a spectrum has a dozen shapes'),
     ('SLOPE_OCTAVES', float(SLOPE_OCTAVES), 'octaves', 'that tell the noise of a constant',
-     'of 1 800 drives of pure 1/f noise 1.6 % had a constant beyond three deviations'),
+     'of 360 drives of pure 1/f noise 4 % had a constant beyond three deviations'),
     ('CONTINUED_OCTAVES', float(CONTINUED_OCTAVES), 'octaves', 'by which they are continued',
-     'the same; with 2 it were 8 %'),
+     'the same'),
 )
 DECISIONS = Decisions()
