@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from workbench_bench import HIDDEN, write_hidden
 
-from pprs_dynamics import read_recording
+from pprs_dynamics import MechanismModel, read_recording
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench import Session
@@ -36,6 +36,7 @@ from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_file import build_model, load_model
@@ -527,6 +528,35 @@ def test_a_reference_stays_when_a_recording_goes(tmp_path: Path) -> None:
     session = Session.of(Inputs.of('config/paper.yaml', [run, other]).since([healthy]))
     session.remove(str(other))
     np.testing.assert_allclose(session.given_residual, alone, atol=1e-9)
+
+
+def test_a_session_says_since_when(tmp_path: Path) -> None:
+    """Of an arm with drag that was always there: only the dry friction has changed."""
+    moved = arm.motion(12.0, seed=0)
+    model = load_model(arm.write_arm(tmp_path, **{
+        key.replace('.', '__'): list(value) for key, value in arm.FRICTION.items()}))
+    assert isinstance(model, MechanismModel)
+
+    def write(name: str, seed: int, force: float = 0.0) -> Path:
+        clean = arm.record(model, moved, 0.05, seed)
+        effort = clean.effort + np.tanh(3 * np.sin(4 * moved.position))
+        effort[:, 1] += force * np.tanh(moved.velocity[:, 1] / 0.002)
+        write_recording(tmp_path / name, Recording.from_arrays(
+            name, clean.time, clean.position, clean.velocity, effort, clean.drives))
+        return tmp_path / name
+
+    healthy, later = write('healthy.csv', 1), write('later.csv', 2, 0.6)
+    session = Session.open([later], tmp_path / 'arm.yaml', reference=[healthy])
+    said = session.to_dict()['reference']
+    assert said['recordings'] == ['healthy.csv']
+    assert 'a fault that was there in the reference cannot be seen' in said['text']
+    assert said['explained']['turn'] > 0.9
+    assert session.diagnose().result(120).verdict == 'effect'
+    called_for = [one['name'] for one in session.to_dict()['effects'] if one['is_called_for']]
+    assert called_for == ['coulomb_friction']
+    with pytest.raises(UnreadableFileError, match='another run'):
+        session.add(healthy)
+    assert Session.open([later], tmp_path / 'arm.yaml').to_dict()['reference'] is None
 
 
 class TestASavedSession:

@@ -15,12 +15,14 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import made_up_arm as arm
 import numpy as np
 import pytest
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.inference.diagnosis import live_diagnosis
+from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.ros import diagnosis_worker
 from pprs_dynamics.ros.diagnosis_worker import (
@@ -176,6 +178,40 @@ def test_what_is_claimed_stands_where_a_window_cannot_be_diagnosed(
     assert 'slide_1' in failed['error']
     assert failed['withdrawn'] == []
     assert set(unknown) == {'error'}
+
+
+def test_the_process_tells_what_has_changed_since_a_reference(tmp_path: Path,
+                                                              monkeypatch: pytest.MonkeyPatch,
+                                                              ) -> None:
+    """What was always there is no change; a file that is not there is one sentence."""
+    monkeypatch.setattr(os, 'nice', lambda by: 0)
+    model = arm.real_arm(tmp_path)
+    moved = arm.motion(20.0, seed=0)
+
+    def window(seed: int, change: float) -> Recording:
+        clean = arm.record(model, moved, 0.05, seed)
+        effort = clean.effort + np.tanh(3 * np.sin(4 * moved.position))
+        effort[:, 1] += change * np.tanh(moved.velocity[:, 1] / 0.002)
+        return Recording.from_arrays('run', clean.time, clean.position, None, effort, clean.drives)
+
+    def sent(one: Recording) -> StreamWindow:
+        return StreamWindow(EPOCH + np.rint(one.time * SECOND).astype(np.int64), one.position,
+                            one.effort)
+
+    healthy = tmp_path / 'healthy.csv'
+    write_recording(healthy, window(1, 0.0))
+    values, source = dict(model.values), model.source
+    pipe = Windows(*((values, source, reference, sent(window(seed, change)))
+                     for reference, seed, change in (
+                         ((str(healthy),), 2, 0.0), ((str(healthy),), 3, 0.6),
+                         ((str(tmp_path / 'gone.csv'),), 4, 0.0))))
+    diagnosis_worker._work(pipe)
+    same, changed, gone = pipe.answers
+    assert same['verdict'] == 'adequate', same
+    assert [(one['name'], one['drives']) for one in changed['effects']] == [
+        ('coulomb_friction', ['swing'])]
+    assert set(gone) == {'error'}
+    assert 'gone.csv' in gone['error']
 
 
 def waited_for(worker: DiagnosisWorker) -> dict[str, Any]:

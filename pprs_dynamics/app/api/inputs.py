@@ -162,6 +162,12 @@ class Inputs:
         _refuse_repeats([_Read(str(path), one, True) for one in more.fitted],
                         [_Read(name, one, True) for name, one in
                          {**self.recordings, **self.validation}.items()], ONCE)
+        if self.reference is not None:
+            from pprs_dynamics.inference.fit.reference_runs import OTHER as OTHER_RUN
+
+            _refuse_repeats([_Read(str(path), one, True) for one in more.fitted],
+                            [_Read(one.name, one, True) for one in self.reference.recordings],
+                            OTHER_RUN)
         if is_held_out:
             return replace(self, validation={**self.validation, **more.recordings},
                            paths=self.paths | more.paths)

@@ -6,6 +6,10 @@ import {amount, plain, titleOf} from './format.mjs';
 const VERDICTS = {adequate: 'the model is adequate', effect: 'effects are missing, or otherwise than in the model',
                   ambiguous: 'several effects explain it alike',
                   unknown: 'something no effect explains'};
+/* The same, since a reference run. */
+const CHANGES = {adequate: 'nothing has changed', effect: 'what is called for has changed',
+                 ambiguous: 'several effects explain alike what has changed',
+                 unknown: 'something has changed that no effect explains'};
 
 const fall = (before, now, state) => `${amount(before)} → ${amount(now)} ${state.unit}`;
 
@@ -35,13 +39,17 @@ export const showJobs = (jobs, cancel) => {
 };
 
 export const showVerdict = (state) => {
-  const {before, now, noise} = state.overall;
+  const {before, now, noise} = state.overall, {reference} = state;
   const line = make('span');
   if (state.little) line.append(make('b', `${state.little} · `));
-  line.append('error ', make('b', fall(before, now, state)), ` · noise ${amount(noise)} ${
+  line.append(reference ? `error since ${reference.recordings.join(', ')} ` : 'error ', make('b', fall(before, now, state)), ` · noise ${amount(noise)} ${
     state.unit}${state.noise_is_guess ? ' (first guess)' : ''}`);
-  if (state.verdict) line.append(` · diagnosis: ${VERDICTS[state.verdict]}`);
+  if (state.verdict) {
+    line.append(` · diagnosis: ${(reference ? CHANGES : VERDICTS)[state.verdict]}`);
+  }
   $('verdict').replaceChildren(line);
+  $('reference').hidden = !reference;
+  $('reference').textContent = reference ? `${reference.text.join('; ')}.` : '';
 };
 
 /* What an adoption came to, once: [sentence, whether it is good]. */

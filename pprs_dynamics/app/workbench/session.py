@@ -14,7 +14,7 @@ from pathlib import Path
 from threading import Lock, RLock
 from typing import Any
 
-from pprs_dynamics.app.api.inputs import Inputs
+from pprs_dynamics.app.api.inputs import Given, Inputs
 from pprs_dynamics.app.workbench import view_state
 from pprs_dynamics.app.workbench.background import Cancelled, Job, run_in_process
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
@@ -31,6 +31,7 @@ from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
 from pprs_dynamics.inference.diagnosis.quantities import word_little
+from pprs_dynamics.inference.diagnosis.sentences import word_reference
 from pprs_dynamics.inference.experiments.next_experiment import check_duration
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -106,15 +107,19 @@ class Session:
     @classmethod
     def open(cls, recordings: Sequence[str | PathLike[str]],
              model: str | PathLike[str] = 'config/paper.yaml',
-             validation: Sequence[str | PathLike[str]] = (), topic: str | None = None) -> Session:
+             validation: Sequence[str | PathLike[str]] = (), topic: str | None = None,
+             reference: Given | None = None) -> Session:
         """Read files by the readers of all commands.
+
+        What has changed since `reference` is asked where runs are given, () for those that the
+        model file names.
 
         Raises
         ------
         PprsError
-            Where one cannot be read, or holds the samples of another.
+            Where one cannot be read, or holds the samples of another; as `read_reference`.
         """
-        session = cls.of(Inputs.read(model, recordings, validation, topic))
+        session = cls.of(Inputs.read(model, recordings, validation, topic).since(reference))
         session.find_mistakes()
         return session
 
@@ -667,6 +672,7 @@ class Session:
         """Return all that one screen shows, but for the curves."""
         with self._lock:
             view, diagnosis, adoption = self.view_state, self.diagnosis, self.last_adoption
+            since = self.fits.since
             called_for = {one.name for one in diagnosis.effects} if diagnosis else None
             return {
                 'revision': self.revision, 'fitted_since': self.fitted_since, 'stage': view.stage,
@@ -679,6 +685,8 @@ class Session:
                     view_state.effect_to_dict(view, effect, self.model, called_for)
                     for effect in self.candidates],
                 'verdict': diagnosis.verdict if diagnosis else None,
+                'reference': None if since is None else {
+                    **since.to_dict(), 'text': list(word_reference(since))},
                 'little': word_little(little_explained(
                     self.model, self.fits.fits.design.residuals, self.current_residual)),
                 'steps': [step.to_dict() for step in self.steps],

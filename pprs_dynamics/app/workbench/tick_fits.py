@@ -17,6 +17,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.adoption.adopt import original
+from pprs_dynamics.inference.diagnosis.diagnose import SinceReference
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.normal_equations import Block
@@ -111,6 +112,8 @@ class TickFits:
     ----------
     before : (M, D) array
         What the model as it is leaves [N].
+    since : SinceReference or None
+        What the reference says of the recordings.
 
     Raises
     ------
@@ -122,9 +125,10 @@ class TickFits:
                  reference: Reference | None = None) -> None:
         self.model, self.recordings = model, tuple(recordings)
         start = original(model)
-        self.design = Design.of(start, recordings)
+        self.design, self.since = Design.of(start, recordings), None
         if reference is not None:
             self.design = self.design.beside(reference.carried_over(self.design))
+            self.since = SinceReference.of(reference, self.design)
         self.fits = FittedSets(self.design, DECISIONS)
         self.scan = Scan(self.fits)
         self.none = self.fits.evaluate(())

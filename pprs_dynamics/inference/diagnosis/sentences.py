@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import isnan
 
 from pprs_dynamics.arrays import root_mean_square
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, SinceReference
 from pprs_dynamics.inference.diagnosis.found_effects import (
     FittedEffect,
     FoundEffect,
@@ -159,7 +159,8 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(f'{_set(diagnosis, one)} may not be, whatever it costs: {one.barred}. It '
               f'{_cost(one)}' for one in diagnosis.barred),
         tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated),
-        diagnosis.warnings, following, command, _reference(diagnosis))
+        diagnosis.warnings, following, command,
+        word_reference(diagnosis.since))
 
 
 def unexplained_groups(diagnosis: Diagnosis) -> list[tuple[Statement, ...]]:
@@ -235,9 +236,8 @@ def _since(diagnosis: Diagnosis) -> str:
     return f'Since {listed(diagnosis.since.recordings)}: ' if diagnosis.since else ''
 
 
-def _reference(diagnosis: Diagnosis) -> tuple[str, ...]:
-    """Return how far a reference run can tell what has changed."""
-    since = diagnosis.since
+def word_reference(since: SinceReference | None) -> tuple[str, ...]:
+    """Return how far a reference run can tell what has changed; nothing without one."""
     if since is None:
         return ()
     shares = listed([f'{share:.0%} on {drive}' for drive, share in since.explained.items()])
