@@ -85,8 +85,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._written = command_writer(names)
         self._controller = ControllerWatch(names.joints)
         self._feedforward = Feedforward(self._settings.model, node_values)
-        self._timing = Timing(*(node_values[name] for name in (
-            'max_age', 'max_ahead', 'max_duration')))
+        self._timing = Timing.of(node_values)
         self._counters = {'received': 0, 'accepted': 0, 'clamped': 0, 'stale': 0, PASSED_OVER: 0,
                           **dict.fromkeys(REJECTIONS, 0)}
         self._senders = Senders()
@@ -160,8 +159,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
     def _use_settings(self) -> None:
         node_values = self._settings.node_values
         self._feedforward.use(self._settings.model, node_values)
-        self._timing = Timing(*(node_values[name] for name in (
-            'max_age', 'max_ahead', 'max_duration')))
+        self._timing = Timing.of(node_values)
         if self._watchdog is not None:
             self._create_parts()
             self._watchdog.rearm()

@@ -73,11 +73,11 @@ test('names, drives and unphysical signs are priced', () => {
   const priced = new RidgeSystem({...data(), effects: [effect]});
   const bare = new RidgeSystem(data());
   const strip = (one) => placement(one.columns);
-  const prior_cost = (used) => priced.fit(used).cost - bare.fit(used.map(strip)).cost;
+  const priorCost = (used) => priced.fit(used).cost - bare.fit(used.map(strip)).cost;
   // Of four choices of two signs one has the odds of 99 : 1, the others share the rest.
   const wrong = 2 * Math.log(99 * 3);
-  near(prior_cost([effect.placements[0]]), 0.5 + wrong + 5 + 3);
-  near(prior_cost(effect.placements), 0.75 + wrong + 2 * 5 + 4);
+  near(priorCost([effect.placements[0]]), 0.5 + wrong + 5 + 3);
+  near(priorCost(effect.placements), 0.75 + wrong + 2 * 5 + 4);
 });
 
 test('what is left of a drive is a sum of squares, and a curve', () => {

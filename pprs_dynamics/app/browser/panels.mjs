@@ -42,7 +42,8 @@ export const showVerdict = (state) => {
   const {before, now, noise} = state.overall, {reference} = state;
   const line = make('span');
   if (state.little) line.append(make('b', `${state.little} · `));
-  line.append(reference ? `error since ${reference.recordings.join(', ')} ` : 'error ', make('b', fall(before, now, state)), ` · noise ${amount(noise)} ${
+  const since = reference ? `since ${reference.recordings.join(', ')} ` : '';
+  line.append(`error ${since}`, make('b', fall(before, now, state)), ` · noise ${amount(noise)} ${
     state.unit}${state.noise_is_guess ? ' (first guess)' : ''}`);
   if (state.verdict) {
     line.append(` · diagnosis: ${(reference ? CHANGES : VERDICTS)[state.verdict]}`);

@@ -55,7 +55,7 @@ export class RidgeSystem {
       if (this.beyond.every((sign, i) => sign === this.held[i])) break;
     }
     const {gram} = this.data;
-    let cost = logDet + this.bothSides(c) + this.prior_cost(placements, c);
+    let cost = logDet + this.bothSides(c) + this.priorCost(placements, c);
     const all = [...free, ...fixed];
     for (const i of all) {
       cost -= 2 * side[i] * c[i];
@@ -141,21 +141,21 @@ export class RidgeSystem {
     return z;
   }
 
-  prior_cost(placements, c) {
+  priorCost(placements, c) {
     const {effects, name_prior_cost, wrong_sign_odds, drive_prior_costs} = this.data;
-    let prior_cost = 0;
+    let priorCost = 0;
     for (const one of placements) {
-      prior_cost += one.prior_cost;
+      priorCost += one.prior_cost;
       if (one.signs.some(([k, bound]) => c[k] < bound)) {
-        prior_cost -= 2 * Math.log(wrong_sign_odds / (1 - wrong_sign_odds) / (2 ** one.signs.length - 1));
+        priorCost -= 2 * Math.log(wrong_sign_odds / (1 - wrong_sign_odds) / (2 ** one.signs.length - 1));
       }
     }
     for (const effect of effects) {
       const used = effect.placements.filter((one) => placements.includes(one));
-      prior_cost += name_prior_cost * new Set(used.flatMap((one) => one.hypotheses)).size;
-      if (used.length && used[0].drive) prior_cost += drive_prior_costs[used.length - 1];
+      priorCost += name_prior_cost * new Set(used.flatMap((one) => one.hypotheses)).size;
+      if (used.length && used[0].drive) priorCost += drive_prior_costs[used.length - 1];
     }
-    return prior_cost;
+    return priorCost;
   }
 }
 

@@ -301,7 +301,8 @@ def diagnose(
     unconfirmed: list[FoundEffect] = []
     if answer.raises_the_error or any(effect.is_impossible for effect in answer.effects):
         # Whatever stands for what cannot be, or beside it, would be as wrong.
-        found = _all_objected(answer.effects, answer.raises_the_error)
+        found = _raising(answer.effects) if answer.raises_the_error else _all_objected(
+            answer.effects)
         answer = _Answer(answer.ranking.reporting_nothing(), validate, decisions,
                          try_courses=False)
         report(1.0)
@@ -316,12 +317,14 @@ def diagnose(
     return replace(diagnosis, since=since)
 
 
-def _all_objected(effects: Sequence[FoundEffect], raise_the_error: bool,
-                  ) -> tuple[FoundEffect, ...]:
+def _raising(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
+    """Return effects with which the error rises, each with that objection."""
+    return tuple(replace(effect, objection='the error of a model with what was found is larger '
+                         'than without') for effect in effects)
+
+
+def _all_objected(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
     """Return effects of which one cannot be: that first, and the others as found beside it."""
-    if raise_the_error:
-        return tuple(replace(effect, objection='the error of a model with what was found is '
-                             'larger than without') for effect in effects)
     impossible = [effect for effect in effects if effect.is_impossible]
     beside = listed([one.name for one in impossible])
     return (*impossible,
@@ -344,8 +347,7 @@ class _Answer:
                 self.final.fitted.fit.coefficients)
         for d, series in self.fits.regression.series.items():
             self.remaining[:, d] -= series.open_forces(self.remaining[:, d])
-        # Before a constant form is believed.
-        # What held-out data refute is not tried again with a beginning.
+        # Before a constant form is believed. What held-out data refute is not tried again.
         self.dated_fits, self.dated = with_courses(
             self.fits, self.reported, [] if ranking.refuted else ranking.alone.values()
         ) if try_courses else (self.fits, self.reported)

@@ -252,8 +252,9 @@ class Reference:
         drives, told = range(len(self.size)), self.told
         samples = len(residuals)
         q, v = motion_of(residuals)
-        shared, *own = ((one.known(q, v, residuals.period), one.new(q, v))
-                        for one in self.processes)
+        features = [one.known(q, v, residuals.period) for one in self.processes]
+        shared, *own = ((known, one.new(q, v, known))
+                        for one, known in zip(self.processes, features, strict=True))
         numbers = (np.concatenate([_numbers(self.model, one) for one in reconstructions])
                    @ self.base if self.base.size else np.zeros((samples, len(drives), 0)))
         of_base = numbers[..., :told] @ self.coefficients[:told]
@@ -273,7 +274,7 @@ class Reference:
             apart.append(np.concatenate((
                 np.sqrt(1 - repeats ** 2) * sizes * known, new), axis=1))
 
-        shown = of_base + self._repeating(q, v, residuals.period)
+        shown = of_base + self._by_features(features)
         return CarriedOver(of_base, self._repeating, *self._open(replace(
             residuals, measured=residuals.measured - shown), together, apart), float(np.mean(
                 (shared[0] ** 2).sum(axis=1) > self.decisions.reference_known)))
@@ -283,8 +284,12 @@ class Reference:
         if len(q) > CHUNK:
             return np.concatenate([self._repeating(q[at:at + CHUNK], v[at:at + CHUNK], period)
                                    for at in range(0, len(q), CHUNK)])
-        shared, *own = (one.known(q, v, period) for one in self.processes)
-        found, at = np.zeros_like(q), self.told
+        return self._by_features([one.known(q, v, period) for one in self.processes])
+
+    def _by_features(self, features: Sequence[Array]) -> Array:
+        """Return what repeats by the features of each process, (M, D) [N]."""
+        shared, *own = features
+        found, at = np.zeros((len(shared), len(self.size))), self.told
         for d in range(len(self.size)):
             known = np.concatenate((shared, *own[d::len(self.size)]), axis=1)
             found[:, d] = self.repeats[d] * (known @ self.coefficients[at:at + known.shape[1]])

@@ -152,9 +152,9 @@ class Process:
         known: Array = solve_triangular(self.root, kernel(self.chosen, at), lower=True).T
         return known
 
-    def new(self, q: Array, v: Array) -> Array:
-        """Return features of states that it does not know, (M, r)."""
-        return factor_of(self.states.at(q, v, self.drive), MOST_NEW, self.known(q, v, 0.0))[1]
+    def new(self, q: Array, v: Array, known: Array) -> Array:
+        """Return features of states that it does not know, (M, r), beside the known ones."""
+        return factor_of(self.states.at(q, v, self.drive), MOST_NEW, known)[1]
 
 
 @dataclass(frozen=True)
@@ -223,6 +223,6 @@ class Waves:
         found: Array = np.concatenate((mean * np.sin(phase), mean * np.cos(phase)), axis=1)
         return found
 
-    def new(self, q: Array, _: Array) -> Array:
+    def new(self, q: Array, _: Array, __: Array) -> Array:
         """Return none: it knows every position."""
         return np.zeros((len(q), 0))

@@ -67,8 +67,8 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
     """
     own = [(kept, candidate) for candidate in kept.effects if _is_new(candidate)]
     alone = [(other, other.effects[0]) for other in others if _is_new(other.effects[0])]
-    begun = [*_offers(fits, kept, own, _courses(fits)),
-             *_offers_for(fits, kept, alone, _few_courses(fits))]
+    begun = [*_offers(fits, [(kept, 0.0)], own, _courses(fits)),
+             *_offers(fits, _bases(fits, kept), alone, _few_courses(fits))]
     drives = {d for unknown in kept.unknowns for d in unknown.drives} | {
         d for offer in begun if offer.is_worth_a_fit(fits) for d in offer.drives}
     if not drives:
@@ -84,7 +84,7 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
                 if not candidate.course and _is_new(candidate)]
         # Patterns of no catalogue imitate what changes: offers are beside effects alone.
         plain = dated.at_noise_of(best, best.effects) if best.unknowns else best
-        offers = sorted(_offers_for(dated, plain, [*held, *more], _courses(dated)),
+        offers = sorted(_offers(dated, _bases(dated, plain), [*held, *more], _courses(dated)),
                         key=lambda offer: -offer.gain)
         found, offered = best, _best_of_each(offers)
         likely += [offer.candidate for offer in offered]
@@ -139,25 +139,25 @@ def _courses(fits: FittedSets) -> Iterator[Course]:
             yield Course(DURING, begin, end)
 
 
-def _offers_for(fits: FittedSets, best: CandidateSet,
-                effects: Sequence[tuple[CandidateSet, EffectCandidate]],
-                courses: Iterable[Course]) -> Iterator[_Offer]:
-    """Yield offers beside a set, and instead of it, where one may make good all that it does.
+def _bases(fits: FittedSets, best: CandidateSet) -> list[tuple[CandidateSet, float]]:
+    """Return a set and no set at all, with what each costs more than the set.
 
-    What a set of constant forms imitates is hardly seen beside it.
+    What a set of constant forms imitates is hardly seen beside it: an offer may have to make good
+    all that it does.
     """
-    courses = list(courses)
-    yield from _offers(fits, best, effects, courses)
-    if best.candidates:
-        nothing = fits.at_noise_of(best, ())
-        for offer in _offers(fits, nothing, effects, courses):
-            yield replace(offer, gain=offer.gain - (nothing.total - best.total))
+    if not best.candidates:
+        return [(best, 0.0)]
+    nothing = fits.at_noise_of(best, ())
+    return [(best, 0.0), (nothing, nothing.total - best.total)]
 
 
-def _offers(fits: FittedSets, base: CandidateSet,
+def _offers(fits: FittedSets, bases: Sequence[tuple[CandidateSet, float]],
             effects: Iterable[tuple[CandidateSet, EffectCandidate]],
             courses: Iterable[Course]) -> Iterator[_Offer]:
-    """Yield effects with the course that lowers the deviance most, by the force that they had."""
+    """Yield effects with the course that lowers the deviance most, by the force that they had.
+
+    Beside each of the `bases`, less what that one costs.
+    """
     residuals, shape = fits.design.residuals, fits.design.residuals.measured.shape
     courses = list(courses)
     weights = np.array([course.weight(residuals.time, residuals.period) for course in courses])
@@ -175,13 +175,14 @@ def _offers(fits: FittedSets, base: CandidateSet,
                          [Entry(course, (k,)) for k, course in enumerate(courses)])
         # A stretch of no more samples than coefficients can be explained by anything.
         told = lengths > sum(len(component.names) for component in candidate.components)
-        for labels, gains in test.gains(base.fit):
-            gains = np.where(told, gains, -np.inf)
-            ranked = np.argsort(-gains)
-            for kind in dict.fromkeys(course.kind for course in labels):
-                at = next(k for k in ranked if labels[k].kind == kind)
-                yield _Offer(float(gains[at]), _with_course(candidate, labels[at]),
-                             frozenset(rows))
+        for base, dearer in bases:
+            for labels, gains in test.gains(base.fit):
+                gains = np.where(told, gains, -np.inf)
+                ranked = np.argsort(-gains)
+                for kind in dict.fromkeys(course.kind for course in labels):
+                    at = next(k for k in ranked if labels[k].kind == kind)
+                    yield _Offer(float(gains[at]) - dearer, _with_course(candidate, labels[at]),
+                                 frozenset(rows))
 
 
 def _best_of_each(offers: list[_Offer]) -> list[_Offer]:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -85,6 +85,11 @@ class Timing(NamedTuple):
     max_age: float = 0.0
     max_ahead: float = 0.0
     max_duration: float = 0.0
+
+    @classmethod
+    def of(cls, node_values: Mapping[str, Any]) -> Timing:
+        """Return that of a node's parameters, which have its names."""
+        return cls(*(node_values[name] for name in cls._fields))
 
     def check(self, request: TrajectoryRequest, now: int, waited: float = 0.0) -> None:
         """Refuse a request that is too old, too early or too long.
