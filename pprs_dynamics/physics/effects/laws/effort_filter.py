@@ -25,6 +25,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import ALONE, DriveRange, MeasurementEffect
 from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.first_order import first_order
 
 LAGS = 2
 # [s], tried: from cut-offs of 160 Hz to one of 1.6 Hz, beyond which no motion of a robot is left.
@@ -109,16 +110,8 @@ def lag(signal: Array, step: float, time_constant: float, entered: float, left: 
     """
     if not step > 0:
         return np.full_like(signal, left)
-    # Here: few models have it. scipy.signal, which has this as well, takes 0.4 s to import.
-    from scipy.linalg.blas import dtbsv
-
     kept = np.exp(-step / time_constant)
     share = (1 - kept) * time_constant / step
     new, old = 1 - share, share - kept
     driven = new * signal + old * np.concatenate(([entered], signal[:-1]))
-    driven[0] += kept * left
-    # y_k - kept y_{k-1} = driven_k: a triangular system with one band below its diagonal.
-    bands = np.empty((2, len(signal)), order='F')
-    bands[1] = -kept
-    smooth: Array = dtbsv(1, bands, driven, lower=1, diag=1)
-    return smooth
+    return first_order(kept, driven, left)

@@ -18,6 +18,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.first_order import first_order
 
 
 class FrictionDrift(DriveEffect):
@@ -89,16 +90,9 @@ def _worked(time: Array, speed: Array, tau: float, memory: Any) -> Array:
 
     Speeds are those of the intervals that end at the samples.
     """
-    # Here, as in effort_filter: few models have it.
-    from scipy.linalg.blas import dtbsv
-
     last = memory['start'] if memory['last'] is None else memory['last']
     elapsed = np.diff(time, prepend=min(last, time[0])) / tau
     kept, gained = np.exp(-elapsed), -np.expm1(-elapsed) * speed
-    gained[0] += kept[0] * memory['work']
-    # w_k - kept_k w_{k-1} = gained_k: a triangular system with one band below its diagonal.
-    bands = np.zeros((2, len(time)), order='F')
-    bands[1, :-1] = -kept[1:]
-    work: Array = dtbsv(1, bands, gained, lower=1, diag=1)
+    work = first_order(kept, gained, memory['work'])
     memory['last'], memory['work'] = float(time[-1]), float(work[-1])
     return work
