@@ -5,7 +5,7 @@
 
 `play_trajectory` -> `feedforward` -> `simulated_robot`, as processes over DDS. This one listens to
 the commands and to joint_states, and says how far the platform was from where it should have been.
-The same commands can be executed once more in simulated time, in which none comes late.
+Commands can be executed in simulated time as well, in which none is late and none is lost.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from ros_processes import environment, executable, node_process
 from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics.drives import DRIVES
@@ -155,8 +156,18 @@ def commands_for(case: Case, path: HelicalPath | Excitation) -> np.ndarray:
                             forces.mechanism.velocity, effort))
 
 
+def places(came: np.ndarray, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which command each that came over the topics is, and by how much it is not [SI].
+
+    Both have the columns of `Tracking`. Times are not looked at: a player that was kept goes on
+    later, and of a burst of messages some may be lost.
+    """
+    distance, row = cKDTree(commands[:, 1:]).query(came[:, 1:])
+    return row, distance
+
+
 def execute(case: Case, commands: np.ndarray) -> Tracking:
-    """Execute commands of a run once more, in simulated time, and return how they were followed.
+    """Execute commands in simulated time, and return how they were followed.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from closed_loop import CASES, RATE, Case, Tracking, execute, run_case
+from closed_loop import CASES, RATE, Case, Tracking, commands_for, execute, places, run_case
 from node_bench import Bench, bench, overrides
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
@@ -23,6 +23,7 @@ from std_msgs.msg import Float64MultiArray
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
 
@@ -32,7 +33,8 @@ HOME = DriveModel.load().drive_forces(PlatformMotion.at_rest((0.0, 0.0, 0.5)))
 REST = HOME.mechanism.position[0]
 WEIGHT = HOME.parts['rigid_body'][0]
 DURATION = 3.0  # [s]
-PATH = ['source:=excitation', f'duration:={DURATION}', 'seed:=2']
+SEED = 2
+PATH = ['source:=excitation', f'duration:={DURATION}', f'seed:={SEED}']
 
 
 class RobotBench:
@@ -247,16 +249,22 @@ def test_it_restarts_where_it_was_killed(ros_domain: int, tmp_path: Path) -> Non
 
 @pytest.fixture(scope='module')
 def tracking(ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Tracking]:
-    """Run both kinds of feedforward as processes over DDS, and execute what they commanded.
+    """Run both kinds of feedforward as processes over DDS, and execute what they command.
 
-    How late a busy machine's commands come is no property of a feedforward: those that went over
-    the topics are executed in simulated time. They do not depend on the robot: one with a hidden
-    effect, and one that takes positions alone, execute those of the paper's model.
+    How late a busy machine's commands come, and how many of them it loses, is no property of a
+    feedforward: those that came are what the model says, in their order, and all that it says
+    is executed in simulated time. It does not depend on the robot: one with a hidden
+    effect, and one that takes positions alone, execute what is commanded to the paper's.
     """
     folder = tmp_path_factory.mktemp('logs')
-    commands = {case.feedforward: run_case(case, PATH, DURATION, ros_domain, folder).commands
-                for case in CASES[1:]}
-    assert min(map(len, commands.values())) > DURATION * RATE
+    path = Excitation(duration=DURATION, seed=SEED)
+    commands = {case.feedforward: commands_for(case, path) for case in CASES[1:]}
+    for case in CASES[1:]:
+        came = run_case(case, PATH, DURATION, ros_domain, folder).commands
+        assert len(came) > DURATION * RATE
+        row, distance = places(came, commands[case.feedforward])
+        assert np.max(distance) < 1e-9
+        assert np.all(np.diff(row) >= 0)
     cases = (*CASES, Case('hidden', 'friction', ('coulomb_friction',)))
     return {case.name: execute(case, commands.get(case.feedforward, commands['friction']))
             for case in cases}
