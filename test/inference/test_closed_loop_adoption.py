@@ -4,8 +4,8 @@
 """Control gets better too: what is found in the run's own recording goes into its feedforward.
 
 Processes over DDS, without a launch file. How late a busy machine's commands come, and how many
-of them it loses, is no property of a model: those that came are the model's, in their order, and all of
-the model's are executed in simulated time.
+of them it loses, is no property of a model: those that came are the model's, in their order, and
+all of the model's are executed in simulated time.
 """
 
 from __future__ import annotations
