@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Sequence
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -88,9 +89,9 @@ class TrajectoryBytes:
                 (f'words{k}', '<u4', 2 if k else self._before // 4), (f'numbers{k}', '<f8', each))),
             ('empty', '<u4', empty), ('sec', '<i4'), ('nanosec', '<u4')])
         # Of what `_one` unpacks: numbers, and words with what they must be.
-        ends = np.cumsum(numbers) + range(3)
+        ends = [end + k for k, end in enumerate(accumulate(numbers))]
         self._numbers = [slice(end - each, end) for end, each in zip(ends, numbers, strict=True)]
-        self._words = [(int(end), count) for end, count in zip(
+        self._words = [(end, count) for end, count in zip(
             [*ends[:2], *range(ends[2], ends[2] + empty)], [*counts[1:], *[0] * empty],
             strict=True)]
         self._counts = counts[1:]
@@ -182,5 +183,5 @@ class TrajectoryBytes:
                 (points[f'words{k}'][:, 0] != word).any()
                 for k, word in enumerate(self._counts, 1)):
             return None
-        return (np.hstack([points[f'numbers{k}'] for k in range(3)]),
+        return (np.concatenate([points[f'numbers{k}'] for k in range(3)], axis=1),
                 points['sec'].astype(np.int64) * NANOSECONDS + points['nanosec'])

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -376,8 +377,9 @@ def _poses(frame: str, body: str) -> RequestReader:
 
 def _written_poses(frame: str, body: str, numbers: Array, offsets: Sequence[int],
                    ) -> MultiDOFJointTrajectory:
-    message = write_trajectory(
-        PlatformMotion(*np.split(numbers, (3, 7, 10, 13, 16), axis=1)), Time(), offsets, frame)
+    motion = PlatformMotion(*(
+        numbers[:, start:end] for start, end in pairwise((0, 3, 7, 10, 13, 16, 19))))
+    message = write_trajectory(motion, Time(), offsets, frame)
     message.joint_names = [body]
     return message
 
@@ -389,7 +391,7 @@ def joint_reader(joints: Sequence[str]) -> RequestReader:
     known.expect(
         np.arange(6.0 * count).reshape(2, -1) / 7,
         lambda numbers, offsets: write_joint_trajectory(
-            JointMotion(*np.hsplit(numbers, 3)), Time(), offsets, names))
+            JointMotion(*_joint_fields(count, numbers)), Time(), offsets, names))
 
     def order(message: JointTrajectory) -> Indices | None:
         given = list(message.joint_names)
@@ -405,6 +407,9 @@ def joint_reader(joints: Sequence[str]) -> RequestReader:
 
 
 def _joint_motion_of(count: int, numbers: Array) -> Callable[[Array], Motion]:
-    position, velocity, acceleration = (
-        numbers[:, k * count:(k + 1) * count] for k in range(3))
-    return lambda time: JointMotion.checked(position, velocity, acceleration, time, count)
+    return lambda time: JointMotion.checked(*_joint_fields(count, numbers), time, count)
+
+
+def _joint_fields(count: int, numbers: Array) -> tuple[Array, Array, Array]:
+    """Return positions, velocities and accelerations, (N, count) each."""
+    return numbers[:, :count], numbers[:, count:2 * count], numbers[:, 2 * count:]
