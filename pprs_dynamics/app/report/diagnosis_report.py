@@ -17,7 +17,7 @@ from pprs_dynamics.app.report import diagnosis_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import escape, stacked, text_table, verdict_panel
 from pprs_dynamics.app.report.what_if_part import add_what_if
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import RivalEffect
 from pprs_dynamics.inference.diagnosis.partial_errors import ErrorStep, error_steps
 from pprs_dynamics.inference.diagnosis.quantities import (

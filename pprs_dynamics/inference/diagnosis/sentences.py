@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import isnan
 
 from pprs_dynamics.arrays import root_mean_square
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, SinceReference
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
 from pprs_dynamics.inference.diagnosis.found_effects import (
     FittedEffect,
     FoundEffect,
