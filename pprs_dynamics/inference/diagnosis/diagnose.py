@@ -73,14 +73,14 @@ def diagnose(
         if one.share > decisions.stick_slip}
     if other or sticking:
         bare = Answer(without_search(model, recordings, decisions, report), validate, decisions,
-                       try_courses=False).diagnosis(())
+                      try_courses=False).diagnosis(())
         return replace(bare, verdict='unknown', warnings=(), effort_looks_like=other,
                        stick_slip=sticking, depends_on=tuple(
                            word_stick_slip(drive, one, bare.residuals)
                            for drive, one in sticking.items()))
     answer = Answer(select(model, recordings, decisions, lambda share: report(0.9 * share),
-                            None if reference is None else reference.carried_over),
-                     validate, decisions)
+                           None if reference is None else reference.carried_over),
+                    validate, decisions)
     since = None if reference is None else SinceReference.of(
         reference, answer.ranking.first.design)
     unconfirmed: list[FoundEffect] = []
@@ -89,7 +89,7 @@ def diagnose(
         found = _raising(answer.effects) if answer.raises_the_error else _all_objected(
             answer.effects)
         answer = Answer(answer.ranking.reporting_nothing(), validate, decisions,
-                         try_courses=False)
+                        try_courses=False)
         report(1.0)
         return replace(answer.diagnosis(found), verdict='unknown', since=since)
     while weak := [effect for effect in answer.effects

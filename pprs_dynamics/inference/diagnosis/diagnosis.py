@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.diagnosis.detectable import DetectableSize, detectable_sizes
 from pprs_dynamics.inference.diagnosis.found_effects import (
     FoundEffect,
     RankedEffect,
@@ -167,6 +169,14 @@ class Diagnosis:
     selection: Ranking | None = field(default=None, repr=False, compare=False)
     decisions: Decisions = DECISIONS
 
+    @cached_property
+    def detectable(self) -> tuple[DetectableSize, ...]:
+        """From which size on other effects would have been told; none where the answer is open."""
+        if (self.selection is None or self.verdict not in ('adequate', 'effect')
+                or any(effect.course for effect in self.effects)):
+            return ()
+        return detectable_sizes(self.selection.last, self.selection.reported)
+
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON: the keys that docs/commands.md lists."""
         return {
@@ -184,6 +194,7 @@ class Diagnosis:
             'sets': [fitted.to_dict() for fitted in self.sets],
             'barred': [one.to_dict() for one in self.barred],
             'calibrated': [number.to_dict() for number in self.calibrated],
+            'detectable': [one.to_dict() for one in self.detectable],
             'held_out_on': self.held_out_on, 'above_noise': dict(self.above_noise),
             'effort_looks_like': kinds_of(self.effort_looks_like),
             'stick_slip': {drive: {'frequency': one.frequency, 'speed': one.speed,
