@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,17 +17,29 @@ from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
-from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
+from trajectory_msgs.msg import (
+    JointTrajectory,
+    JointTrajectoryPoint,
+    MultiDOFJointTrajectory,
+)
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.ros import feedforward
-from pprs_dynamics.ros.messages import conversions, serialisation
+from pprs_dynamics.ros.messages import conversions, serialisation, trajectory_request
 from pprs_dynamics.ros.messages.conversions import RobotNames
-from pprs_dynamics.ros.messages.incoming_bytes import is_whole, message_in, read_points
+from pprs_dynamics.ros.messages.incoming_bytes import is_whole, message_in
 from pprs_dynamics.ros.messages.serialisation import CommandBytes
 from pprs_dynamics.ros.messages.status_codes import Rejection
-from pprs_dynamics.ros.messages.trajectory_request import read_serialised, read_trajectory
+from pprs_dynamics.ros.messages.trajectory_bytes import TrajectoryBytes
+from pprs_dynamics.ros.messages.trajectory_request import (
+    RequestReader,
+    joint_reader,
+    read_joint_trajectory,
+    read_trajectory,
+    reader_for,
+)
 
 pytestmark = pytest.mark.nodes
 
@@ -43,26 +57,113 @@ def random_message(points: int, seed: int) -> MultiDOFJointTrajectory:
     return message
 
 
-def outcome(read: object, data: object) -> object:
+def poses() -> RequestReader:
+    return reader_for(DriveModel.load())
+
+
+def outcome(read: Callable[..., Any], *what: Any) -> object:
     """Return what a reader gives: its numbers, or its refusal."""
     try:
-        request = read(data, 1_000, 0.0)  # type: ignore[operator]
+        request = read(*what, 1_000, 'reject')
     except Exception as error:
         return type(error), str(error)
     motion = request.motion
-    return (request.start, request.offsets.tolist(), motion.position.tobytes(),
-            motion.orientation.tobytes(), motion.linear_velocity.tobytes(),
-            motion.angular_velocity.tobytes(), motion.linear_acceleration.tobytes(),
-            motion.angular_acceleration.tobytes())
+    fields = ('position', 'velocity', 'acceleration') if isinstance(motion, JointMotion) else (
+        'position', 'orientation', 'linear_velocity', 'angular_velocity', 'linear_acceleration',
+        'angular_acceleration')
+    return (request.start, request.offsets.tolist(), motion.time.tobytes(),
+            *(getattr(motion, field).tobytes() for field in fields))
+
+
+def without_objects(reader: RequestReader, monkeypatch: pytest.MonkeyPatch) -> RequestReader:
+    """Return a reader that must do without message objects."""
+    monkeypatch.setattr(trajectory_request, 'message_in', lambda *_: pytest.fail('objects'))
+    return reader
 
 
 @settings(max_examples=200)
 @given(POINTS, SEEDS)
 def test_bytes_and_objects_give_the_same_numbers(points: int, seed: int) -> None:
     message = random_message(points, seed)
-    data = serialize_message(message)
-    assert read_points(data) is not None
-    assert outcome(read_serialised, data) == outcome(read_trajectory, message)
+    with pytest.MonkeyPatch.context() as patch:
+        reader = without_objects(poses(), patch)
+        found = outcome(reader.read, serialize_message(message))
+    assert found == outcome(read_trajectory, message)
+
+
+LEGS = tuple(f'leg_{k}' for k in range(1, 7))
+
+
+def joint_message(points: int, seed: int, joints: Sequence[str] = LEGS) -> JointTrajectory:
+    rng = np.random.default_rng(seed)
+    message = JointTrajectory(joint_names=list(joints))
+    message.header.stamp.sec = int(rng.integers(-2**31, 2**31))
+    message.header.stamp.nanosec = int(rng.integers(0, 10**9))
+    for k in range(points):
+        p, v, a = rng.normal(size=(3, len(joints))).tolist()
+        message.points.append(JointTrajectoryPoint(
+            positions=p, velocities=v, accelerations=a,
+            time_from_start=conversions.duration(k * 1_234_567_891)))
+    return message
+
+
+@settings(max_examples=100)
+@given(st.integers(1, 8), POINTS, SEEDS)
+def test_joints_are_read_from_bytes_as_from_objects(joints: int, points: int, seed: int) -> None:
+    names = tuple(f'j{"o" * k}int' for k in range(joints))
+    message = joint_message(points, seed, names)
+    with pytest.MonkeyPatch.context() as patch:
+        reader = without_objects(joint_reader(names), patch)
+        found = outcome(reader.read, serialize_message(message))
+    assert found == outcome(read_joint_trajectory, message, names)
+
+
+@pytest.mark.parametrize('order', [LEGS, LEGS[::-1], (*LEGS[2:], *LEGS[:2])])
+def test_whoever_names_joints_otherwise_is_known_from_the_second_message_on(
+    order: tuple[str, ...], monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    reader = joint_reader(LEGS)
+    for seed in range(3):
+        message = joint_message(2, seed, order)
+        message.header.frame_id = 'map'
+        found = outcome(reader.read, serialize_message(message))
+        assert found == outcome(read_joint_trajectory, message, LEGS)
+        reader = without_objects(reader, monkeypatch)
+
+
+@settings(max_examples=200)
+@given(POINTS, SEEDS)
+def test_joint_messages_of_another_layout_are_left_to_the_ordinary_path(
+    points: int, seed: int,
+) -> None:
+    rng = np.random.default_rng(seed)
+    message = joint_message(points, seed)
+    point = message.points[int(rng.integers(points))]
+    field = str(rng.choice(['positions', 'velocities', 'accelerations', 'effort', 'names']))
+    if field == 'names':
+        message.joint_names = rng.permutation(LEGS).tolist()[:int(rng.integers(5, 7))]
+    else:
+        setattr(point, field, [0.5] * int(rng.choice([0, 5, 7] if field != 'effort' else [1, 6])))
+    reader = joint_reader(LEGS)
+    for _ in range(2):  # a layout that was accepted is no reason to read the next one wrong
+        assert outcome(reader.read, serialize_message(message)) == outcome(
+            read_joint_trajectory, message, LEGS)
+
+
+@settings(max_examples=200)
+@given(POINTS, SEEDS)
+def test_changed_joint_bytes_give_the_ordinary_numbers_or_a_rejection(
+    points: int, seed: int,
+) -> None:
+    rng = np.random.default_rng(seed)
+    data = bytearray(serialize_message(joint_message(points, seed)))
+    for _ in range(int(rng.integers(1, 5))):
+        data[int(rng.integers(len(data)))] = int(rng.integers(256))
+
+    def ordinary(data: bytes, now: int, missing: str) -> Any:
+        return read_joint_trajectory(message_in(data, JointTrajectory), LEGS, now, missing)
+
+    assert outcome(joint_reader(LEGS).read, bytes(data)) == outcome(ordinary, bytes(data))
 
 
 def alter(message: MultiDOFJointTrajectory, rng: np.random.Generator) -> None:
@@ -94,9 +195,7 @@ def test_whatever_differs_from_the_layout_is_left_to_the_ordinary_path(
 ) -> None:
     message = random_message(points, seed)
     alter(message, np.random.default_rng(seed))
-    data = serialize_message(message)
-    assert read_points(data) is None
-    assert outcome(read_serialised, data) == outcome(read_trajectory, message)
+    assert outcome(poses().read, serialize_message(message)) == outcome(read_trajectory, message)
 
 
 @settings(max_examples=200)
@@ -106,24 +205,20 @@ def test_changed_bytes_give_the_ordinary_numbers_or_a_rejection(points: int, see
     data = bytearray(serialize_message(random_message(points, seed)))
     for _ in range(int(rng.integers(1, 5))):
         data[int(rng.integers(len(data)))] = int(rng.integers(256))
-    points_read = read_points(bytes(data))
-    if points_read is None:
-        return
-    # Where the bytes still have the layout, ROS itself reads the same from them.
-    message = deserialize_message(bytes(data), MultiDOFJointTrajectory)
-    assert conversions.nanoseconds(message.header.stamp) == points_read[0]
-    for point, row, offset in zip(message.points, points_read[1], points_read[2], strict=True):
-        position = point.transforms[0].translation
-        np.testing.assert_array_equal([position.x, position.y, position.z], row[:3])
-        angular = point.accelerations[0].angular
-        np.testing.assert_array_equal([angular.x, angular.y, angular.z], row[16:])
-        assert conversions.nanoseconds(point.time_from_start) == offset
+
+    def ordinary(data: bytes, now: int, missing: str) -> Any:
+        return read_trajectory(message_in(data, MultiDOFJointTrajectory), now, missing)
+
+    assert outcome(poses().read, bytes(data)) == outcome(ordinary, bytes(data))
 
 
-def test_big_endian_bytes_are_read_by_the_ordinary_path_or_rejected() -> None:
-    data = bytearray(serialize_message(random_message(1, 2)))
+@pytest.mark.parametrize('reader', [poses(), joint_reader(LEGS)])
+def test_big_endian_bytes_are_read_by_the_ordinary_path_or_rejected(reader: RequestReader) -> None:
+    data = bytearray(serialize_message(
+        random_message(1, 2) if reader.message is MultiDOFJointTrajectory else joint_message(1, 2)))
     data[1] = 0
-    assert read_points(bytes(data)) is None
+    with pytest.raises(Rejection):
+        reader.read(bytes(data), 1)
 
 
 @pytest.mark.parametrize('points', [1, 2, 17])
@@ -177,7 +272,7 @@ def test_a_message_cut_off_within_padding_is_noticed() -> None:
     for length in range(len(data)):
         assert not is_whole(data[:length])
         with pytest.raises(Rejection, match=r'^SIZE'):
-            read_serialised(data[:length], 1)
+            poses().read(data[:length], 1)
 
 
 @settings(max_examples=100)
@@ -224,7 +319,6 @@ def test_bytes_are_used_where_rclpy_reads_them_and_objects_where_not(
 ) -> None:
     assert isinstance(serialisation.command_writer(conversions.PAPER), CommandBytes)
     assert isinstance(serialisation.command_writer(RobotNames(('axis',), '')), CommandBytes)
-    assert serialisation.trajectories_have_known_bytes()
     # A middleware whose messages have another length word, and one with another layout of points.
     for name in ('commands', 'joint_state', 'joint_trajectory'):
         with monkeypatch.context() as patch:
@@ -232,8 +326,13 @@ def test_bytes_are_used_where_rclpy_reads_them_and_objects_where_not(
             patch.setattr(CommandBytes, name, lambda *a, known=known: known(*a)[:-8])
             assert isinstance(serialisation.command_writer(conversions.PAPER),
                               serialisation.CommandObjects)
-    monkeypatch.setattr(serialisation, 'read_points', lambda data: None)
-    assert not serialisation.trajectories_have_known_bytes()
+    # A middleware that aligns numbers otherwise.
+    patched = TrajectoryBytes._points
+    monkeypatch.setattr(TrajectoryBytes, '_points', lambda known, data, place, order: patched(
+        known, data[4:], place, order))
+    message = joint_message(2, 1)
+    assert outcome(joint_reader(LEGS).read, serialize_message(message)) == outcome(
+        read_joint_trajectory, message, LEGS)
 
 
 def test_a_node_with_objects_answers_as_one_with_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -242,7 +341,7 @@ def test_a_node_with_objects_answers_as_one_with_bytes(monkeypatch: pytest.Monke
     for known in (True, False):
         if not known:
             monkeypatch.setattr(feedforward, 'command_writer', serialisation.CommandObjects)
-            monkeypatch.setattr(serialisation, 'read_points', lambda data: None)
+            monkeypatch.setattr(TrajectoryBytes, 'read', lambda known, data: None)
         with feedforward_bench() as node:
             answer = node.answer(message)
             assert node.bench.spin_until(lambda: node.joint_command and node.joint_trajectory)

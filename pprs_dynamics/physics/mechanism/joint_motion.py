@@ -65,6 +65,15 @@ class JointMotion:
         MotionError
             For a wrong shape, a non-finite number, or times that do not strictly increase.
         """
+        try:
+            whole = np.array((position, velocity, acceleration), dtype=float)
+        except (TypeError, ValueError):
+            whole = np.empty(0)
+        if whole.ndim == 3 and whole.shape[2] == drives and whole.size and (
+                np.isfinite(whole).all()):
+            q, v, a = whole
+            return cls(q, v, a, checked_times(time, len(q)))
+        # Something is wrong, and is named; or a row stands alone.
         q = checked_matrix('position', position, drives)
         v, a = (checked_matrix(name, values, drives, len(q)) for name, values in (
             ('velocity', velocity), ('acceleration', acceleration)))

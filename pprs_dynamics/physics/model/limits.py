@@ -73,9 +73,8 @@ class DriveLimits(ABC):
         """
         lower, upper = self.strokes
         position = drive_motion[0]
-        return bool(np.isfinite(forces).all() and np.isfinite(drive_motion).all()
-                    and (np.abs(forces) <= self.efforts).all()
-                    and (position >= lower).all() and (position <= upper).all())
+        within = (np.abs(forces) <= self.efforts) & (position >= lower) & (position <= upper)
+        return bool(within.all() and np.isfinite((forces, *drive_motion)).all())
 
     def check_strokes(self, positions: Array) -> None:
         """Raise WorkspaceError for the first drive position, (N, D), outside its stroke."""

@@ -22,7 +22,6 @@ from trajectory_msgs.msg import JointTrajectory
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.samples import Indices
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.ros.messages.conversions import (
     LATEST_SECOND,
     NANOSECONDS,
@@ -32,9 +31,8 @@ from pprs_dynamics.ros.messages.conversions import (
     seconds_and_rest,
     time,
     write_joint_trajectory,
-    write_trajectory,
 )
-from pprs_dynamics.ros.messages.incoming_bytes import read_points, walked
+from pprs_dynamics.ros.messages.incoming_bytes import walked
 from pprs_dynamics.system.cdr import HEADER, STAMP, WORD
 
 SAMPLES = 2  # points after the first have another place than it
@@ -184,18 +182,3 @@ def command_writer(names: RobotNames) -> CommandBytes | CommandObjects:
     except (struct.error, IndexError, ValueError, RuntimeError):  # the last: base of rclpy's own
         return objects
     return written if agree else objects
-
-
-def trajectories_have_known_bytes() -> bool:
-    """Return whether `read_points` finds in rclpy's bytes what was written."""
-    rows = np.arange(SAMPLES * 18, dtype=float).reshape(6, SAMPLES, 3) / 7
-    motion = PlatformMotion(rows[0], np.tile([0.0, 0.0, 0.6, 0.8], (SAMPLES, 1)), *rows[2:])
-    expected = np.concatenate((motion.position, motion.orientation, *rows[2:]), axis=1)
-    for count in (1, SAMPLES):
-        offsets = [k * 1_500_000_000 for k in range(count)]
-        found = read_points(bytes(serialize_message(
-            write_trajectory(motion[:count], time(MOMENT), offsets))))
-        if found is None or found[0] != MOMENT or found[2].tolist() != offsets or (
-                found[1].tolist() != expected[:count].tolist()):
-            return False
-    return True

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from builtin_interfaces.msg import Time
 from trajectory_msgs.msg import (
     JointTrajectory,
     MultiDOFJointTrajectory,
@@ -30,10 +32,12 @@ from pprs_dynamics.ros.messages.conversions import (
     PLATFORM,
     RobotNames,
     nanoseconds,
+    write_joint_trajectory,
+    write_trajectory,
 )
-from pprs_dynamics.ros.messages.incoming_bytes import message_in, read_points
-from pprs_dynamics.ros.messages.serialisation import trajectories_have_known_bytes
+from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
+from pprs_dynamics.ros.messages.trajectory_bytes import TrajectoryBytes
 
 TRAJECTORY, POSES = '~/trajectory', '~/pose_trajectory'
 REJECT, SPLINE = 'reject', 'spline'
@@ -125,18 +129,6 @@ class Timing(NamedTuple):
         if now and self.max_ahead and ahead > self.max_ahead:
             raise Rejection('TIME', f'the first point is due {ahead:.3f} s from now, and would be '
                             f'executed at once; max_ahead allows {self.max_ahead:g} s')
-
-
-def read_serialised(
-    data: bytes, now: int, missing: str = REJECT, frame: str = BASE,
-) -> TrajectoryRequest:
-    """Return what the bytes of a message ask for; see `read_trajectory`."""
-    # The layout of the bytes is known for the frame's own name and for none.
-    points = read_points(data) if frame == BASE else None
-    if points is not None:
-        stamp, numbers, offsets = points
-        return _request_of(stamp or now, offsets, _motion_of(numbers))
-    return read_trajectory(message_in(data, MultiDOFJointTrajectory), now, missing, frame)
 
 
 def read_trajectory(
@@ -294,28 +286,58 @@ def read_joint_trajectory(
     order = [names.index(joint) for joint in joints]
     numbers = np.array([[point.positions, point.velocities or none, point.accelerations or none]
                         for point in points], dtype=float)[:, :, order].reshape(len(points), -1)
-    position, velocity, acceleration = (
-        slice(k * count, (k + 1) * count) for k in range(3))
     if lacking.any():
-        _fill_in(numbers, (velocity, acceleration), position_spline_derivatives(
-            (offsets - offsets[0]) / NANOSECONDS, numbers[:, position]), lacking)
-    return _request_of(start, offsets, lambda time: JointMotion.checked(
-        numbers[:, position], numbers[:, velocity], numbers[:, acceleration], time, count))
+        _fill_in(numbers, (slice(count, 2 * count), slice(2 * count, 3 * count)),
+                 position_spline_derivatives((offsets - offsets[0]) / NANOSECONDS,
+                                             numbers[:, :count]), lacking)
+    return _request_of(start, offsets, _joint_motion_of(count, numbers))
 
 
-class RequestReader(NamedTuple):
-    """How requests arrive.
+class RequestReader:
+    """How requests arrive, as bytes.
+
+    What begins like one that was read before is read without message objects.
 
     Parameters
     ----------
     message : type
-    read : callable
-        Bytes, time of arrival [ns] and what to do about missing derivatives -> TrajectoryRequest;
+    read_message : callable
+        Message, time of arrival [ns] and what to do about missing derivatives -> TrajectoryRequest;
         see `read_trajectory`.
+    known : TrajectoryBytes
+    motion : callable
+        Numbers of points (N, K) -> their times [s] -> motion.
+    order : callable, optional
+        Message -> order of its numbers, see `TrajectoryBytes.learn`.
     """
 
-    message: type
-    read: Callable[[bytes, int, str], TrajectoryRequest]
+    def __init__(self, message: type, read_message: Callable[..., TrajectoryRequest],
+                 known: TrajectoryBytes, motion: Callable[[Array], Callable[[Array], Motion]],
+                 order: Callable[[Any], Indices | None] = lambda message: None) -> None:
+        self.message, self._read_message, self._known = message, read_message, known
+        self._motion, self._order = motion, order
+
+    def read(self, data: bytes, now: int, missing: str = REJECT) -> TrajectoryRequest:
+        """Return what the bytes of a message ask for.
+
+        Parameters
+        ----------
+        data : bytes
+        now, missing
+            See `read_trajectory`.
+
+        Raises
+        ------
+        Rejection, MotionError
+            For a message that breaks a rule.
+        """
+        points = self._known.read(data)
+        if points is not None:
+            return _request_of(points.stamp or now, points.offsets, self._motion(points.numbers))
+        message = message_in(data, self.message)
+        request = self._read_message(message, now, missing)
+        self._known.learn(data, self._order(message))
+        return request
 
 
 def readers_for(model: ForceModel, names: RobotNames | None = None) -> dict[str, RequestReader]:
@@ -337,15 +359,57 @@ def readers_for(model: ForceModel, names: RobotNames | None = None) -> dict[str,
 
 def reader_for(model: ForceModel, names: RobotNames | None = None) -> RequestReader:
     """Return how trajectories for a model arrive, by the names of its robot."""
-    joints, frame = names or RobotNames.of(model)
-    if model.moves_joints:
-        return RequestReader(JointTrajectory, lambda data, *rules: read_joint_trajectory(
-            message_in(data, JointTrajectory), joints, *rules))
-    if trajectories_have_known_bytes():
-        return RequestReader(MultiDOFJointTrajectory, partial(read_serialised, frame=frame))
-    return _poses(frame, PLATFORM)
+    names = names or RobotNames.of(model)
+    return joint_reader(names.joints) if model.moves_joints else _poses(names.frame, PLATFORM)
 
 
 def _poses(frame: str, body: str) -> RequestReader:
-    return RequestReader(MultiDOFJointTrajectory, lambda data, now, missing: read_trajectory(
-        message_in(data, MultiDOFJointTrajectory), now, missing, frame, body))
+    known = TrajectoryBytes((1, 1, 1), (7, 6, 6))
+    numbers = np.arange(2.0 * 19).reshape(2, 19) / 7
+    numbers[:, 3:7] = 0.0, 0.0, 0.6, 0.8
+    for named in ('', frame):
+        known.expect(numbers, partial(_written_poses, named, body))
+    return RequestReader(
+        MultiDOFJointTrajectory,
+        lambda message, now, missing: read_trajectory(message, now, missing, frame, body),
+        known, _motion_of)
+
+
+def _written_poses(frame: str, body: str, numbers: Array, offsets: Sequence[int],
+                   ) -> MultiDOFJointTrajectory:
+    motion = PlatformMotion(*(
+        numbers[:, start:end] for start, end in pairwise((0, 3, 7, 10, 13, 16, 19))))
+    message = write_trajectory(motion, Time(), offsets, frame)
+    message.joint_names = [body]
+    return message
+
+
+def joint_reader(joints: Sequence[str]) -> RequestReader:
+    """Return how joint trajectories arrive, for joints in the model's order."""
+    count, names = len(joints), RobotNames(tuple(joints), '')
+    known = TrajectoryBytes((count,) * 3, (count,) * 3, empty=1)  # without efforts
+    known.expect(
+        np.arange(6.0 * count).reshape(2, -1) / 7,
+        lambda numbers, offsets: write_joint_trajectory(
+            JointMotion(*_joint_fields(count, numbers)), Time(), offsets, names))
+
+    def order(message: JointTrajectory) -> Indices | None:
+        given = list(message.joint_names)
+        if given == list(joints):
+            return None
+        places = np.array([given.index(joint) for joint in joints])
+        return np.concatenate([places + k * count for k in range(3)])
+
+    return RequestReader(
+        JointTrajectory,
+        lambda message, now, missing: read_joint_trajectory(message, joints, now, missing),
+        known, partial(_joint_motion_of, count), order)
+
+
+def _joint_motion_of(count: int, numbers: Array) -> Callable[[Array], Motion]:
+    return lambda time: JointMotion.checked(*_joint_fields(count, numbers), time, count)
+
+
+def _joint_fields(count: int, numbers: Array) -> tuple[Array, Array, Array]:
+    """Return positions, velocities and accelerations, (N, count) each."""
+    return numbers[:, :count], numbers[:, count:2 * count], numbers[:, 2 * count:]
