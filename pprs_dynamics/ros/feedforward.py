@@ -46,6 +46,7 @@ from pprs_dynamics.ros.node.provenance import files_given, hardware_of
 from pprs_dynamics.ros.node.qos import SETPOINTS, publisher, subscription
 from pprs_dynamics.ros.node.senders import PASSED_OVER, Senders, publishers_of
 from pprs_dynamics.ros.node.status import Durations, StatusReporter
+from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 
 try:
     from control_msgs.msg import JointTrajectoryControllerState
@@ -68,6 +69,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
     def __init__(self, **options: Any) -> None:
         ManagedNode.__init__(
             self, 'feedforward', allow_undeclared_parameters=True, **options)
+        self._log = ThrottledLog(self)
         self._publishers_made: list[Any] = []
         self._parts: dict[str, Any] = {}
         self._current: Any = None
@@ -302,7 +304,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             self._counters['stale'] += 1
             text = f'{text}; {self._do_timeout_action(left)}'
         self._status.report('ERROR', rejection.code, text)
-        self.get_logger().warning(f'rejected, {rejection.code}: {text}', throttle_duration_sec=1.0)
+        self._log.warning('rejected', f'rejected, {rejection.code}: {text}')
 
     # --- stale commands -------------------------------------------------------------------------
 
@@ -319,7 +321,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._counters['stale'] += 1
         text = f'no valid trajectory for {node_values["command_timeout"]:g} s: {done}'
         self._status.report('STALE', 'STALE', text)
-        self.get_logger().warning(text, throttle_duration_sec=1.0)
+        self._log.warning('stale', text)
 
     def _last_word(self) -> None:
         """Do the timeout's action now where a command is in force, and see it off."""

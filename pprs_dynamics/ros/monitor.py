@@ -50,6 +50,7 @@ from pprs_dynamics.ros.node.qos import (
     subscription,
 )
 from pprs_dynamics.ros.node.status import StatusReporter
+from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 from pprs_dynamics.system.plain_text import for_json
 
 try:
@@ -90,6 +91,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
 
     def __init__(self, **options: Any) -> None:
         ManagedNode.__init__(self, 'monitor', allow_undeclared_parameters=True, **options)
+        self._log = ThrottledLog(self)
         self._worker = DiagnosisWorker()
         self._input: Any = None
         self._publishers_made: list[Any] = []
@@ -203,7 +205,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         try:
             found = self._joints.at(self._settings.model, position)
         except PprsError as error:
-            self.get_logger().warning(f'not drawn: {error}', throttle_duration_sec=5.0)
+            self._log.warning('not drawn', f'not drawn: {error}', 5.0)
             return
         if found is None:
             return
@@ -324,4 +326,4 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
     def _reject(self, rejection: Rejection) -> None:
         self._counters[rejection.code] += 1
         self._status.report('ERROR', rejection.code, rejection.text)
-        self.get_logger().warning(f'rejected, {rejection}', throttle_duration_sec=1.0)
+        self._log.warning('rejected', f'rejected, {rejection}')

@@ -35,6 +35,7 @@ from pprs_dynamics.ros.node.parameters import (
     refuse_unknown,
 )
 from pprs_dynamics.ros.node.qos import publisher
+from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 from pprs_dynamics.ros.run_node import Finished
 from pprs_dynamics.simulation.arm_run import draw_motion
 
@@ -78,6 +79,7 @@ class PlayTrajectoryNode(Node):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('play_trajectory', **options)
+        self._log = ThrottledLog(self)
         joints = is_mechanism(overrides(self))
         values = declare_node_parameters(self, OF_JOINTS if joints else PARAMETERS)
         self._rate, self._points, self._repeat = values['rate'], values['points'], values['repeat']
@@ -126,7 +128,7 @@ class PlayTrajectoryNode(Node):
 
     def _look_at_clock(self) -> None:
         if clock_is_missing(self):
-            self.get_logger().warning(MISSING_CLOCK, throttle_duration_sec=5.0)
+            self._log.warning('clock', MISSING_CLOCK, 5.0)
 
 
 class Beats:

@@ -37,6 +37,7 @@ from pprs_dynamics.ros.node.parameters import (
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.status import StatusReporter
+from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect
@@ -93,6 +94,7 @@ class SimulatedRobotNode(ExplainsRefusals):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('simulated_robot', allow_undeclared_parameters=True, **options)
+        self._log = ThrottledLog(self)
         of_joints = is_mechanism(overrides(self))
         node_values = declare_node_parameters(self, OF_JOINTS if of_joints else PARAMETERS)
         declare_model(self)
@@ -161,7 +163,7 @@ class SimulatedRobotNode(ExplainsRefusals):
             self._status.report('OK', 'OK', 'following commands')
         for note in robot.notes:
             self._status.report('WARN' if note.code == 'HOLD' else 'ERROR', note.code, note.message)
-            self.get_logger().warning(f'{note.code}: {note.message}', throttle_duration_sec=1.0)
+            self._log.warning('note', f'{note.code}: {note.message}')
         robot.notes.clear()
 
     def _on_command(self, take: Callable[[bytes], None], data: bytes) -> None:
@@ -172,7 +174,7 @@ class SimulatedRobotNode(ExplainsRefusals):
             self._counters['refused'] += 1
             reason = f'a command was refused: {error}'
             self._status.report('ERROR', 'REFUSED', reason)
-            self.get_logger().warning(reason, throttle_duration_sec=1.0)
+            self._log.warning('refused', reason)
 
     def _take_setpoint(self, data: bytes) -> None:
         message = message_in(data, JointState)

@@ -49,6 +49,7 @@ from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.senders import publishers_of
 from pprs_dynamics.ros.node.status import StatusReporter
+from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 
 # Of the feedforward node's parameters, those that say what may go out.
 SHARED = ('feedforward_scale', 'effort_limits', 'limit_policy', 'missing_derivatives')
@@ -73,6 +74,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
 
     def __init__(self, **options: Any) -> None:
         super().__init__('trajectory_proxy', allow_undeclared_parameters=True, **options)
+        self._log = ThrottledLog(self)
         # Planners may leave derivatives out; feedforward, whose messages are short, refuses that.
         parameters = (ACTION, TIMEOUT, *(
             replace(one, default=SPLINE) if one.name == 'missing_derivatives' else one
@@ -183,7 +185,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
     def _refused(self, handle: Any, status: Code, text: str, code: int) -> Any:
         self._counters['refused'] += 1
         self._status.report('ERROR', status, text)
-        self.get_logger().warning(f'refused, {status}: {text}', throttle_duration_sec=1.0)
+        self._log.warning('refused', f'refused, {status}: {text}')
         handle.abort()
         return Result(error_code=code, error_string=f'{status}: {text}')
 
