@@ -24,7 +24,8 @@ from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun, adopt_all
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel

@@ -25,7 +25,8 @@ import numpy as np
 
 from benchmarks.hidden.motions import joint_motion
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion

@@ -34,7 +34,8 @@ from benchmarks import OUTPUT
 from benchmarks.scores.arms import judge
 from benchmarks.scores.cases import Outcome, here, read_outcomes, run_missing
 from pprs_dynamics.arrays import Array, root_mean_square
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion

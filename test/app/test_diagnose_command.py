@@ -85,7 +85,7 @@ def test_the_hidden_effect_is_named_with_its_drives_and_its_size(
 
 def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> None:
     promised = {'verdict', 'effects', 'indistinguishable', 'candidates', 'depends_on', 'suspects'}
-    added = {'above_noise', 'barred', 'calibrated', 'effort_looks_like', 'explained',
+    added = {'above_noise', 'barred', 'calibrated', 'detectable', 'effort_looks_like', 'explained',
              'explained_after', 'held_out_on', 'little_explained', 'noise_floor',
              'noise_floors', 'reference', 'changed_since', 'sets', 'stick_slip', 'unconfirmed',
              'warnings'}

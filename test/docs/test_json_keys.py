@@ -22,7 +22,7 @@ from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun
 from pprs_dynamics.inference.diagnosis.changed_number import ChangedNumber
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect, RankedEffect, RankedSet
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.fit.base_fit import BaseFit, FittedNumber, Refit

@@ -15,7 +15,8 @@ from scipy.signal import butter, lfilter, lfilter_zi
 from benchmarks.hidden.recordings import Case, make_case
 from pprs_dynamics import DriveModel, simulate
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.experiments.fourier_path import FourierPath
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design

@@ -11,7 +11,8 @@ import numpy as np
 from made_up_arm import motion, real_arm, record
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 
 NOISE = 0.2  # [N m] of a sample
 SWING, VISCOUS = 1, 15.0  # [N m s/rad]

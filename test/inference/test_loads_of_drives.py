@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import MechanismModel
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, next_step
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion

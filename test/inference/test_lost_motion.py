@@ -16,7 +16,8 @@ from planar_arm import planar_arm
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import UnknownNameError
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.lost_motion import LostMotion, behind_play

@@ -20,7 +20,8 @@ from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import MisreadError, ModelError, UnreadableFileError
 from pprs_dynamics.inference.fit.reference import Reference, ReferenceRunError
 from pprs_dynamics.inference.fit.reference_runs import read_reference
-from pprs_dynamics.inference.regression.design import CarriedOver, Design
+from pprs_dynamics.inference.regression.carried_over import CarriedOver
+from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording, write_recording

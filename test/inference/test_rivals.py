@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import MechanismModel
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose, rival_effects
+from pprs_dynamics.inference.diagnosis.answer import rival_effects
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.quantities import in_unit
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.measurement.files.recording import Recording

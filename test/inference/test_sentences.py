@@ -32,7 +32,7 @@ from pprs_dynamics.app.report.diagnosis_figures import unknown_picture
 from pprs_dynamics.app.report.diagnosis_report import diagnosis_page, diagnosis_view
 from pprs_dynamics.app.report.terminal import as_text
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import RankedSet, RivalEffect
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
 from pprs_dynamics.inference.diagnosis.partial_errors import error_steps, partial_residual

@@ -18,7 +18,8 @@ import pytest
 
 from benchmarks.hidden.recordings import tolerant_model
 from pprs_dynamics import DriveModel, JointMotion, MechanismModel
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model

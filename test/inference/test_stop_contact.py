@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
 
 SWING = 1

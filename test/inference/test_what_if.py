@@ -18,7 +18,8 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.diagnosis.what_if import what_if
 from pprs_dynamics.inference.regression.joint_fit import JointFit

@@ -100,6 +100,10 @@ class Relayed:
         assert self._running.spin_until(result.done, within)
         return result.result().status, list(result.result().result.sequence)
 
+    def counted_to(self, last: int) -> bool:
+        """Return whether feedback came in order; the result may overtake the last of it."""
+        return self.feedback in (list(range(1, last)), list(range(1, last + 1)))
+
     def spin_until(self, predicate: Callable[[], Any]) -> None:
         assert self._running.spin_until(predicate)
 
@@ -116,7 +120,7 @@ def relayed(ros_domain: int, tmp_path: Path) -> Iterator[Relayed]:
 def test_feedback_result_and_refusal_pass_through(relayed: Relayed) -> None:
     relayed.controller()
     assert relayed.answer(relayed.goal(5), 5) == (SUCCEEDED, [5])
-    assert relayed.feedback == [1, 2, 3, 4, 5]
+    assert relayed.counted_to(5)
     assert relayed.answer(relayed.goal(-1), 5) == (ABORTED, [])
     assert relayed.node.said == ['the controller rejected the goal; its log says why']
 
@@ -154,7 +158,7 @@ def test_a_controller_that_goes_in_the_middle_ends_the_goal(
         relayed.controller()
     relayed.feedback.clear()
     assert relayed.answer(relayed.goal(3), 5) == (SUCCEEDED, [3]), relayed.node.said
-    assert relayed.feedback == [1, 2, 3]
+    assert relayed.counted_to(3)
 
 
 def test_without_feedback_the_end_of_the_motion_is_waited_for(relayed: Relayed) -> None:

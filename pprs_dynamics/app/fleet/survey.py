@@ -29,7 +29,8 @@ from pprs_dynamics.app.fleet.store import AUTO, OWN, key_of
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.fit.reference_runs import read_reference
 from pprs_dynamics.inference.residuals.conventions import find_mistakes

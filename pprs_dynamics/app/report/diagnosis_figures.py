@@ -22,7 +22,7 @@ from pprs_dynamics.app.report.comparison_figures import (
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.fit_curve import CurveRequest, curve_variable
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import FittedEffect
 from pprs_dynamics.inference.diagnosis.partial_errors import partial_residual, remaining_residuals
 from pprs_dynamics.inference.diagnosis.statements import Statement

@@ -17,7 +17,7 @@ from pprs_dynamics.app.report import diagnosis_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import escape, stacked, text_table, verdict_panel
 from pprs_dynamics.app.report.what_if_part import add_what_if
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import RivalEffect
 from pprs_dynamics.inference.diagnosis.partial_errors import ErrorStep, error_steps
 from pprs_dynamics.inference.diagnosis.quantities import (
@@ -31,10 +31,12 @@ from pprs_dynamics.inference.diagnosis.sentences import (
     Finding,
     FittedValue,
     Sentences,
+    detectable_rows,
     fitted_values,
     runner_up,
     set_rows,
     unexplained_groups,
+    word_detectable,
 )
 from pprs_dynamics.inference.diagnosis.what_if import WhatIf
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -46,6 +48,8 @@ LONGEST = 400  # characters of rows, values and the runner-up without --details:
 MOST_EFFECTS = 4  # that are shown without --details
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
 ELSEWHERE = '[dim]Why, how to confirm it, and all values: --details, or --report FILE.html[/]'
+LEGEND = '[dim]Of costs, fit: to the recording; coefficients: sizes; all else: what was chosen[/]'
+SEEN = 'What else would have been seen, each alone'
 METHOD = (
     'Model and measured effort get the same treatment; every effect of the catalogue, in every '
     'shape tried and on every drive, is a column of one regression beside the model\'s own numbers '
@@ -93,6 +97,9 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
             yield f'  … values of {len(lines) - len(shown)} more: --details'
     if second:
         yield f'[bold]Runner-up[/] {escape(second)}'
+        yield LEGEND
+    if diagnosis.verdict == 'adequate' and (seen := word_detectable(diagnosis)):
+        yield escape(seen)
     if words.within_model_error:
         yield ('May be left by the forms of what was found, no finding: '
                f'{escape(_within_model_error(diagnosis))}')
@@ -139,11 +146,14 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
         yield _table('The best sets of effects, and their costs above the best',
                      ('cost', 'set', 'of which'),
                      [(cost, escape(text), why) for text, cost, why in set_rows(diagnosis)])
+        yield LEGEND
     if diagnosis.candidates:
         yield _table('Each effect alone', (
             'effect', 'on', 'evidence', f'error after [{diagnosis.residuals.unit}]'), [
             (one.name, sites(one.drives, diagnosis), f'{one.evidence:.0f}',
              f'{one.error_after:.3f}') for one in diagnosis.candidates], right=(2, 3))
+    if rows := detectable_rows(diagnosis):
+        yield _table(SEEN, ('effect', 'size'), [tuple(map(escape, row)) for row in rows])
     yield from _list('Within their tolerance', words.calibrated, 'blue')
     yield from _list('Suspects', words.suspects, 'yellow')
     yield from _list('Within model error', words.within_model_error, 'blue')
@@ -257,6 +267,11 @@ def diagnosis_page(
         add_what_if(page, system, diagnosis.residuals)
     _findings(page, diagnosis, words, rivals)
     _sets(page, diagnosis)
+    if rows := detectable_rows(diagnosis):
+        with page.fold(SEEN):
+            page.text('The size from which on each effect alone would have cost 10 less than the '
+                      'answer, at the noise of these recordings.', 'note')
+            page.table(('effect', 'size'), rows)
     _contributions(page, diagnosis, steps)
     _parameters(page, diagnosis, words)
     figures.add_every_drive(page, diagnosis.residuals, after, diagnosis.noise_floors,

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.experiments.next_experiment import next_experiment
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.measurement.files.recording import Recording

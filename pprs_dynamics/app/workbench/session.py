@@ -29,7 +29,7 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt, original
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.quantities import word_little
 from pprs_dynamics.inference.diagnosis.sentences import word_reference
 from pprs_dynamics.inference.experiments.next_experiment import check_duration

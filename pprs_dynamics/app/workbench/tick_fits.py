@@ -17,7 +17,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.adoption.adopt import original
-from pprs_dynamics.inference.diagnosis.diagnose import SinceReference
+from pprs_dynamics.inference.diagnosis.diagnosis import SinceReference
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.normal_equations import Block

@@ -27,7 +27,8 @@ from pprs_dynamics.inference.adoption.fit_curve import (
 )
 from pprs_dynamics.inference.adoption.fit_effect import StandingError, fit_effect
 from pprs_dynamics.inference.adoption.request import EffectRequest, EffectRequestError
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum

@@ -13,7 +13,8 @@ import numpy as np
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
-from pprs_dynamics.inference.regression.design import CarriedOver, Design
+from pprs_dynamics.inference.regression.carried_over import CarriedOver
+from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.paired_errors import PairedGain
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions

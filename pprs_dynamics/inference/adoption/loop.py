@@ -12,7 +12,8 @@ from typing import Any
 from pprs_dynamics.inference.adoption.adopt import adopt, original
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, diagnose
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.search.decisions import DECISIONS

@@ -12,7 +12,7 @@ import numpy as np
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.inference.adoption.fit_effect import SURE, EffectFit
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.quantities import as_fitted, with_uncertainty
 from pprs_dynamics.inference.residuals.paired_errors import PairedGain
 from pprs_dynamics.inference.residuals.residuals import Residuals

@@ -66,7 +66,7 @@ def _second_encoders(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterat
     """Look for second encoders that tell of a wind-up or a clearance which efforts do not."""
     design, windups = fits.design, fits.components.windups
     told = {(effect.name, name) for effect in effects for name in effect.drives or ()}
-    for d, clearance in design.clearances.items():
+    for d, clearance in design.second_encoders.clearances.items():
         name, units = design.drives[d], design.given.units[d]
         where = f'the link of {name} is not where its motor is: by its second encoder '
         unseen = 'which changes the efforts by less than can be told'

@@ -18,7 +18,7 @@ from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
-    from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+    from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
     from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
     from pprs_dynamics.physics.model.force_model import ForceModel
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import FittedEffect, RivalEffect
 from pprs_dynamics.inference.diagnosis.statements import UNITS
 from pprs_dynamics.inference.residuals.bins import bin_edges, bin_of

@@ -23,11 +23,7 @@ COUNTS = ('no', 'one', 'two', 'three', 'four', 'five', 'six')
 
 def with_uncertainty(value: float, std: float, unit: str, size: float | None = None) -> str:
     """Return a value with ± two standard deviations, in a unit that fits its size or another."""
-    below, factor, name = READ_IN.get(unit, (0.0, 1.0, unit))
-    if abs(value if size is None else size) >= below:
-        factor, name = 1.0, unit
-    name = PRINTED.get(name, name)
-    name = name if name in ('', '°') else f' {name}'
+    factor, name = _fitting_unit(abs(value if size is None else size), unit)
     value, spread = value * factor, INTERVAL * std * factor
     if not isfinite(spread):
         return f'{plain(value)}{name} (not determined)'
@@ -36,6 +32,21 @@ def with_uncertainty(value: float, std: float, unit: str, size: float | None = N
     decimals = 1 - floor(log10(spread))
     digits = max(decimals, 0)
     return f'{round(value, decimals):.{digits}f} ± {round(spread, decimals):.{digits}f}{name}'
+
+
+def in_fitting_unit(values: Sequence[float], unit: str, digits: int = 2) -> str:
+    """Return 'a' or 'a to b' of sizes with so many digits, in a unit that fits the largest."""
+    factor, name = _fitting_unit(max(values), unit)
+    return ' to '.join(dict.fromkeys(plain(value * factor, digits) for value in values)) + name
+
+
+def _fitting_unit(size: float, unit: str) -> tuple[float, str]:
+    """Return the unit in which a quantity of a size is read, as it is printed, and its factor."""
+    below, factor, name = READ_IN.get(unit, (0.0, 1.0, unit))
+    if size >= below:
+        factor, name = 1.0, unit
+    name = PRINTED.get(name, name)
+    return factor, name if name in ('', '°') else f' {name}'
 
 
 def as_fitted(value: float, std: float, unit: str, scale: float, size: float | None = None,

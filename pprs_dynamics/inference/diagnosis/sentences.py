@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import isnan
 
 from pprs_dynamics.arrays import root_mean_square
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis, SinceReference
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
 from pprs_dynamics.inference.diagnosis.found_effects import (
     FittedEffect,
     FoundEffect,
@@ -24,6 +24,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     INTERVAL,
     as_fitted,
     change,
+    in_fitting_unit,
     in_unit,
     listed,
     percent,
@@ -51,6 +52,8 @@ MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
 TOLD_COST = 0.05  # of a term of a cost, that one digit shows
 VAGUE = 0.1  # of a mass, an uncertainty beyond which its first moment is told as well, if surer
 MOSTLY = 0.95  # of a recording, from which on a reference knows its states
+# Of which one line says what would have been seen.
+COMMON = ('payload_mass', 'coulomb_friction', 'viscous_friction')
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
 
 
@@ -180,6 +183,22 @@ def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     """Return the best sets of effects in words, each with its cost above the best, and of what."""
     return [(_set(diagnosis, fitted), f'{fitted.cost:+.1f}' if number else 'the best',
              word_terms(fitted.terms)) for number, fitted in enumerate(diagnosis.sets)]
+
+
+def detectable_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+    """Return from which size on other effects would have been told, on any drive or joint."""
+    rows: dict[tuple[type[CatalogueEffect], Parameter, str], list[float]] = {}
+    for one in diagnosis.detectable:
+        rows.setdefault((one.effect, one.parameter, one.unit), []).append(one.size)
+    return [(effect.name, (f'{parameter.name} ' if len(effect.linear) > 1 else '')
+             + in_fitting_unit((min(sizes), max(sizes)), unit))
+            for (effect, parameter, unit), sizes in rows.items()]
+
+
+def word_detectable(diagnosis: Diagnosis) -> str:
+    """Return the same of some common effects as one sentence; '' for none."""
+    told = [f'{name} from {size}' for name, size in detectable_rows(diagnosis) if name in COMMON]
+    return f'Would have been seen, each alone: {", ".join(told)}' if told else ''
 
 
 def _set(diagnosis: Diagnosis, found: RankedSet) -> str:

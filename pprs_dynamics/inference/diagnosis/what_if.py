@@ -19,7 +19,7 @@ from math import inf
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.diagnosis.diagnose import Diagnosis
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.regression.normal_equations import (
     Block,
     DriveEquations,

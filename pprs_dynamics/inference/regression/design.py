@@ -19,7 +19,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy import fft
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import (
@@ -32,10 +31,13 @@ from pprs_dynamics.inference.regression.base_columns import (
     present_columns,
     present_values,
 )
+from pprs_dynamics.inference.regression.carried_over import CarriedOver
 from pprs_dynamics.inference.regression.collecting import (
     ColumnCollector,
     stacked_columns,
 )
+from pprs_dynamics.inference.regression.drive_ranges import drive_range
+from pprs_dynamics.inference.regression.second_encoders import SecondEncoders
 from pprs_dynamics.inference.regression.sensitivities import (
     BARE,
     HOMING,
@@ -47,7 +49,6 @@ from pprs_dynamics.inference.regression.sensitivities import (
     Sensitivities,
 )
 from pprs_dynamics.inference.regression.terms import FullRate, OperatingPoint, Term
-from pprs_dynamics.inference.residuals.bands import OpenForces
 from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
 from pprs_dynamics.inference.residuals.reconstruction import (
     Reconstruction,
@@ -60,17 +61,14 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import (
-    Clearance,
     DriveEffect,
     DriveRange,
     DriveSamples,
     GainEffect,
     MeasurementEffect,
-    Windup,
 )
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
-from pprs_dynamics.physics.effects.laws.elastic_joint import told_by_windup
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -79,66 +77,13 @@ from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 
 SHARE = 0.1  # of what a model has of an effect that shifts positions, for derivatives
 SIZES = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # of what it usually is, that are tried where none is
-MOVED = 1e-4  # [m, rad], for derivatives of what is carried over by positions
 SHAPE_STEP = 1e-3  # amount of movement, for derivatives by shape parameters
-LONGEST_DELAY = 0.3  # [s], that a recording may show at once
 # By how many of its standard deviations a number of an effect may have been fitted wrong as long as
 # another effect was missing.
 LEANING = 10.0
 # A drive hardly moves whose speed is seldom beyond the width in which the model's friction turns
 # over, times the first: in less than the second of the time.
 TURNED, LEAST_MOVING = 2.0, 0.05
-
-
-@dataclass(frozen=True)
-class CarriedOver:
-    """What a reference run says of recordings; see `pprs_dynamics.inference.fit.reference`.
-
-    Parameters
-    ----------
-    of_base : (M, D) array
-        Forces that the model lacks there as well by the numbers of its base [N].
-    repeating : callable
-        Gives those that no number explains, (N, D), of positions and velocities (N, D) and the
-        time over which they are means [s].
-    directions : tuple of ReferenceDirection
-        In which they are uncertain most.
-    open_forces : mapping of drive to OpenForces
-        In which they are uncertain beyond.
-    covered : float
-        Share of the samples whose states the reference knows.
-    """
-
-    of_base: Array
-    repeating: Callable[[Array, Array, float], Array]
-    directions: tuple[ReferenceDirection, ...]
-    open_forces: Mapping[int, OpenForces]
-    covered: float
-
-    def shown(self, residuals: Residuals) -> Array:
-        """Return the forces that the model lacks there as well, (M, D) [N].
-
-        Of residuals of the same samples, whose positions may be read otherwise.
-        """
-        q, v = (residuals.variables[name] for name in ('position', 'velocity'))
-        return self.of_base + self.repeating(q, v, residuals.period)
-
-    def per_position(self, residuals: Residuals) -> Array:
-        """Return how the forces change with the position of each drive, (D, M, D) [N/m]."""
-        q, v = (residuals.variables[name] for name in ('position', 'velocity'))
-        return np.stack([
-            (self.repeating(q + step, v, residuals.period)
-             - self.repeating(q - step, v, residuals.period)) / (2 * MOVED)
-            for step in MOVED * np.eye(q.shape[1])])
-
-    def at_full_rate(self, recordings: Sequence[FullRate], time: Array) -> list[Array]:
-        """Return the forces at every sample of recordings, (N, D) [N]; `time` (M,) of means."""
-        found, end = [], 0
-        for one in recordings:
-            part = slice(end, end := end + len(one.treat))
-            found.append(self.repeating(one.position, one.velocity, 0.0) + np.stack(
-                [np.interp(one.time, time[part], row) for row in self.of_base[part].T], axis=1))
-        return found
 
 
 @dataclass
@@ -380,46 +325,9 @@ class Design:
         return replace(design, base=tuple(base))
 
     @cached_property
-    def windups(self) -> dict[int, Windup]:
-        """What second encoders tell of drives that wind up under their loads."""
-        found = {}
-        for d, (load, _, windup) in self._second_encoders.items():
-            if np.ptp(load):
-                stiffness, damping, said = told_by_windup(load, windup)
-                if stiffness > 0:
-                    found[d] = Windup(1 / stiffness, damping / stiffness,
-                                      float(np.var(said) / np.var(load)))
-        return found
-
-    @cached_property
-    def clearances(self) -> dict[int, Clearance]:
-        """What second encoders tell of drives that lead their links by one of two distances."""
-        found = {}
-        for d, (load, direction, windup) in self._second_encoders.items():
-            lead = windup[0] - windup[0].mean()
-
-            def clearance(side: Array, of: str, lead: Array = lead) -> Clearance:
-                side = side - side.mean()
-                size = float(side @ lead / max(float(side @ side), 1e-300))
-                left = float(np.var(lead - size * side))
-                return Clearance(2 * size, of, 1 - left / max(float(np.var(lead)), 1e-300))
-
-            found[d] = max(clearance(direction, 'motion'), clearance(np.sign(load), 'load'),
-                           key=lambda one: one.explained)
-        return found
-
-    @cached_property
-    def _second_encoders(self) -> dict[int, tuple[Array, Array, Array]]:
-        """Load, direction and lead with its rates (3, N) of drives with a second encoder."""
-        read = [(one.transmitted, one.direction, found.windup) for one, found in zip(
-            self.recordings, self.reconstructions, strict=False) if found.windup is not None]
-        found = {}
-        for d in range(len(self.drives) if read else 0):
-            load, direction = (np.concatenate([one[k][:, d] for one in read]) for k in (0, 1))
-            windup = np.concatenate([one[:, :, d] for *_, one in read], axis=1)
-            if np.any(windup):
-                found[d] = load, direction, windup
-        return found
+    def second_encoders(self) -> SecondEncoders:
+        """What encoders behind the gears tell of the drives that have one."""
+        return SecondEncoders.of(self.recordings, self.reconstructions)
 
     def moving(self, drive: int) -> np.typing.NDArray[np.bool_]:
         """Return when a drive is in motion, (M,)."""
@@ -433,29 +341,8 @@ class Design:
     @cached_property
     def covered(self) -> tuple[DriveRange, ...]:
         """What each drive did."""
-        return tuple(self._covered(drive) for drive in range(len(self.drives)))
-
-    def _covered(self, drive: int) -> DriveRange:
-        position = np.concatenate([one.position[:, drive] for one in self.recordings])
-        velocity = np.concatenate([one.velocity[:, drive] for one in self.recordings])
-        longest = max(self.recordings, key=lambda recording: len(recording.time))
-        return DriveRange(float(longest.time[-1] - longest.time[0]),
-                          float(np.median(np.diff(longest.time))),
-                          float(np.ptp(position)), float(np.abs(velocity).max()),
-                          self.given.gear_ratios[drive], _delay(longest, drive),
-                          self.given.units[drive].turns,
-                          any(np.any(one.friction_load[:, drive]) for one in self.recordings),
-                          self._channels(drive), float(position.min() + position.max()) / 2)
-
-    def _channels(self, drive: int) -> dict[str, tuple[float, float]]:
-        """Return the ranges of what was measured of a drive beside motion and effort."""
-        found = {}
-        for name in {name for one in self.recordings for name in one.channels}:
-            values = np.concatenate([one.channels[name][:, drive] for one in self.recordings
-                                     if name in one.channels])
-            if np.isfinite(values).any():
-                found[name] = float(np.nanmin(values)), float(np.nanmax(values))
-        return found
+        return tuple(drive_range(self.given, self.recordings, drive)
+                     for drive in range(len(self.drives)))
 
     def acts_on(self, effect: type[CatalogueEffect], drive: int) -> bool:
         """Return whether an effect may be looked for on a drive, there already or not."""
@@ -722,35 +609,6 @@ def searched_in_drives(design: Design) -> list[type[DriveEffect]]:
     """Return the effects on drives that the given model may lack."""
     return [effect for effect in catalogue().values() if issubclass(effect, DriveEffect)
             and any(design.acts_on(effect, d) for d in range(len(design.drives)))]
-
-
-def _delay(recording: FullRate, drive: int) -> float:
-    """Return by how much the measured effort is most like the drive's if that is late [s].
-
-    By the multiple correlation with the model's effort and what a model may lack most of (dry and
-    viscous friction, inertia), over the longest segment, within `LONGEST_DELAY`: a model that
-    explains little is like nothing by itself.
-    """
-    part = max(recording.segments, key=lambda one: one.stop - one.start)
-    time = recording.time[part]
-    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    even = np.arange(time[0], time[-1], step) if step else np.zeros(0)
-    most = min(int(LONGEST_DELAY / step), len(even) // 4) if step else 0
-    measured = recording.effort_measured[part, drive]
-    known = np.isfinite(measured)
-    if not most or not np.any(known):
-        return 0.0
-    seen = np.interp(even, time[known], measured[known])
-    columns = np.stack([np.interp(even, time, values[part, drive]) for values in (
-        recording.effort, recording.velocity, recording.direction, recording.acceleration)])
-    columns -= columns.mean(axis=1, keepdims=True)
-    columns /= np.maximum(np.linalg.norm(columns, axis=1, keepdims=True), 1e-300)
-    size = fft.next_fast_len(len(even) + most, real=True)
-    alike = fft.irfft(fft.rfft(seen - seen.mean(), size) * fft.rfft(columns, size).conj(), size)
-    lags = np.arange(-most, most + 1)
-    explained = np.einsum('kl,km,ml->l', alike[:, lags], np.linalg.pinv(columns @ columns.T),
-                          alike[:, lags])
-    return float(lags[np.argmax(explained)] * step)
 
 
 def _rows(column: Array) -> dict[int, Array]:

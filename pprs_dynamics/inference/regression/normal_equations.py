@@ -129,10 +129,15 @@ class Prior:
             return Posterior(self.mean, gram, 0.0, 0.0)
         b = side - gram @ self.mean
         beyond = np.zeros(len(b))
+        open_prior = gram + self.precision
         for _ in range(MOST_LIMITED):
-            H = gram + self.precision + np.diag(BEYOND_TOLERANCE * np.abs(beyond))
+            H = open_prior + np.diag(BEYOND_TOLERANCE * np.abs(beyond)) if beyond.any() else (
+                open_prior)
             scale = 1 / np.sqrt(np.einsum('ii->i', H))
-            factor, minor = dpotrf(H * np.outer(scale, scale) + 1e-12 * np.eye(len(H)))
+            scales = np.outer(scale, scale)
+            scaled = H * scales
+            np.einsum('ii->i', scaled)[:] += 1e-12
+            factor, minor = dpotrf(scaled)
             if minor:
                 raise np.linalg.LinAlgError(f'minor {minor} of the normal equations is negative')
             away = scale * dpotrs(factor, scale * (
@@ -141,8 +146,10 @@ class Prior:
             if np.array_equal(now, beyond):
                 break
             beyond = now
-        upper = np.triu(dpotri(factor)[0])
-        covariance = (upper + np.triu(upper, 1).T) * np.outer(scale, scale)
+        upper = dpotri(factor)[0]  # 0 below the diagonal, as the factor is
+        covariance = upper + upper.T
+        np.einsum('ii->i', covariance)[:] = np.einsum('ii->i', upper)
+        covariance *= scales
         penalty = float(away @ self.precision @ away + BEYOND_TOLERANCE * np.sum(
             np.abs(beyond) * (np.abs(away) - DEVIATIONS) ** 2))
         log_det = 2 * float(np.log(np.diag(factor)).sum() - np.log(scale).sum())

@@ -268,7 +268,7 @@ class Components:
     @cached_property
     def windups(self) -> dict[int, Windup]:
         """What second encoders tell of the drives whose wind-up follows their load."""
-        return {d: windup for d, windup in self.design.windups.items()
+        return {d: windup for d, windup in self.design.second_encoders.windups.items()
                 if windup.explained > self.prior_costs.decisions.explained}
 
     def _seen(self, component: Component) -> Mapping[str, float]:

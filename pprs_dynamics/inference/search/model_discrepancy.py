@@ -24,11 +24,20 @@ def discrepancy_ratio(design: Design, regression: Regression, decisions: Decisio
                       fitted: CandidateSet, candidate: Candidate,
                       ) -> tuple[float, tuple[str, ...]]:
     """Return a candidate's force beyond the others over what their lack of fit may leave."""
+    drives = {d for block in fitted.blocks_of(candidate) for d in block.rows}
+    allowed, names = lack_of_fit(design, regression, decisions, fitted, candidate, drives)
+    square = beyond_others(regression, fitted, candidate)
+    return float(np.sqrt(square / max(allowed, 1e-300))), names
+
+
+def lack_of_fit(design: Design, regression: Regression, decisions: Decisions,
+                fitted: CandidateSet, candidate: Candidate, drives: set[int],
+                ) -> tuple[float, tuple[str, ...]]:
+    """Return the whitened square that others may leave where a candidate acts, and of which."""
     # Masses, gravity and sensors are exact: nothing else's lack of fit looks like them by much.
     exact = isinstance(candidate, EffectCandidate) and not (
         candidate.effect.idealised or candidate.effect.shows_at_reversals)
     share = decisions.exact_share if exact else decisions.form_share
-    drives = {d for block in fitted.blocks_of(candidate) for d in block.rows}
     allowed, names = 0.0, []
     for other in fitted.effects:
         if other is candidate or not other.effect.idealised:
@@ -48,8 +57,7 @@ def discrepancy_ratio(design: Design, regression: Regression, decisions: Decisio
             design, regression, fitted, drives)
     if own > allowed:
         names = ["the model's own friction"]
-    square = beyond_others(regression, fitted, candidate)
-    return float(np.sqrt(square / max(allowed + own, 1e-300))), tuple(names)
+    return allowed + own, tuple(names)
 
 
 def beyond_others(regression: Regression, fitted: CandidateSet, candidate: Candidate) -> float:

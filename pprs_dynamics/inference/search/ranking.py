@@ -14,7 +14,8 @@ from types import MappingProxyType
 import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
-from pprs_dynamics.inference.regression.design import CarriedOver, Design
+from pprs_dynamics.inference.regression.carried_over import CarriedOver
+from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.absorbed import Absorbed, without_absorbed
 from pprs_dynamics.inference.search.candidates import (
     Candidate,

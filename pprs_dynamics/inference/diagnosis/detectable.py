@@ -1,0 +1,113 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""From which size on an effect that was not found would have been told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import root_mean_square
+from pprs_dynamics.inference.regression.base_columns import units_of
+from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
+from pprs_dynamics.inference.search.components import placed
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.inference.search.model_discrepancy import lack_of_fit
+from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
+
+
+@dataclass(frozen=True)
+class DetectableSize:
+    """The size from which on an effect would have been told, on one drive or in the structure.
+
+    Parameters
+    ----------
+    effect : type of CatalogueEffect
+    drive : str or None
+    parameter : Parameter
+        The one number that it has.
+    size : float
+        Of that.
+    unit : str
+    """
+
+    effect: type[CatalogueEffect]
+    drive: str | None
+    parameter: Parameter
+    size: float
+    unit: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return an entry of `detectable` in the JSON."""
+        return {'name': self.effect.name, 'drive': self.drive, 'parameter': self.parameter.name,
+                'size': self.size, 'unit': self.unit}
+
+
+def detectable_sizes(fits: FittedSets, fitted: CandidateSet) -> tuple[DetectableSize, ...]:
+    """Return from which size on effects of one number would have been told beside a set.
+
+    Each by itself, at the noise of the set, as it stands: where the deviance is expected to fall
+    by the prior cost of the effect, and by as much again as rivals are apart; and where its force
+    is beyond the lack of fit of all else, or stands out of the noise of a drive. For a coefficient
+    c of own information S and prior precision L the deviance falls by
+    (c S)^2 / (S + L) - ln(1 + S / L).
+
+    Parameters
+    ----------
+    fits : FittedSets
+    fitted : CandidateSet
+        Whose effects and those of the given model are left out.
+    """
+    known = {effect.name for effect in fits.design.given.effects} | {
+        candidate.name for candidate in fitted.effects}
+    found = []
+    for component in _of_one_number(fits):
+        if component.effect.name in known:
+            continue
+        block = fits.components.block(component)
+        own = float(fits.regression.own_information(fitted.fit, block)[0, 0])
+        prior = float(block.precision[0, 0])
+        if own <= prior:  # the recordings say less of it than is expected anyway
+            continue
+        candidate = EffectCandidate.of([component])
+        asked = (fits.components.prior_cost(candidate).total
+                 + fits.decisions.rival_margin + np.log1p(own / prior))
+        lack, _ = lack_of_fit(fits.design, fits.regression, fits.decisions, fitted, candidate,
+                              set(block.rows))
+        beyond_forms = min(np.sqrt(lack / own), _standing_out(fits, fitted, block, own))
+        values = component.values(np.array([
+            max(np.sqrt(asked * (own + prior)) / own, beyond_forms)]))
+        parameter = next(p for p in component.effect.linear if values[p.name])
+        drive = None if component.drive is None else fits.design.drives[component.drive]
+        found.append(DetectableSize(
+            component.effect, drive, parameter, abs(values[parameter.name]),
+            units_of(fits.design.given, component.drive).of(parameter.unit)))
+    return tuple(found)
+
+
+def _standing_out(fits: FittedSets, fitted: CandidateSet, block: Block, own: float) -> float:
+    """Return the coefficient with which what is left of a drive stands out of its noise."""
+    regression = fits.regression
+    share = own / sum(float(rows[0] ** 2 @ regression.series[d].spread(
+        regression.weights(fitted.fit, d))) for d, rows in block.rows.items())
+    sizes = [root_mean_square(rows) / max(regression.noise_floor(fitted.fit, d), 1e-300)
+             for d, rows in block.rows.items()]
+    return float(np.sqrt((fits.decisions.left_ratio ** 2 - 1) / share)) / max(sizes)
+
+
+def _of_one_number(fits: FittedSets) -> Iterator[Component]:
+    """Yield the effects that have a number and no shape, on each drive that they may be on."""
+    components = fits.components
+    yield from (one for one in (*components.structure, *components.spanning)
+                if len(one.names) == 1 and not one.shape and not (
+                    issubclass(one.effect, MeasurementEffect) and one.effect.not_linear_in))
+    for d, local in components.local.items():
+        for effect in local.effects:
+            if not effect.shape and len(effect.variants) == len(effect.variants[0]) == 1:
+                yield placed(fits.design, effect, d, {}, effect.variants[0])

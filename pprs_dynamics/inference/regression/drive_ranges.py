@@ -1,0 +1,73 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What drives did in recordings: strokes, speeds, delays, and what was measured beside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import fft
+
+from pprs_dynamics.inference.regression.terms import FullRate
+from pprs_dynamics.physics.effects.drive_effect import (
+    DriveRange,
+)
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+LONGEST_DELAY = 0.3  # [s], that a recording may show at once
+
+
+def drive_range(model: ForceModel, recordings: Sequence[FullRate], drive: int) -> DriveRange:
+    """Return what a drive of a model did in recordings."""
+    position = np.concatenate([one.position[:, drive] for one in recordings])
+    velocity = np.concatenate([one.velocity[:, drive] for one in recordings])
+    longest = max(recordings, key=lambda recording: len(recording.time))
+    return DriveRange(float(longest.time[-1] - longest.time[0]),
+                      float(np.median(np.diff(longest.time))),
+                      float(np.ptp(position)), float(np.abs(velocity).max()),
+                      model.gear_ratios[drive], _delay(longest, drive),
+                      model.units[drive].turns,
+                      any(np.any(one.friction_load[:, drive]) for one in recordings),
+                      _channels(recordings, drive), float(position.min() + position.max()) / 2)
+
+
+def _channels(recordings: Sequence[FullRate], drive: int) -> dict[str, tuple[float, float]]:
+    """Return the ranges of what was measured of a drive beside motion and effort."""
+    found = {}
+    for name in {name for one in recordings for name in one.channels}:
+        values = np.concatenate([one.channels[name][:, drive] for one in recordings
+                                 if name in one.channels])
+        if np.isfinite(values).any():
+            found[name] = float(np.nanmin(values)), float(np.nanmax(values))
+    return found
+
+
+def _delay(recording: FullRate, drive: int) -> float:
+    """Return by how much the measured effort is most like the drive's if that is late [s].
+
+    By the multiple correlation with the model's effort and what a model may lack most of (dry and
+    viscous friction, inertia), over the longest segment, within `LONGEST_DELAY`: a model that
+    explains little is like nothing by itself.
+    """
+    part = max(recording.segments, key=lambda one: one.stop - one.start)
+    time = recording.time[part]
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    even = np.arange(time[0], time[-1], step) if step else np.zeros(0)
+    most = min(int(LONGEST_DELAY / step), len(even) // 4) if step else 0
+    measured = recording.effort_measured[part, drive]
+    known = np.isfinite(measured)
+    if not most or not np.any(known):
+        return 0.0
+    seen = np.interp(even, time[known], measured[known])
+    columns = np.stack([np.interp(even, time, values[part, drive]) for values in (
+        recording.effort, recording.velocity, recording.direction, recording.acceleration)])
+    columns -= columns.mean(axis=1, keepdims=True)
+    columns /= np.maximum(np.linalg.norm(columns, axis=1, keepdims=True), 1e-300)
+    size = fft.next_fast_len(len(even) + most, real=True)
+    alike = fft.irfft(fft.rfft(seen - seen.mean(), size) * fft.rfft(columns, size).conj(), size)
+    lags = np.arange(-most, most + 1)
+    explained = np.einsum('kl,km,ml->l', alike[:, lags], np.linalg.pinv(columns @ columns.T),
+                          alike[:, lags])
+    return float(lags[np.argmax(explained)] * step)

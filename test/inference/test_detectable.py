@@ -1,0 +1,80 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What is said would have been seen is seen, and what is much smaller is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
+from pprs_dynamics.inference.diagnosis.sentences import detectable_rows, word_detectable
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.robot_block import AXIS
+
+MASS, VISCOUS, COULOMB, WIDTH = 20.0, 40.0, 6.0, 0.001
+NOISE = 0.3  # [N]
+TIME = np.arange(0.0, 20.0, 0.004)
+MOTION = ((0.06, 0.5), (0.03, 1.1), (0.01, 2.3))  # amplitude [m], frequency [Hz]
+Q, Q_DOT, Q_DDOT = (sum(a * (2 * np.pi * f) ** n * np.sin(2 * np.pi * f * TIME + n * np.pi / 2)
+                        for a, f in MOTION) for n in range(3))
+# What each adds per unit of its one number.
+LAWS = {'coulomb_friction': np.tanh(Q_DOT / WIDTH), 'viscous_friction': Q_DOT,
+        'drive_inertia': Q_DDOT, 'effort_offset': np.ones_like(TIME),
+        'quadratic_friction': Q_DOT * np.abs(Q_DOT)}
+
+
+def told(seed: int, more: np.ndarray | float = 0.0) -> Diagnosis:
+    model = build_model({'axis.mass': MASS, 'axis.viscous': VISCOUS, 'axis.coulomb': COULOMB,
+                         'axis.offset': 0.0, 'friction.reversal_velocity': WIDTH})
+    force = (MASS * Q_DDOT + VISCOUS * Q_DOT + COULOMB * np.tanh(Q_DOT / WIDTH) + more
+             + NOISE * np.random.default_rng(seed).standard_normal(len(TIME)))
+    return diagnose(model, [Recording.from_arrays('run', TIME, Q[:, None], None, force[:, None],
+                                                  (AXIS,))])
+
+
+@pytest.fixture(scope='module')
+def adequate() -> Diagnosis:
+    found = told(1)
+    assert found.verdict == 'adequate'
+    return found
+
+
+@pytest.mark.parametrize('name', LAWS)
+def test_an_effect_of_twice_the_size_is_seen_and_one_of_a_quarter_is_not(
+        name: str, adequate: Diagnosis) -> None:
+    size = next(one.size for one in adequate.detectable if one.effect.name == name)
+    for seed in (2, 3):
+        assert told(seed, 2 * size * LAWS[name]).verdict != 'adequate'
+        assert told(seed, size / 4 * LAWS[name]).verdict == 'adequate'
+
+
+def test_more_noise_hides_more_but_for_friction_that_the_models_own_may_leave(
+        adequate: Diagnosis) -> None:
+    loud = {one.effect.name: one.size for one in told(
+        5, 2 * NOISE * np.random.default_rng(6).standard_normal(len(TIME))).detectable}
+    quiet = {one.effect.name: one.size for one in adequate.detectable}
+    assert loud['drive_inertia'] > 1.5 * quiet['drive_inertia']
+    assert quiet['coulomb_friction'] == pytest.approx(loud['coulomb_friction'], rel=0.2)
+    assert quiet['coulomb_friction'] > 0.9 * DECISIONS.own_form_share * COULOMB
+
+
+def test_what_was_found_or_is_in_the_model_is_not_listed(adequate: Diagnosis) -> None:
+    size = next(one.size for one in adequate.detectable if one.effect.name == 'effort_offset')
+    found = told(2, 20 * size)
+    assert [one.name for one in found.effects] == ['effort_offset']
+    names = {one.effect.name for one in found.detectable}
+    assert 'effort_offset' not in names
+    assert 'drive_inertia' in names
+
+
+def test_sizes_are_told_with_their_units(adequate: Diagnosis) -> None:
+    size = next(one for one in adequate.detectable if one.effect.name == 'coulomb_friction')
+    assert (size.drive, size.unit) == (AXIS, 'N')
+    assert ('coulomb_friction', f'{size.size:.2g} N') in detectable_rows(adequate)
+    assert f'coulomb_friction from {size.size:.2g} N' in word_detectable(adequate)
+    assert adequate.to_dict()['detectable']
