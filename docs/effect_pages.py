@@ -10,8 +10,9 @@ robot), with a typical value of each parameter.
 
 from __future__ import annotations
 
+import re
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from inspect import getdoc
@@ -28,7 +29,7 @@ import numpy as np
 from pprs_dynamics import DriveModel, MechanismModel, PlatformMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect
 from pprs_dynamics.physics.effects.effect import PLATFORM, CatalogueEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
@@ -167,9 +168,27 @@ def draw(effect: type[CatalogueEffect], file: Path) -> None:
     plt.close(figure)
 
 
+def symbols_of(effect: type[CatalogueEffect]) -> Iterator[tuple[str, str, str]]:
+    """Yield symbols, meaning and unit of the rows of docs/effects.md that a law needs.
+
+    Of what stands in the law and is no parameter of the effect.
+    """
+    text = (Path(__file__).parent / 'effects.md').read_text(encoding='utf-8')
+    table = text.split('## Symbols')[1].split('\n## ')[0]
+    parameters = {each.symbol for each in effect.parameters}
+    for symbols, where, meaning, unit in re.findall(
+            r'^\| (`.+?) \| (.+?) \| (.+?) \| (.+?) \|$', table, re.M):
+        is_meant = where == 'all' or f'`{effect.name}`' in where or (
+            where == 'what sensors say' and issubclass(effect, MeasurementEffect))
+        if is_meant and any(re.search(rf'(?<!\w){re.escape(each)}(?!\w)', effect.card.equation)
+                            for each in set(re.findall('`(.+?)`', symbols)) - parameters):
+            yield symbols, meaning.replace('](', '](../../'), unit  # from where its page is
+
+
 def page(effect: type[CatalogueEffect]) -> str:
     """Return an effect's page."""
-    card, effect = effect.card, platform()[0].bound(effect)
+    card, symbols = effect.card, [f'| {" | ".join(row)} |' for row in symbols_of(effect)]
+    effect = platform()[0].bound(effect)
     given = ', '.join(f'`{name}` = {value:g}' for name, value in values(effect).items())
     rows = [f'| `{each.name}` | {each.symbol} | {each.unit} | {each.description} | '
             f'{"" if each.default is None else f"{each.default:g}"} |'
@@ -183,6 +202,10 @@ def page(effect: type[CatalogueEffect]) -> str:
         f'**In the residual:** {card.looks_like}.', '', f'**Usual causes:** {card.causes}.', '',
         f'**To confirm it:** {card.confirm}.', '',
         '| parameter | symbol | unit | meaning | default |', '|---|---|---|---|---|', *rows, '',
+        *(['| else in the law | meaning | unit |', '|---|---|---|', *symbols, '']
+          if symbols else []),
+        'On which machines it was seen: '
+        '[table](../../effects.md#on-which-machines-they-were-seen).', '',
         f'Acts in: {", ".join(kinds[kind] for kind in kinds if kind in effect.acts_in)}. '
         f'Source: `pprs_dynamics/physics/effects/laws/{effect.name}.py`.', '',
         f'Reference: {card.reference}.', ''])

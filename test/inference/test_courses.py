@@ -5,8 +5,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
+import made_up_arm
 import numpy as np
 import pytest
+from scipy.signal import butter, lfilter
 
 from pprs_dynamics import DriveModel, Recording
 from pprs_dynamics.inference.adoption.adopt import adopt
@@ -90,3 +95,45 @@ def test_a_zero_that_drifts_is_told_as_drifting() -> None:
     assert found.to_dict()['effects'][0]['course'] == 'drift'
     value = effect.parameters['slide_2.zero']
     assert abs(value.value - 0.004) < 4 * value.std + 2e-4
+
+
+ARM_TIME = np.arange(0, 30.0, 0.01)
+WARMTH = 20.0 + np.tile(ARM_TIME[:, None], 3)  # [degC] a kelvin a second
+
+
+def lagging(forces: np.ndarray) -> np.ndarray:
+    """Return forces behind a Butterworth filter, which is of no form of the catalogue."""
+    return np.asarray(lfilter(*butter(2, 12.0, fs=100.0), forces, axis=0))
+
+
+def late(forces: np.ndarray) -> np.ndarray:
+    return np.roll(forces, 2, axis=0)
+
+
+def weaker(forces: np.ndarray) -> np.ndarray:
+    """Return forces of which the second drive's constant falls with its temperature."""
+    return np.asarray(forces * (1 - np.array([0, 0.005, 0]) * (WARMTH - 25.0)))
+
+
+@pytest.mark.parametrize(('change', 'name', 'key', 'value', 'tolerance'), [
+    (lagging, 'effort_filter', 'swing.time_constant', np.sqrt(2) / (2 * np.pi * 12.0), 0.001),
+    (late, 'time_delay', 'swing.delay', 0.02, 0.0005),
+    (weaker, 'current_gain', 'swing.temperature', -0.005, 0.0002)])
+def test_what_sensors_begin_to_do_has_a_date_its_own_name_and_its_own_shape(
+        tmp_path: Path, change: Callable[[np.ndarray], np.ndarray], name: str, key: str,
+        value: float, tolerance: float) -> None:
+    """Filter, play, delay and hysteresis that are there all the time imitate one that begins.
+
+    A Butterworth filter is as late as two equal lags of together sqrt(2) over its cut-off [rad/s].
+    """
+    arm = made_up_arm.real_arm(tmp_path, **{'arm.gear_ratio': (50.0, 50.0, 1.0)})
+    moved = made_up_arm.motion(30.0)
+    forces = arm.drive_forces(moved).total
+    effort = np.where(ARM_TIME[:, None] < 15.0, forces, change(forces))
+    effort += 0.2 * np.random.default_rng(3).normal(size=effort.shape)
+    found = diagnose(arm, [Recording.from_arrays(
+        'half', ARM_TIME, moved.position, None, effort, arm.drives, {'temperature': WARMTH})])
+    assert found.verdict == 'effect'
+    assert [one.name for one in found.effects] == [name]
+    assert found.to_dict()['effects'][0]['since'] == pytest.approx(15.0, abs=0.2)
+    assert found.effects[0].parameters[key].value == pytest.approx(value, abs=tolerance)

@@ -88,15 +88,33 @@ class Answer:
                 self.final.fitted.fit.coefficients)
         for d, series in self.fits.regression.series.items():
             self.remaining[:, d] -= series.open_forces(self.remaining[:, d])
-        # Before a constant form is believed. What held-out data refute is not tried again.
-        self.dated_fits, self.dated = with_courses(
-            self.fits, self.reported, [] if ranking.refuted else ranking.alone.values()
-        ) if try_courses else (self.fits, self.reported)
+        # Before a constant form is believed.
+        self.dated_fits, self.dated = self._with_courses() if try_courses else (
+            self.fits, self.reported)
         self.is_dated, self.adopted = self.dated is not self.reported, self.final.model
         if self.is_dated:
             self.remaining = linear_residual(self.dated_fits, self.dated)
             self.adopted = self._dated_model()
         self.effects = self._dated_effects() if self.is_dated else self._effects_reported()
+
+    def _with_courses(self) -> tuple[FittedSets, CandidateSet]:
+        """Return the best set in which effects may begin, end or grow, with what it is a set of.
+
+        Where what was found bends the columns, around the model as given, too, and without it: what
+        is there all the time may imitate what begins, which does not show around its model.
+        What held-out data refute is not tried again.
+        """
+        ranking, reported = self.ranking, self.reported
+        alone = [] if ranking.refuted else list(ranking.alone.values())
+        fits, found = with_courses(self.fits, reported, alone)
+        if alone and ranking.first is not self.fits:
+            kept = ranking.first.evaluate(tuple(
+                candidate for candidate in reported.effects if not candidate.effect.nonlinear))
+            given, there = with_courses(ranking.first, kept, alone,
+                                        min(found.cost, self.map_set.cost))
+            if there is not kept:
+                return given, there
+        return fits, found
 
     @property
     def raises_the_error(self) -> bool:

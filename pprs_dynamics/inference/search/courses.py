@@ -34,6 +34,7 @@ COURSE_HALVINGS = 6  # of the step between them, around the best
 COURSE_TRIALS = 3  # candidates of a scan that are fitted
 FIRST_TIMES = 5  # parts of the recordings, between which effects that are not kept are tried first
 MOST_COURSES = 3  # effects of one set that change within the recordings
+SINGLE = float(np.finfo(np.float32).eps)  # share of a force's squares that is rounding
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class _Offer:
 
 
 def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[CandidateSet],
-                 ) -> tuple[FittedSets, CandidateSet]:
+                 below: float = np.inf) -> tuple[FittedSets, CandidateSet]:
     """Return the best set in which effects may begin, end or grow, with what it is a set of.
 
     The same fits and set where nothing changes in time.
@@ -64,6 +65,8 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
         Of constant forms.
     others : iterable of CandidateSet
         Of one effect each, that may be the right one with a step in time.
+    below : float
+        What some other set costs, which the first effect that changes has to be better than.
     """
     own = [(kept, candidate) for candidate in kept.effects if _is_new(candidate)]
     alone = [(other, other.effects[0]) for other in others if _is_new(other.effects[0])]
@@ -93,7 +96,7 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
                 # Its shape was that of an effect that is there all the time.
                 tried = dated.pruned(dated.refined(dated.evaluate((*rest, offer.candidate))))
                 found = min(found, tried, key=lambda fitted: fitted.cost)
-        if not found.cost < best.cost - fits.decisions.rival_margin:
+        if not found.cost < min(best.cost, below) - fits.decisions.rival_margin:
             break
         best = _refined(dated, found)
     best = _simplest(dated, best, {candidate.effect: candidate for candidate in (
@@ -161,7 +164,7 @@ def _offers(fits: FittedSets, bases: Sequence[tuple[CandidateSet, float]],
     residuals, shape = fits.design.residuals, fits.design.residuals.measured.shape
     courses = list(courses)
     weights = np.array([course.weight(residuals.time, residuals.period) for course in courses])
-    lengths = weights.sum(axis=1)
+    lengths, squares = weights.sum(axis=1), weights ** 2
     for found, candidate in effects:
         force = fits.components.force(found, candidate, shape)
         rows = {d: fits.regression.series[d].transform(
@@ -175,6 +178,8 @@ def _offers(fits: FittedSets, bases: Sequence[tuple[CandidateSet, float]],
                          [Entry(course, (k,)) for k, course in enumerate(courses)])
         # A stretch of no more samples than coefficients can be explained by anything.
         told = lengths > sum(len(component.names) for component in candidate.components)
+        # Nor is one in which the force is nothing but rounding, as of Stribeck friction at speed.
+        told &= squares @ (force ** 2).sum(axis=1) > SINGLE * np.sum(force ** 2)
         for base, dearer in bases:
             for labels, gains in test.gains(base.fit):
                 gains = np.where(told, gains, -np.inf)

@@ -3,7 +3,7 @@
 
 """Friction in the passive joints and loops of a mechanism.
 
-Torque against the relative rate: c w + (T + mu r F) sgn(w), with F the force that the joint
+Torque against the relative rate: c w + (T + mu r N) sgn(w), with N the force that the joint
 transmits across its axis, of a ball all of it; by virtual work T' tau at the drives.
 
 References
@@ -41,7 +41,7 @@ class JointFrictionEffect(PassiveJointEffect):
     linear = ()
     radii: ClassVar[Mapping[str, float]] = {}
     card = Card(
-        'moment (c |w| + T + mu r F) against the motion in C_i, w = u_dot_i, or in A_i, '
+        'moment (c |w| + T + mu r N) against the motion in C_i, w = u_dot_i, or in A_i, '
         'w = omega_n,i',
         'errors on all six drives at once that turn over where a rod reverses its swing (C_i), or '
         'the platform turns back against a rod (A_i), not where a drive reverses',
@@ -51,7 +51,7 @@ class JointFrictionEffect(PassiveJointEffect):
         'and repeat; run the robot warm and compare',
         'Itul, Pisla, 2007, Eq. (9) and (12)')
     arm_card = Card(
-        'tau -> tau + T\' (c w + (T + mu r F) sgn(w)), of one passive joint',
+        'tau -> tau + T\' (c w + (T + mu r N) sgn(w)), of one passive joint',
         'errors of several drives at once, in the proportions in which they move the joint, with '
         'the sign of its rate or growing with it',
         'a bearing that runs dry, is overtightened or worn; a seal; a cable loom over the joint',
