@@ -105,20 +105,6 @@ def test_what_can_only_be_nothing_does_not_void_what_is_there() -> None:
     assert without.cost < held.cost
 
 
-def test_a_ripple_comes_back_within_the_stroke() -> None:
-    """A wave longer than the stroke, with a second one, is any smooth curve: a spring's, say."""
-    moved = motion()
-    curve = 60 * moved.position + 2e4 * moved.position ** 3
-    fits = FittedSets(Design.of(MODEL, [recorded(MODEL.drive_forces(moved).total + curve)]),
-                      DECISIONS)
-    ripple = catalogue()['force_ripple']
-    pitches = [shape['pitch'] for shape in ripple.trials(fits.design.covered[0])]
-    component = Component.of(ripple, 0, {'pitch': max(pitches)}, ripple.variants[-1])
-    found = fits.refined(fits.evaluate((EffectCandidate.of([component]),)))
-    (after,) = found.blocks
-    assert after.parameters['pitch'] <= max(pitches)
-
-
 def test_a_drive_constant_that_is_another_unit_is_no_effect() -> None:
     """Told apart from mass and friction that all are too small only where gains may be large."""
     loose = build_model({**MODEL.values, 'tolerances.effort_gain.gain': 1.0})

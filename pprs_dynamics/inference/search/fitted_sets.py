@@ -35,8 +35,6 @@ from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
 from pprs_dynamics.inference.search.possible_bodies import with_possible_bodies
 from pprs_dynamics.inference.search.possible_totals import with_possible_totals
 from pprs_dynamics.physics.effects.added_body import AddedBody
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.effects.effect import Parameter
 
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
 NEAR = 1e-3  # [m], within which a body is where its columns are
@@ -283,20 +281,12 @@ class FittedSets:
             for parameter, step in zip(effect.shape, fit.of(block), strict=True):
                 limit = longest * reach[parameter.name]
                 value = parameter.moved(shape[parameter.name], float(np.clip(step, -limit, limit)))
-                shape[parameter.name] = float(np.clip(value, *self._limits(component, parameter)))
+                bounded = parameter.of(units_of(self.design.given, component.drive).turns)
+                shape[parameter.name] = float(np.clip(value, bounded.lower, bounded.upper))
             moved[component] = replace(component, shape=tuple(sorted(shape.items())))
         return tuple(
             EffectCandidate.of(moved.get(component, component) for component in c.components)
             if isinstance(c, EffectCandidate) else c for c in fitted.candidates)
-
-    def _limits(self, component: Component, parameter: Parameter) -> tuple[float, float]:
-        """Return between which values a shape parameter of a component is looked for."""
-        effect = component.effect
-        if issubclass(effect, DriveEffect) and effect.between_trials:
-            tried = self.components.tried(component, parameter.name)
-            return tried[0], tried[-1]
-        bounded = parameter.of(units_of(self.design.given, component.drive).turns)
-        return bounded.lower, bounded.upper
 
     def slopes(self, fitted: CandidateSet) -> list[tuple[Component, Block]]:
         """Return derivatives by the shapes of a set, of unit prior, for the components with any."""

@@ -128,15 +128,9 @@ class DriveEffect(CatalogueEffect):
 
     Its force is linear in the coefficients: the sum of coefficient times column. What is not
     linear (`shape`) enters the columns.
-
-    Class attributes
-    ----------------
-    between_trials : bool
-        Whether shapes beyond those tried are another effect's, so that none is looked for there.
     """
 
     acts_in = frozenset({PLATFORM, SINGLE_AXIS, ARM})
-    between_trials: ClassVar[bool] = False
 
     def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
         self.drives = {drive: dict(values) for drive, values in drives.items()}

@@ -46,7 +46,6 @@ class ForceRipple(DriveEffect):
             ('cosine', 'A sin phi', 'amplitude of the cosine'),
             ('second_sine', 'A_2 cos phi_2', 'amplitude of the second sine'),
             ('second_cosine', 'A_2 sin phi_2', 'amplitude of the second cosine')))
-    between_trials = True
     scanned = ('sine', 'cosine')
     variants = (('sine', 'cosine'), ('sine', 'cosine', 'second_sine', 'second_cosine'))
     card = Card(
