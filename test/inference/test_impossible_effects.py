@@ -14,6 +14,7 @@ import pytest
 from pprs_dynamics import JointMotion, MechanismModel
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, next_step
 from pprs_dynamics.inference.diagnosis.possible import why_impossible, why_nothing
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
@@ -124,6 +125,10 @@ def test_a_drive_constant_that_is_another_unit_is_no_effect() -> None:
     (gain,) = [one for one in found.unconfirmed if one.name == 'effort_gain']
     assert gain.is_impossible
     assert 'times too large, which is another unit' in gain.objection
+    # Another recording would say the same.
+    said, command = next_step(found, PLACEHOLDERS)
+    assert said.startswith('Check units')
+    assert command.startswith('pprs info')
 
 
 def test_a_gain_that_a_drive_may_have_is_one() -> None:
