@@ -23,7 +23,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
-from pprs_dynamics.inference.diagnosis.possible import why_impossible, why_nothing
+from pprs_dynamics.inference.diagnosis.possible import why_impossible
 from pprs_dynamics.inference.diagnosis.quantities import plain
 from pprs_dynamics.inference.diagnosis.statements import (
     Statement,
@@ -193,18 +193,14 @@ class Answer:
         parameters = estimates.parameters
         without = self._told(self.ranking.best_without(candidate),
                              self.ranking.best_with(candidate))
-        in_model = self._in_model(candidate, parameters)
         impossible = why_impossible(candidate.effect, parameters, self.decisions) or (
             self._why_less_than_nothing(candidate))
-        # Numbers that stand for each other in part are uncertain each, and not together.
-        nothing = '' if without.cost > self.decisions.rival_margin else why_nothing(
-            candidate.effect, parameters, in_model)
         return FoundEffect(
             candidate.effect, self.design.named(candidate.drives), parameters,
             final.fits.components.force(final.fitted, last, self.remaining.shape), without.cost,
             errors[0], errors[1], held_out[0], held_out[1], estimates.at_bound, share,
-            self._certainty(candidate), impossible or nothing, bool(impossible), without,
-            in_model, moments=estimates.moments)
+            self._certainty(candidate), impossible, without,
+            self._in_model(candidate, parameters), moments=estimates.moments)
 
     def _why_less_than_nothing(self, candidate: EffectCandidate) -> str:
         """Return where recordings speak for less than no friction or inertia, as a clause."""

@@ -81,13 +81,16 @@ def detectable_sizes(fits: FittedSets, fitted: CandidateSet) -> tuple[Detectable
         lack, _ = lack_of_fit(fits.design, fits.regression, fits.decisions, fitted, candidate,
                               set(block.rows))
         beyond_forms = min(np.sqrt(lack / own), _standing_out(fits, fitted, block, own))
-        values = component.values(np.array([
-            max(np.sqrt(asked * (own + prior)) / own, beyond_forms)]))
-        parameter = next(p for p in component.effect.linear if values[p.name])
+        c = np.array([max(np.sqrt(asked * (own + prior)) / own, beyond_forms)])
+        units = units_of(fits.design.given, component.drive)
+        values = component.values(c)
+        numbers = [p for p in component.effect.linear if values[p.name]]
+        if not component.is_within(c, units) or len(numbers) != 1:
+            continue  # no machine has so much of it; a body somewhere else has a place as well
+        (parameter,) = numbers
         drive = None if component.drive is None else fits.design.drives[component.drive]
-        found.append(DetectableSize(
-            component.effect, drive, parameter, abs(values[parameter.name]),
-            units_of(fits.design.given, component.drive).of(parameter.unit)))
+        found.append(DetectableSize(component.effect, drive, parameter,
+                                    abs(values[parameter.name]), units.of(parameter.unit)))
     return tuple(found)
 
 

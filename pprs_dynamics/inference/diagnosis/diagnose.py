@@ -83,23 +83,20 @@ def diagnose(
                     validate, decisions)
     since = None if reference is None else SinceReference.of(
         reference, answer.ranking.first.design)
-    unconfirmed: list[FoundEffect] = []
-    if answer.raises_the_error or any(effect.is_impossible for effect in answer.effects):
-        # Whatever stands for what cannot be, or beside it, would be as wrong.
-        found = _raising(answer.effects) if answer.raises_the_error else _all_objected(
-            answer.effects)
-        answer = Answer(answer.ranking.reporting_nothing(), validate, decisions,
-                        try_courses=False)
-        report(1.0)
-        return replace(answer.diagnosis(found), verdict='unknown', since=since)
-    while weak := [effect for effect in answer.effects
-                   if effect.objection or effect.certainty < -decisions.sure]:
-        unconfirmed.append(min(weak, key=lambda one: one.evidence))
-        gone = answer.ranking.order[answer.effects.index(unconfirmed[-1])]
+    refuted: list[FoundEffect] = []
+    while not (answer.raises_the_error or any(effect.objection for effect in answer.effects)):
+        weak = [effect for effect in answer.effects if effect.certainty < -decisions.sure]
+        if not weak:
+            report(1.0)
+            return replace(answer.diagnosis(tuple(refuted)), since=since)
+        refuted.append(min(weak, key=lambda one: one.evidence))
+        gone = answer.ranking.order[answer.effects.index(refuted[-1])]
         answer = Answer(answer.ranking.less(gone), validate, decisions)
-    diagnosis = answer.diagnosis(tuple(unconfirmed))
+    # Whatever stands for what cannot be, or beside it, would be as wrong.
+    found = _raising(answer.effects) if answer.raises_the_error else _all_objected(answer.effects)
+    nothing = Answer(answer.ranking.reporting_nothing(), validate, decisions, try_courses=False)
     report(1.0)
-    return replace(diagnosis, since=since)
+    return replace(nothing.diagnosis((*refuted, *found)), verdict='unknown', since=since)
 
 
 def _raising(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
@@ -110,8 +107,8 @@ def _raising(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
 
 def _all_objected(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
     """Return effects of which one cannot be: that first, and the others as found beside it."""
-    impossible = [effect for effect in effects if effect.is_impossible]
+    impossible = [effect for effect in effects if effect.objection]
     beside = listed([one.name for one in impossible])
     return (*impossible,
             *(replace(effect, objection=f'it was found beside {beside}, which cannot be')
-              for effect in effects if not effect.is_impossible))
+              for effect in effects if not effect.objection))

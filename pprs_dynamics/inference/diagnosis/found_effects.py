@@ -107,8 +107,6 @@ class FoundEffect(FittedEffect):
         numbers have a share.
     objection : str
         Why it is no finding whatever the error does, as a clause; '' where nothing speaks against.
-    is_impossible : bool
-        Whether that is that no machine can have it.
     without : RankedSet, optional
         The best set without it, against the best one with it.
     in_model : mapping of str to float
@@ -129,7 +127,6 @@ class FoundEffect(FittedEffect):
     share: float = 0.0
     certainty: float = np.inf
     objection: str = ''
-    is_impossible: bool = False
     without: RankedSet | None = None
     in_model: Mapping[str, float] = field(default_factory=dict)
     course: Course | None = None

@@ -88,10 +88,9 @@ PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made without files
 
 
 def first_step(model: ForceModel, files: GivenFiles) -> tuple[str, str]:
-    """Return what to do before anything else where a model is another machine's, and the command.
+    """Return what to do before anything else where a model explains little, and the command.
 
-    It explains little, or what no machine has makes good what it lacks. A description alone,
-    without friction and with the maker's masses, is fitted first.
+    A description alone, without friction and with the maker's masses, is fitted first.
     """
     if model.is_described:
         bare = not any(np.any(model.values[key]) for key in OWN_FRICTION)
@@ -120,7 +119,7 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         return ('Record a motion that is faster than the stick-slip, and diagnose that; as long as '
                 'the machine has to move so slowly, its cause comes first (grease, gains, a soft '
                 'transmission)', replace(files, recordings=(SECOND,)).command('diagnose'))
-    if diagnosis.little or any(effect.is_impossible for effect in diagnosis.unconfirmed):
+    if diagnosis.little:
         return first_step(diagnosis.model, files)
     if changing := [f'{effect.name}{effect.when}' for effect in diagnosis.effects
                     if effect.course is not None]:

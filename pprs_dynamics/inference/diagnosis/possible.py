@@ -3,8 +3,8 @@
 
 """What a fit may say of an effect and no machine can have: then it is no finding.
 
-A base that leans as none does, a gain that is another unit, and values whose interval holds
-nothing at all. Negative friction and inertia are a matter of cost (`search.possible_totals`).
+A base that leans as none does, and a gain that is another unit. Negative friction and inertia are
+a matter of cost (`search.possible_totals`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from pprs_dynamics.inference.diagnosis.quantities import INTERVAL, with_uncertainty
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -33,32 +32,6 @@ def why_impossible(effect: type[CatalogueEffect], parameters: Mapping[str, Estim
     decisions : Decisions
     """
     return next(_reasons(effect, parameters, decisions), '')
-
-
-def why_nothing(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
-                in_model: Mapping[str, float]) -> str:
-    """Return why what a fit says of an effect may be nothing, as a clause; '' where it is not.
-
-    One number of several may be nothing. Of an effect that the model has, as `in_model` says, what
-    is otherwise may be no more than the uncertainty.
-
-    Parameters
-    ----------
-    effect : type of CatalogueEffect
-    parameters : mapping of str to Estimate
-        By drive.parameter, or parameter.
-    in_model : mapping of str to float
-        By the same; empty for an effect that the model lacks.
-    """
-    if in_model:
-        return '' if any(abs(one.value - in_model[key]) > INTERVAL * one.std
-                         for key, one in parameters.items() if key in in_model) else (
-            'it holds what the model has')
-    sizes = _sizes(effect, parameters)
-    if not sizes or any(abs(one.value) > INTERVAL * one.std for one in sizes.values()):
-        return ''
-    key, one = max(sizes.items(), key=lambda item: abs(item[1].value) / item[1].std)
-    return f'{key} is {with_uncertainty(one.value, one.std, one.unit)}, which holds 0'
 
 
 def _sizes(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],

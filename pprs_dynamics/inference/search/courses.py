@@ -98,7 +98,7 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
                 found = min(found, tried, key=lambda fitted: fitted.cost)
         if not found.cost < min(best.cost, below) - fits.decisions.rival_margin:
             break
-        best = _refined(dated, _dated_anew(dated, found))
+        best = _refined(dated, found)
     best = _simplest(dated, best, {candidate.effect: candidate for candidate in (
         *(candidate for _, candidate in own), *likely)}.values())
     best, _ = beyond_discrepancy(dated, best)
@@ -210,31 +210,6 @@ def _rests(base: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidate
 def _with_course(candidate: EffectCandidate, course: Course) -> EffectCandidate:
     return EffectCandidate.of(replace(component, course=course)
                               for component in candidate.components)
-
-
-def _dated_anew(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
-    """Return a set whose effects begin where those of their fitted shapes do.
-
-    Beginnings and shapes in turn, as long as that costs less: the beginnings were those of the
-    shapes that the effects have where they are there all the time.
-    """
-    begins = [course for course in _courses(fits) if course.kind == SINCE]
-    tried = fitted
-    while tried is fitted or tried.cost < fitted.cost - fits.decisions.rival_margin:
-        fitted = tried
-        for candidate in fitted.effects:
-            if candidate.course is None or candidate.course.kind != SINCE:
-                continue
-            rest = fits.evaluate(fitted.without(candidate))
-            throughout = EffectCandidate.of(replace(component, course=None)
-                                            for component in candidate.components)
-            held = fits.evaluate((*rest.candidates, throughout))
-            for offer in _offers(fits, [(rest, 0.0)], [(held, throughout)], begins):
-                tried = min(tried, fits.refined(fits.evaluate(
-                    (*rest.candidates, offer.candidate))), key=lambda fitted: fitted.cost)
-        if tried is fitted:
-            break
-    return min(fitted, tried, key=lambda fitted: fitted.cost)
 
 
 def _refined(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:

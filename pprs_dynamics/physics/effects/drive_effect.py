@@ -159,7 +159,7 @@ class DriveEffect(CatalogueEffect):
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:
-        """Return the shape parameters to try first; they are refined between them."""
+        """Return the shape parameters to try first; they are refined from the best of them on."""
         return ({},)
 
     @classmethod
