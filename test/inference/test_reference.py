@@ -18,6 +18,8 @@ from pprs_dynamics import JointMotion, MechanismModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import MisreadError, ModelError, UnreadableFileError
+from pprs_dynamics.inference.diagnosis.diagnosis import SinceReference
+from pprs_dynamics.inference.diagnosis.sentences import word_reference
 from pprs_dynamics.inference.fit.reference import Reference, ReferenceRunError
 from pprs_dynamics.inference.fit.reference_runs import read_reference
 from pprs_dynamics.inference.regression.carried_over import CarriedOver
@@ -84,6 +86,23 @@ def test_what_was_in_the_reference_has_not_changed(
     # The model lacks much all the same.
     assert min(rms_by_drive(measure_residuals(model, [again])[0]).values()) > 5 * NOISE
     assert max(found.diagnosis.noise_floors.values()) < 2 * NOISE
+
+
+@pytest.mark.parametrize(('pace', 'is_told'), [
+    (1.0, False), (1.1, False), (0.5, True), (2.0, True)])
+def test_another_speed_than_the_references_is_told(
+    machine: tuple[MechanismModel, Reference], pace: float, is_told: bool,
+) -> None:
+    model, reference = machine
+    moved = arm.motion(20.0, seed=0)
+    other = JointMotion(moved.position, pace * moved.velocity, pace ** 2 * moved.acceleration,
+                        moved.time / pace)
+    clean = arm.record(model, other, NOISE, 6)
+    design = Design.of(model, [clean])
+    since = SinceReference.of(reference, design.beside(reference.carried_over(design)))
+    assert since.pace == pytest.approx(pace, rel=0.05)
+    told = [one for one in word_reference(since) if 'times the speed of the reference' in one]
+    assert bool(told) == is_told
 
 
 def test_a_change_of_friction_is_told_alone(machine: tuple[MechanismModel, Reference]) -> None:

@@ -54,6 +54,8 @@ class SinceReference:
         Share of the samples whose states they know.
     explained : mapping of str to float
         Share of each drive's squared error, under the model as given, that they show as well.
+    pace : float
+        Speed of the drives, over that in them: the median of all drives.
     note : str
         What must be known of them; '' for nothing.
     """
@@ -61,6 +63,7 @@ class SinceReference:
     recordings: tuple[str, ...]
     covered: float
     explained: Mapping[str, float]
+    pace: float
     note: str
 
     @classmethod
@@ -72,12 +75,16 @@ class SinceReference:
         before, after = (np.nansum(one ** 2, axis=0) for one in (whole, left))
         explained = {drive: max(0.0, 1 - float(after[d] / before[d]))
                      for d, drive in enumerate(design.drives) if before[d] > 0}
-        return cls(reference.names, design.carried.covered, explained, reference.note)
+        here, there = (np.sqrt(np.nanmean(one.variables['velocity'] ** 2, axis=0))
+                       for one in (design.residuals, reference.regression.residuals))
+        moved = there > 0
+        pace = float(np.median(here[moved] / there[moved])) if moved.any() else 1.0
+        return cls(reference.names, design.carried.covered, explained, pace, reference.note)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it for JSON."""
         return {'recordings': list(self.recordings), 'covered': self.covered,
-                'explained': dict(self.explained)}
+                'explained': dict(self.explained), 'pace': self.pace}
 
 
 @dataclass(frozen=True)

@@ -52,6 +52,9 @@ MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
 TOLD_COST = 0.05  # of a term of a cost, that one digit shows
 VAGUE = 0.1  # of a mass, an uncertainty beyond which its first moment is told as well, if surer
 MOSTLY = 0.95  # of a recording, from which on a reference knows its states
+# Times the speed of a reference, or one over it, beyond which what lags shows: at half the speed a
+# real arm is told delays of up to 70 ms that it has not; a program repeats its own to hundredths.
+ALIKE_PACE = 1.25
 # Of which one line says what would have been seen.
 COMMON = ('payload_mass', 'coulomb_friction', 'viscous_friction')
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
@@ -260,11 +263,15 @@ def word_reference(since: SinceReference | None) -> tuple[str, ...]:
     if since is None:
         return ()
     shares = listed([f'{share:.0%} on {drive}' for drive, share in since.explained.items()])
-    told = (f'{listed(since.recordings)} knows the states of {since.covered:.0%} of this '
-            'recording' + ('' if since.covered > MOSTLY else
-                           ': elsewhere only the model\'s numbers are known')
-            + f', and shows this share of its squared error as well: {shares}',
-            'a fault that was there in the reference cannot be seen')
+    told: tuple[str, ...] = (
+        f'{listed(since.recordings)} knows the states of {since.covered:.0%} of this recording'
+        + ('' if since.covered > MOSTLY else ': elsewhere only the model\'s numbers are known')
+        + f', and shows this share of its squared error as well: {shares}',
+        'a fault that was there in the reference cannot be seen')
+    if not 1 / ALIKE_PACE < since.pace < ALIKE_PACE:
+        told += (f'this recording moves at {since.pace:.2g} times the speed of the reference, in '
+                 'which errors that lag come at other places: do not believe a delay or a '
+                 'hysteresis that is told since then without a reference of this speed',)
     return (*told, since.note) if since.note else told
 
 
