@@ -9,8 +9,10 @@ import io
 import re
 import shlex
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import made_up_arm as arm
 import numpy as np
 import pytest
 from made_up_diagnosis import (
@@ -127,6 +129,17 @@ def test_a_held_out_error_that_rises_stands_in_the_headline_and_forbids_adoption
     assert not words.effects
     assert words.following.startswith('Do not add hysteresis')
     assert 'adopt' not in words.command
+
+
+@pytest.mark.parametrize(('objection', 'command'), [
+    ('it would be measured 1.6 times too large', 'pprs fit RECORDING --output base.yaml'),
+    ('', 'pprs diagnose RECORDING SECOND_RECORDING')])
+def test_a_model_of_another_machine_is_fitted_before_another_motion_is_recorded(
+    tmp_path: Path, objection: str, command: str,
+) -> None:
+    impossible = replace(made_up_diagnosis('unknown', unconfirmed=(
+        found_effect('effort_gain', objection=objection),)), model=arm.real_arm(tmp_path))
+    assert word_diagnosis(impossible).command == command
 
 
 def test_an_error_above_the_noise_is_told_where_nothing_holds() -> None:

@@ -144,6 +144,10 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         return ('Record a motion that tells the candidates apart; this designs it',
                 files.command('next-experiment', '--output', 'next.csv'))
     if diagnosis.unconfirmed and not diagnosis.effects:
+        if diagnosis.since is None and diagnosis.model.is_described and any(
+                one.objection for one in diagnosis.unconfirmed):
+            # What no machine can have says that the model is of another: no motion mends that.
+            return first_step(diagnosis.model, files)
         names = listed([one.name for one in diagnosis.unconfirmed])
         return (f'Do not add {names} on this evidence. Record another motion, and '
                 'diagnose both recordings', repeat)
