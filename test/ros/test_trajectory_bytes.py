@@ -131,6 +131,18 @@ def test_whoever_names_joints_otherwise_is_known_from_the_second_message_on(
         reader = without_objects(reader, monkeypatch)
 
 
+def test_a_stream_of_another_layout_does_not_crowd_out_what_is_known(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    reader = joint_reader(LEGS)
+    other, known = joint_message(1, 1), joint_message(1, 2)
+    other.header.frame_id = 'map'
+    other.points[0].effort = [0.0] * 6
+    for _ in range(10):
+        reader.read(bytes(serialize_message(other)), 1)
+    without_objects(reader, monkeypatch).read(bytes(serialize_message(known)), 1)
+
+
 @settings(max_examples=200)
 @given(POINTS, SEEDS)
 def test_joint_messages_of_another_layout_are_left_to_the_ordinary_path(

@@ -138,7 +138,8 @@ class TrajectoryBytes:
                 names + WORD.size, *(text.stop for text in texts)]
         known = _Beginning(tuple((start, data[start:end]) for start, end in zip(
             walk.words, ends, strict=True)), aligned(walk.at, WORD.size), order)
-        self._beginnings = [known, *self._beginnings[:MOST_BEGINNINGS - 1]]
+        if all(one.parts != known.parts for one in self._beginnings):
+            self._beginnings = [known, *self._beginnings[:MOST_BEGINNINGS - 1]]
 
     def read(self, data: bytes) -> Points | None:
         """Return what a message says; None where it is not laid out like one that was learnt."""
