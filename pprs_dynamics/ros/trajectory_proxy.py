@@ -25,7 +25,6 @@ from control_msgs.action import FollowJointTrajectory
 from control_msgs.msg import JointTrajectoryControllerState
 from geometry_msgs.msg import Twist
 from rclpy.action import ActionServer, CancelResponse
-from rclpy.serialization import serialize_message
 from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.errors import PprsError
@@ -39,7 +38,7 @@ from pprs_dynamics.ros.messages.trajectory_request import (
     SPLINE,
     TrajectoryRequest,
     read_joint_trajectory,
-    reader_for,
+    read_trajectory,
 )
 from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
@@ -216,14 +215,13 @@ class TrajectoryProxyNode(ExplainsRefusals):
         missing = self._settings.node_values['missing_derivatives']
         if missing == SPLINE:
             _end_at_rest(goal)
+        names = RobotNames.of(model)
+        if not (model.moves_joints or goal.trajectory.points):
+            return read_trajectory(goal.multi_dof_trajectory, now, missing, names.frame)
+        request = read_joint_trajectory(goal.trajectory, names.joints, now, missing)
         if model.moves_joints:
-            return reader_for(model).read(serialize_message(goal.trajectory), now, missing)
-        if not goal.trajectory.points:
-            return reader_for(model).read(
-                serialize_message(goal.multi_dof_trajectory), now, missing)
+            return request
         # Drives' positions: the platform's motion follows from them.
-        request = read_joint_trajectory(
-            goal.trajectory, RobotNames.of(model).joints, now, missing)
         drives: Any = request.motion
         motion = model.motion_of_drives(drives.position, drives.velocity, drives.acceleration)
         return TrajectoryRequest(motion, request.start, request.offsets)
