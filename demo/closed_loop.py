@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 from ros_processes import environment, executable, node_process
 from scipy.interpolate import CubicHermiteSpline
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics.drives import DRIVES
@@ -154,16 +153,6 @@ def commands_for(case: Case, path: HelicalPath | Excitation) -> np.ndarray:
     effort = forces.parts['rigid_body'] if case.feedforward == 'rigid_body' else forces.total
     return np.column_stack((np.arange(len(motion)) / RATE, forces.mechanism.position,
                             forces.mechanism.velocity, effort))
-
-
-def places(came: np.ndarray, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return which command each that came over the topics is, and by how much it is not [SI].
-
-    Both have the columns of `Tracking`. Times are not looked at: a player that was kept goes on
-    later, and of a burst of messages some may be lost.
-    """
-    distance, row = cKDTree(commands[:, 1:]).query(came[:, 1:])
-    return row, distance
 
 
 def execute(case: Case, commands: np.ndarray) -> Tracking:

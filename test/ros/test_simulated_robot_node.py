@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from closed_loop import CASES, RATE, Case, Tracking, commands_for, execute, places, run_case
+from closed_loop import CASES, RATE, Case, Tracking, commands_for, execute, run_case
+from commands_over_topics import assert_are_the_models
 from node_bench import Bench, bench, overrides
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
@@ -261,10 +262,7 @@ def tracking(ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> dict[
     commands = {case.feedforward: commands_for(case, path) for case in CASES[1:]}
     for case in CASES[1:]:
         came = run_case(case, PATH, DURATION, ros_domain, folder).commands
-        assert len(came) > DURATION * RATE
-        row, distance = places(came, commands[case.feedforward])
-        assert np.max(distance) < 1e-9
-        assert np.all(np.diff(row) >= 0)
+        assert_are_the_models(came, commands[case.feedforward], DURATION * RATE)
     cases = (*CASES, Case('hidden', 'friction', ('coulomb_friction',)))
     return {case.name: execute(case, commands.get(case.feedforward, commands['friction']))
             for case in cases}
