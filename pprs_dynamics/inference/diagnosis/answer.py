@@ -49,9 +49,7 @@ from pprs_dynamics.inference.search.estimates import (
     calibrations,
     estimate,
 )
-from pprs_dynamics.inference.search.explained_effort import (
-    little_explained,
-)
+from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,

@@ -11,13 +11,9 @@ from dataclasses import replace
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.diagnosis.answer import Answer
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
-from pprs_dynamics.inference.diagnosis.found_effects import (
-    FoundEffect,
-)
+from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import listed
-from pprs_dynamics.inference.diagnosis.statements import (
-    word_stick_slip,
-)
+from pprs_dynamics.inference.diagnosis.statements import word_stick_slip
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measured_effort import looks_like
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions

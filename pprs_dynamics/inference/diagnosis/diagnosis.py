@@ -20,9 +20,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     RankedSet,
     WithinModelError,
 )
-from pprs_dynamics.inference.diagnosis.statements import (
-    Statement,
-)
+from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measured_effort import kinds_of
@@ -30,12 +28,8 @@ from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
-from pprs_dynamics.inference.search.estimates import (
-    Calibration,
-)
-from pprs_dynamics.inference.search.explained_effort import (
-    explained_shares,
-)
+from pprs_dynamics.inference.search.estimates import Calibration
+from pprs_dynamics.inference.search.explained_effort import explained_shares
 from pprs_dynamics.inference.search.ranking import Ranking
 from pprs_dynamics.measurement.motion.stick_slip import StickSlip
 from pprs_dynamics.physics.model.force_model import ForceModel

@@ -11,9 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.regression.base_columns import (
-    ReferenceDirection,
-)
+from pprs_dynamics.inference.regression.base_columns import ReferenceDirection
 from pprs_dynamics.inference.regression.terms import FullRate
 from pprs_dynamics.inference.residuals.bands import OpenForces
 from pprs_dynamics.inference.residuals.residuals import Residuals

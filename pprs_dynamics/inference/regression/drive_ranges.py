@@ -11,9 +11,7 @@ import numpy as np
 from scipy import fft
 
 from pprs_dynamics.inference.regression.terms import FullRate
-from pprs_dynamics.physics.effects.drive_effect import (
-    DriveRange,
-)
+from pprs_dynamics.physics.effects.drive_effect import DriveRange
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 LONGEST_DELAY = 0.3  # [s], that a recording may show at once

@@ -12,9 +12,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.terms import FullRate
-from pprs_dynamics.inference.residuals.reconstruction import (
-    Reconstruction,
-)
+from pprs_dynamics.inference.residuals.reconstruction import Reconstruction
 from pprs_dynamics.physics.effects.drive_effect import (
     Clearance,
     Windup,
