@@ -270,7 +270,8 @@ def diagnosis_page(
     if rows := detectable_rows(diagnosis):
         with page.fold(SEEN):
             page.text('The size from which on each effect alone would have cost 10 less than the '
-                      'answer, at the noise of these recordings.', 'note')
+                      'answer, at the noise of these recordings, and been more than the forms of '
+                      'what is there may leave.', 'note')
             page.table(('effect', 'size'), rows)
     _contributions(page, diagnosis, steps)
     _parameters(page, diagnosis, words)
