@@ -172,7 +172,7 @@ class PrescribedPlant:
                 for values in (position, velocity, acceleration))
         warm = next((one for one in effects if isinstance(one, FrictionTemperature)), None)
         # What a play does to recorded rates is left to those who differentiate positions.
-        lead = faults.lead(velocity)
+        lead = faults.lead(velocity, acceleration)
         return Readings(position + faults.zero + lead, velocity, acceleration, lead, effort,
                         {} if warm is None else warm.measured(motion.time, motion.velocity))
 
