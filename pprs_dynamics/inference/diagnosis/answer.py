@@ -23,7 +23,6 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
-from pprs_dynamics.inference.diagnosis.possible import why_impossible
 from pprs_dynamics.inference.diagnosis.quantities import plain
 from pprs_dynamics.inference.diagnosis.statements import (
     Statement,
@@ -62,6 +61,7 @@ from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import hold_out
 from pprs_dynamics.inference.search.noise_floors import noise_floors
 from pprs_dynamics.inference.search.possible_totals import left_at_nothing
+from pprs_dynamics.inference.search.possible_values import why_impossible
 from pprs_dynamics.inference.search.ranking import Ranking
 from pprs_dynamics.inference.search.relinearisation import settled
 from pprs_dynamics.measurement.files.recording import Recording
