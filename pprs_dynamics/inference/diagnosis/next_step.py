@@ -123,9 +123,10 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         return ('Record a motion that is faster than the stick-slip, and diagnose that; as long as '
                 'the machine has to move so slowly, its cause comes first (grease, gains, a soft '
                 'transmission)', replace(files, recordings=(SECOND,)).command('diagnose'))
-    if diagnosis.little or (diagnosis.verdict == 'unknown' and diagnosis.since is None
-                            and _has_no_friction(diagnosis.model)):
-        # Beside all the friction that lacks, no form of it is found.
+    if diagnosis.little or (
+            diagnosis.since is None and _has_no_friction(diagnosis.model)
+            and (diagnosis.verdict == 'unknown' or len(diagnosis.effects) > 1)):
+        # Of a model that lacks all friction several effects are what fits together, at best.
         return first_step(diagnosis.model, files)
     if changing := [f'{effect.name}{effect.when}' for effect in diagnosis.effects
                     if effect.course is not None]:
