@@ -69,8 +69,8 @@ def test_what_begins_in_the_middle_is_not_adopted_throughout() -> None:
 
 
 def test_what_is_there_from_the_first_strokes_on_has_no_beginning() -> None:
-    """Before it the robot has hardly moved, which friction that has not turned over does as well."""
-    picked = np.where((0.3 < TIME)[:, None], loaded(0.2), FORCES.total)
+    """Before it the robot has hardly moved, as friction that has not turned over would show."""
+    picked = np.where((TIME > 0.3)[:, None], loaded(0.2), FORCES.total)
     payload = next(one for one in diagnosed(picked).effects if one.name == 'payload_mass')
     assert payload.course is None
     assert payload.parameters['mass'].value == pytest.approx(0.2, abs=0.01)
