@@ -409,7 +409,7 @@ class Columns:
                 return found
 
             with_base = weighted(None)
-            known = np.concatenate([with_base[:, :-1], *(weighted(one) for one in acting)], axis=1)
+            known = np.concatenate([with_base[:, :-1], *map(weighted, acting)], axis=1)
             side += with_base[:, -1] - known @ fit.coefficients[index]
             taken[:, index] += known
         return taken, side
