@@ -86,7 +86,10 @@ class Readings:
     Parameters
     ----------
     position, velocity, acceleration : (N, 6) arrays
-        As measured; the latter two are what differentiation would find [m, m/s, m/s^2].
+        As measured; the latter two are what differentiation would find, but for what a play adds
+        to the position [m, m/s, m/s^2].
+    lead : (N, 6) array
+        What a play adds to the position [m].
     effort : (N, 6) array
         [N]
     channels : dict of str to (N, 6) array
@@ -96,6 +99,7 @@ class Readings:
     position: Array
     velocity: Array
     acceleration: Array
+    lead: Array
     effort: Array
     channels: dict[str, Array]
 
@@ -168,8 +172,8 @@ class PrescribedPlant:
                 for values in (position, velocity, acceleration))
         warm = next((one for one in effects if isinstance(one, FrictionTemperature)), None)
         # What a play does to recorded rates is left to those who differentiate positions.
-        return Readings(position + faults.zero + faults.lead(velocity), velocity, acceleration,
-                        effort,
+        lead = faults.lead(velocity, acceleration)
+        return Readings(position + faults.zero + lead, velocity, acceleration, lead, effort,
                         {} if warm is None else warm.measured(motion.time, motion.velocity))
 
     def _bodies_with(self, changes: Sequence[BodyChange]) -> BodyForces:

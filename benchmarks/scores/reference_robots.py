@@ -42,14 +42,9 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel, inertial_values
 from pprs_dynamics.physics.model.model_file import build_model, load_model
+from pprs_dynamics.simulation.arm_engine import ArmEngine
 from pprs_dynamics.simulation.arm_forms import FORMS, STEEPNESS, JointForm, JointMoment
-from pprs_dynamics.simulation.arm_run import (
-    ArmEngine,
-    ArmRun,
-    draw_motion,
-    noise_like,
-    simulate_arm,
-)
+from pprs_dynamics.simulation.arm_run import ArmRun, draw_motion, noise_like, simulate_arm
 
 DURATION, REFERENCE_SEED = 20.0, 1000
 HEALTHY, SHARE = ('hysteresis', 'force_ripple', 'stribeck_friction'), 0.4  # of a form's size

@@ -26,8 +26,9 @@ from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.simulation.arm_engine import SLOWEST, ArmEngine
 from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, draw_form, truth
-from pprs_dynamics.simulation.arm_run import SLOWEST, ArmEngine, draw_motion, one_able_joint
+from pprs_dynamics.simulation.arm_run import draw_motion, one_able_joint
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 from pprs_dynamics.simulation.plant import UnsolvedError

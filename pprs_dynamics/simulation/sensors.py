@@ -20,7 +20,9 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT
 from pprs_dynamics.simulation.hidden_effect import HiddenEffect, Range, SensorEffect
 
-CROSSING = 0.002  # [m/s], speed within which a play is crossed
+# A play is crossed whenever a drive turns, however slowly: within that time [s] of it; what is
+# slower than the second stands [m/s].
+CROSSING, STANDING = 0.02, 1e-4
 # Correlation times of the slow processes that add up to 1/f noise [samples], a factor 4 apart:
 # the sum follows 1/f within 10 % from 1/200 of the sampling rate down to 1/400 000 of it.
 PINK_TIMES = 2.0 * 4.0 ** np.arange(9)
@@ -107,9 +109,10 @@ class SensorFaults:
         late = max(0.0, -float(delay.min()))
         return cls(zero, gain, delay + late, np.full(drives, late), time_constant, play)
 
-    def lead(self, velocity: Array) -> Array:
-        """Return by how much encoders lead their drives, (D,), at velocities (D,)."""
-        return self.play / 2 * velocity / np.hypot(velocity, CROSSING)
+    def lead(self, velocity: Array, acceleration: Array) -> Array:
+        """Return by how much encoders lead their drives, (..., D), at rates (..., D)."""
+        turning = np.hypot(acceleration * CROSSING, STANDING)
+        return self.play / 2 * velocity / np.hypot(velocity, turning)
 
 
 class ButterworthFilter:
@@ -242,7 +245,7 @@ class Sensors:
         self._past: deque[tuple[Array, Array, Array]] = deque()
         self.position, self.velocity, self.zero = np.zeros((3, len(self._scale)))
         # Of what is recorded; the drives' own control has encoders without a play.
-        self._lead, self._lead_rate = np.zeros((2, len(self._scale)))
+        self._lead, self._lead_rate, self._true_velocity = np.zeros((3, len(self._scale)))
         self.use_effects(effects)
         self.smoothing = 1.0 if settings.true_velocity else 1 - float(
             np.exp(-2 * np.pi * settings.velocity_bandwidth * step))
@@ -262,7 +265,9 @@ class Sensors:
         self._past.clear()
         self._filter.forget()
         self.position, self.velocity = self._encoder(position), np.array(velocity)
-        self._lead, self._lead_rate = self._faults.lead(self.velocity), np.zeros(len(self._scale))
+        self._lead_rate = np.zeros(len(self._scale))
+        self._lead, self._true_velocity = self._faults.lead(
+            self.velocity, self._lead_rate), self.velocity.copy()
 
     def read_encoders(self, position: Array, velocity: Array) -> None:
         """Take the true positions and velocities, (D,), as the drives' electronics see them."""
@@ -273,7 +278,8 @@ class Sensors:
             change = (seen - self.position) / self._step
             self.velocity = self.velocity + self.smoothing * (change - self.velocity)
         self.position = seen
-        lead = self._faults.lead(velocity)
+        lead = self._faults.lead(velocity, (velocity - self._true_velocity) / self._step)
+        self._true_velocity = np.array(velocity)
         self._lead_rate = self._lead_rate + self.smoothing * (
             (lead - self._lead) / self._step - self._lead_rate)
         self._lead = lead
@@ -346,8 +352,8 @@ class TimeDelay(SensorEffect):
 
 
 class LostMotion(SensorEffect):
-    """A play in an encoder's coupling: a smooth sign of the speed, the catalogue has a travel."""
+    """A play in an encoder's coupling, crossed within a time; the catalogue has a travel."""
 
     name: ClassVar[str] = 'lost_motion'
-    form: ClassVar[str] = 'measured position = position + play v / (2 sqrt(v^2 + w^2))'
+    form: ClassVar[str] = 'measured position = position + play v / (2 sqrt(v^2 + (a T)^2))'
     ranges: ClassVar[dict[str, Range]] = {'play': Range('m', 0.0003, 0.001, 'log', scales=True)}

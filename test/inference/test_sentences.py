@@ -357,7 +357,7 @@ def test_the_runner_up_stands_beside_the_best_set_with_its_cost() -> None:
         ('nothing missing', '+120.4', 'names + 120.4'),
         ('a pattern depending on position on lift_2', '+130.0', 'names + 130.0')]
     page = diagnosis_page(diagnosis, word_diagnosis(diagnosis), made_up_residuals(), ['a'])
-    assert '>hysteresis on lift_2</td>' in page.html()
+    assert '>hysteresis on lift_2</th>' in page.html()
 
 
 @pytest.mark.parametrize(('second', 'said'), [

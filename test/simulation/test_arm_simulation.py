@@ -19,8 +19,9 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.simulation.arm_engine import ArmEngine
 from pprs_dynamics.simulation.arm_forms import FORMS, NAMES
-from pprs_dynamics.simulation.arm_run import ArmEngine, draw_motion, simulate_arm
+from pprs_dynamics.simulation.arm_run import draw_motion, simulate_arm
 from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
 
 

@@ -806,7 +806,7 @@ CONTAINERS = (
 # forms of their own; `test_engine_loops.py` holds them against the model.
 DESCRIPTION = tuple(f'pprs_dynamics.physics.mechanism.{name}' for name in (
     'description', 'urdf', 'structure', 'mechanism', 'tree_equations', 'passive_joints'))
-OF_ARMS = {**dict.fromkeys(('engine_state.py', 'engine_loops.py'), DESCRIPTION),
+OF_ARMS = {**dict.fromkeys(('engine_state.py', 'engine_loops.py', 'arm_engine.py'), DESCRIPTION),
            **dict.fromkeys(('arm_run.py', 'mechanism_plant.py'), (
                *DESCRIPTION, 'pprs_dynamics.physics.effects.laws.joint_friction'))}
 # Of the equations, which are compiled functions over tables, names and kinds of rows alone.

@@ -367,8 +367,7 @@ def _sets(page: Page, diagnosis: Diagnosis) -> None:
                   'comes nearer is told as a rival. Of which: how much worse it fits, what its '
                   'coefficients ask of their prior, and the prior costs of its names, drives, '
                   'shapes and signs.', 'note')
-        page.table(('cost', 'set', 'of which'), [
-            (cost, text, why) for text, cost, why in set_rows(diagnosis)])
+        page.table(('set', 'cost', 'of which'), set_rows(diagnosis))
         if diagnosis.candidates:
             page.figure(figures.evidence_bars(diagnosis),
                         'Evidence of each effect alone; 0 is the threshold. Blue: found. Yellow: '

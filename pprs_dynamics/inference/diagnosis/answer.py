@@ -23,7 +23,6 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
-from pprs_dynamics.inference.diagnosis.possible import why_impossible
 from pprs_dynamics.inference.diagnosis.quantities import plain
 from pprs_dynamics.inference.diagnosis.statements import (
     Statement,
@@ -62,6 +61,7 @@ from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import hold_out
 from pprs_dynamics.inference.search.noise_floors import noise_floors
 from pprs_dynamics.inference.search.possible_totals import left_at_nothing
+from pprs_dynamics.inference.search.possible_values import why_impossible
 from pprs_dynamics.inference.search.ranking import Ranking
 from pprs_dynamics.inference.search.relinearisation import settled
 from pprs_dynamics.measurement.files.recording import Recording
@@ -104,7 +104,9 @@ class Answer:
         """
         ranking, reported = self.ranking, self.reported
         alone = [] if ranking.refuted else list(ranking.alone.values())
-        fits, found = with_courses(self.fits, reported, alone)
+        # Beside the MAP set: what is within the model error of others is none with a date, either.
+        constant = reported if ranking.refuted else self.map_set
+        fits, found = with_courses(self.fits, constant, alone)
         if alone and ranking.first is not self.fits:
             kept = ranking.first.evaluate(tuple(
                 candidate for candidate in reported.effects if not candidate.effect.nonlinear))
@@ -112,7 +114,7 @@ class Answer:
                                         min(found.cost, self.map_set.cost))
             if there is not kept:
                 return given, there
-        return fits, found
+        return fits, reported if found is constant else found
 
     @property
     def raises_the_error(self) -> bool:
@@ -230,6 +232,7 @@ class Answer:
                 fits.evaluate(found.without(candidate)).total - found.total, errors[k],
                 errors[k + 1], held_out[k], held_out[k + 1], estimates.at_bound,
                 (errors[k] - errors[k + 1]) / errors[0],
+                objection=why_impossible(candidate.effect, estimates.parameters, self.decisions),
                 in_model=self._in_model(candidate, estimates.parameters),
                 course=None if course is None else replace(
                     course, begin=course.begin - begun, end=course.end - begun),

@@ -93,13 +93,17 @@ def first_step(model: ForceModel, files: GivenFiles) -> tuple[str, str]:
     A description alone, without friction and with the maker's masses, is fitted first.
     """
     if model.is_described:
-        bare = not any(np.any(model.values[key]) for key in OWN_FRICTION)
-        words = ('The model has no friction yet: fit inertia and friction first' if bare else
+        words = ('The model has no friction yet: fit inertia and friction first'
+                 if _has_no_friction(model) else
                  'Check units, signs and zeros, and that this is the model of this machine as it '
                  'was recorded; then fit it')
         return words, files.command('fit', '--output', files.output('base.yaml'))
     return ('Check units, signs and zeros, and that this is the model of this machine as it was '
             'recorded', files.command('info'))
+
+
+def _has_no_friction(model: ForceModel) -> bool:
+    return model.is_described and not any(np.any(model.values[key]) for key in OWN_FRICTION)
 
 
 def measure_first(findings: Sequence[NoMeasurement], files: GivenFiles) -> tuple[str, str]:
@@ -119,7 +123,10 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         return ('Record a motion that is faster than the stick-slip, and diagnose that; as long as '
                 'the machine has to move so slowly, its cause comes first (grease, gains, a soft '
                 'transmission)', replace(files, recordings=(SECOND,)).command('diagnose'))
-    if diagnosis.little:
+    if diagnosis.little or (
+            diagnosis.since is None and _has_no_friction(diagnosis.model)
+            and (diagnosis.verdict == 'unknown' or len(diagnosis.effects) > 1)):
+        # Of a model that lacks all friction several effects are what fits together, at best.
         return first_step(diagnosis.model, files)
     if changing := [f'{effect.name}{effect.when}' for effect in diagnosis.effects
                     if effect.course is not None]:

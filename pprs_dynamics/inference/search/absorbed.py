@@ -21,6 +21,7 @@ from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, E
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, FittedSets
 from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
+from pprs_dynamics.inference.search.possible_values import is_possible
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 
@@ -56,7 +57,8 @@ def without_absorbed(search: Search, map_set: CandidateSet,
     fits, cheapest = search.fits, search.best
     reported, absorbed = beyond_discrepancy(fits, map_set)
     while reported.total > map_set.total + fits.decisions.rival_margin:
-        replaced = search.replaced(reported, lambda other: not _absorbable(fits, other))
+        replaced = search.replaced(reported, lambda other: not _absorbable(fits, other)
+                                   and is_possible(fits, other))
         if replaced is reported:
             break
         reported = replaced

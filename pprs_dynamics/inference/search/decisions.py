@@ -159,7 +159,8 @@ FIXED = (
      'they were fitted without it; recordings decide, and where they tell nothing the file'),
     ('TURNED', TURNED, '1', "speed over the model's width of reversal, at which a drive moves",
      'friction has turned over to 96 %'),
-    ('LEAST_MOVING', LEAST_MOVING, '1', 'share of the time in motion that friction needs',
+    ('LEAST_MOVING', LEAST_MOVING, '1', 'share of the time in motion that friction needs, and of '
+     'the motion that a beginning needs before and after it',
      'where a drive stands any constant force looks like friction'),
     ('LEAST_SAMPLES', float(LEAST_SAMPLES), '1', 'samples of a drive that takes part',
      'a spectrum has a dozen shapes'),

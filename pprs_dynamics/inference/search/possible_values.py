@@ -4,7 +4,7 @@
 """What a fit may say of an effect and no machine can have: then it is no finding.
 
 A base that leans as none does, and a gain that is another unit. Negative friction and inertia are
-a matter of cost (`search.possible_totals`).
+a matter of cost (`possible_totals`).
 """
 
 from __future__ import annotations
@@ -13,8 +13,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.decisions import Decisions
-from pprs_dynamics.inference.search.estimates import Estimate
+from pprs_dynamics.inference.search.estimates import Estimate, estimate
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.physics.effects.laws.effort_gain import EffortGain
@@ -32,6 +34,13 @@ def why_impossible(effect: type[CatalogueEffect], parameters: Mapping[str, Estim
     decisions : Decisions
     """
     return next(_reasons(effect, parameters, decisions), '')
+
+
+def is_possible(fits: FittedSets, fitted: CandidateSet) -> bool:
+    """Return whether a machine can have all that a set says."""
+    return not any(why_impossible(one.effect, estimate(fits, fitted, one).parameters,
+                                  fits.decisions)
+                   for one in fitted.effects if one.effect in (EffortGain, BaseTilt))
 
 
 def _sizes(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
