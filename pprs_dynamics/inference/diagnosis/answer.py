@@ -31,7 +31,7 @@ from pprs_dynamics.inference.diagnosis.statements import (
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.paired_errors import paired_gain, rms
-from pprs_dynamics.inference.search.absorbed import Absorbed, form_errors, stands_out
+from pprs_dynamics.inference.search.absorbed import Absorbed
 from pprs_dynamics.inference.search.candidates import (
     DURING,
     SINCE,
@@ -319,10 +319,10 @@ class Answer:
         for d in self.fits.regression.drives:
             floor = max(floors[self.drives[d]], 1e-300)
             # A constant that slow noise would show as well is none of it.
-            left = float(np.nanstd(self.remaining[:, d]))
-            if (stands_out(left, floor, self._form_errors[d], self.decisions)
-                    and self._is_worth_a_word(d)):
-                found[self.drives[d]] = left / floor
+            kept = float(np.nanstd(self.remaining[:, d])) / floor
+            allowed = np.hypot(self.decisions.left_ratio, self._lack_of_fit[d] / floor)
+            if kept > allowed and self._is_worth_a_word(d):
+                found[self.drives[d]] = kept
         return found
 
     def _is_worth_a_word(self, d: int) -> bool:
@@ -353,13 +353,21 @@ class Answer:
                     by_drive[d], candidate, self.dated.fit.of(block), evidence))
         drifting = levels(self.fits.regression.residuals, dict(noise), self.decisions)
         statements += [statement for name, statement in drifting.items()
-                       if statement.amplitude > self._form_errors[self.drives.index(name)]]
+                       if statement.amplitude > self._lack_of_fit[self.drives.index(name)]]
         return tuple(sorted(statements, key=lambda one: -one.evidence))
 
     @cached_property
-    def _form_errors(self) -> list[float]:
-        """What the forms of the adopted effects may leave, by drive, rms [N]."""
-        return form_errors(self.dated_fits, self.dated)
+    def _lack_of_fit(self) -> list[float]:
+        """What the forms of the adopted effects may leave, by drive, rms [N].
+
+        A share of their sum: what others nearly cancel is no force of a machine.
+        """
+        force = np.zeros(self.remaining.shape)
+        for candidate in self.dated.effects:
+            if candidate.effect.idealised:
+                force += self.dated_fits.components.force(self.dated, candidate,
+                                                          self.remaining.shape)
+        return [self.decisions.form_share * root_mean_square(of_drive) for of_drive in force.T]
 
     def _candidates(self) -> tuple[RankedEffect, ...]:
         """Return the effects that were fitted as the only one, the best first."""

@@ -14,7 +14,6 @@ import numpy as np
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.regression.base_columns import units_of
 from pprs_dynamics.inference.regression.normal_equations import Block
-from pprs_dynamics.inference.search.absorbed import form_errors
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
@@ -100,14 +99,9 @@ def _standing_out(fits: FittedSets, fitted: CandidateSet, block: Block, own: flo
     regression = fits.regression
     share = own / sum(float(rows[0] ** 2 @ regression.series[d].spread(
         regression.weights(fitted.fit, d))) for d, rows in block.rows.items())
-    forms = form_errors(fits, fitted)
-    found = np.inf
-    for d, rows in block.rows.items():
-        noise = max(regression.noise_floor(fitted.fit, d), 1e-300)
-        allowed = fits.decisions.left_ratio ** 2 + (forms[d] / noise) ** 2
-        size = max(root_mean_square(rows), 1e-300)
-        found = min(found, float(np.sqrt((allowed - 1) / share)) * noise / size)
-    return found
+    sizes = [root_mean_square(rows) / max(regression.noise_floor(fitted.fit, d), 1e-300)
+             for d, rows in block.rows.items()]
+    return float(np.sqrt((fits.decisions.left_ratio ** 2 - 1) / share)) / max(sizes)
 
 
 def _of_one_number(fits: FittedSets) -> Iterator[Component]:

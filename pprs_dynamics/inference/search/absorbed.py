@@ -6,8 +6,7 @@
 The catalogue's friction, springs and cords are only nearly of the form that real ones have, and so
 is the model's own friction. A further candidate on the same drives, whose whitened force beyond
 all others is a small share of theirs, is within their discrepancy: it is told as such and not
-adopted. Not so where a drive would keep an error that stands out without it: of its noise, and of
-what forms leave, by the rule that makes a verdict `unknown`.
+adopted. Not so where a drive would keep an error that stands out of its noise without it.
 """
 
 from __future__ import annotations
@@ -16,9 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
-from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, FittedSets
 from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
 from pprs_dynamics.inference.search.possible_values import is_possible
@@ -81,7 +78,8 @@ def beyond_discrepancy(fits: FittedSets, map_set: CandidateSet,
         # Of two that look like each other, either is small beyond the other.
         less = {candidate: fits.evaluate(rest.without(candidate)) for candidate in absorbable}
         less = {candidate: smaller for candidate, smaller in less.items()
-                if _is_of_loads(fits, rest, candidate) or not _stands_out(fits, map_set, smaller)}
+                if _is_of_loads(fits, rest, candidate)
+                or _over_noise(fits, map_set, smaller) <= fits.decisions.left_ratio}
         if not less:
             break
         gone = min(less, key=lambda candidate: less[candidate].total)
@@ -104,32 +102,11 @@ def _is_of_loads(fits: FittedSets, fitted: CandidateSet, candidate: Candidate) -
                     if other is not candidate for component in other.components))
 
 
-def _stands_out(fits: FittedSets, map_set: CandidateSet, smaller: CandidateSet) -> bool:
-    """Return whether a set leaves more on a drive than noise, that of the MAP set, and forms do."""
-    regression, allowed = fits.regression, form_errors(fits, smaller)
-    left = regression.left(smaller.fit)
-    return any(stands_out(float(left[k]), regression.noise_floor(map_set.fit, d), allowed[d],
-                          fits.decisions) for k, d in enumerate(regression.drives))
-
-
-def form_errors(fits: FittedSets, fitted: CandidateSet) -> list[float]:
-    """Return what the forms of a set's effects may leave, by drive, rms [N].
-
-    A share of their sum: what others nearly cancel is no force of a machine.
-    """
-    force = np.zeros(fits.design.residuals.measured.shape)
-    for candidate in fitted.effects:
-        if candidate.effect.idealised:
-            force += fits.components.force(fitted, candidate, force.shape)
-    return [fits.decisions.form_share * root_mean_square(of_drive) for of_drive in force.T]
-
-
-def stands_out(left: float, noise: float, form_error: float, decisions: Decisions) -> bool:
-    """Return whether what is left on a drive is more than its noise and forms leave, all rms [N].
-
-    Of independent errors the squares add up.
-    """
-    return left > float(np.hypot(decisions.left_ratio * noise, form_error))
+def _over_noise(fits: FittedSets, map_set: CandidateSet, smaller: CandidateSet) -> float:
+    """Return the largest rms that a set leaves on a drive, over the noise beside the MAP set."""
+    regression = fits.regression
+    noise = [regression.noise_floor(map_set.fit, d) for d in regression.drives]
+    return float(np.max(regression.left(smaller.fit) / np.maximum(noise, 1e-300)))
 
 
 def _absorbable(fits: FittedSets, fitted: CandidateSet) -> dict[Candidate, tuple[str, ...]]:
