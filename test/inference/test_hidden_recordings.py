@@ -84,6 +84,20 @@ def test_a_case_has_the_strength_it_promises_and_repeats(
     np.testing.assert_allclose(again.effort, recording.effort, rtol=1e-6)
 
 
+def test_a_play_is_as_strong_as_a_comparison_sees_it() -> None:
+    """It shows as bursts of acceleration, a hundred times what it is as an error of position."""
+    case = recordings.Case('effects', ('lost_motion',), 4, 3.0)
+    model, recording, truth = recordings.make_case(case)
+    robot = build_model({**model.values, **truth['robot']})
+    error = measure_residuals(robot, [recording])[0].error
+    over_noise = np.sqrt(np.mean(np.square(error), axis=0)) / truth['noise_by_drive']
+    (effect,) = truth['effects']
+    strongest = int(np.argmax(effect['snr_by_drive']))
+    expected = np.hypot(1.0, effect['snr_by_drive'][strongest])
+    # Noise that is correlated hides less of bursts than of what is as slow as itself.
+    assert 0.5 * expected < over_noise[strongest] < 2 * expected
+
+
 @pytest.mark.parametrize('name', ['viscous_friction', 'drive_spring', 'force_ripple'])
 def test_a_form_that_is_off_is_off_by_5_to_15_percent(name: str) -> None:
     rng = np.random.default_rng(3)

@@ -20,7 +20,7 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.effects.laws.lost_motion import LostMotion, behind_play
+from pprs_dynamics.physics.effects.laws.lost_motion import LostMotion, behind_play, reversals
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.model_file import build_model
@@ -79,6 +79,22 @@ def test_behind_a_play_is_the_link(play: float) -> None:
     assert np.abs(after).max() < 0.25 * np.abs(before).max()
 
 
+def test_an_encoder_that_has_come_back_by_nearly_the_play_has_crossed_it() -> None:
+    play, link = 0.02, 0.4 * np.sin(2 * TIME)
+    side = np.cos(2 * TIME) / np.hypot(np.cos(2 * TIME), 0.05)
+    encoder = link + 0.95 * play / 2 * side
+    nearly = encoder.copy()
+    turns = np.flatnonzero(np.diff(np.sign(np.gradient(encoder))))
+    between = slice(turns[2], turns[3])  # this stroke alone is of 0.95 of the play
+    stroke = np.linspace(0.0, 0.95 * play, turns[3] - turns[2])
+    nearly[between] = encoder[turns[2]] + np.sign(encoder[turns[3]] - encoder[turns[2]]) * stroke
+    nearly[turns[3]:] += nearly[turns[3] - 1] - encoder[turns[3]]
+    assert len(reversals(nearly, play)) < len(reversals(encoder, play))
+    found = nearly - behind_play(nearly, play)
+    middle = (turns[2] + turns[3]) // 2
+    assert np.ptp(np.sign(found[[middle - 150, turns[3] - 1]])) == 2.0
+
+
 def test_motion_within_a_play_and_without_a_reversal_is_as_read() -> None:
     ramp = 0.1 * TIME
     np.testing.assert_array_equal(behind_play(ramp, 0.02), ramp)
@@ -115,6 +131,22 @@ def test_a_model_with_the_play_leaves_the_noise(tmp_path: Path, size: float) -> 
     after = left(build_model({**model.values, **on_swing(play=size)}, model.source))
     assert after < 0.5 * before
     assert after < 6 * NOISE
+
+
+def test_bursts_of_an_encoder_do_not_choose_the_window(tmp_path: Path) -> None:
+    """A motor that crosses a play fast asks for a short window, its link for a long one."""
+    model = made_up_arm.real_arm(tmp_path)
+    size, moved = 0.03, made_up_arm.motion(20.0)
+    recording = with_play(model, size, width=0.1)
+    read = reconstruct(model, recording)
+    behind = reconstruct(build_model({**model.values, **on_swing(play=size)}, model.source),
+                         recording)
+    assert behind.read.smoothing.duration == read.smoothing.duration
+    np.testing.assert_array_equal(behind.index, read.index)
+    found, before = (np.std(one.acceleration[:, SWING] - moved.acceleration[one.index, SWING])
+                     for one in (behind, read))
+    assert behind.smoothing.duration > 4 * read.smoothing.duration
+    assert found < 0.2 * before
 
 
 @pytest.mark.parametrize('size', [0.008, 0.03])

@@ -532,8 +532,8 @@ class Design:
             rate = np.gradient(planned, recording.time)
             found = np.stack((planned, rate, np.gradient(rate, recording.time)))
         else:
-            found = np.concatenate(misread([effect], name, read.recorded, read.read, drive),
-                                   axis=1).T
+            found = np.concatenate(misread([effect], name, read.recorded, read.read, drive,
+                                           read.smoothing), axis=1).T
         load = recording.transmitted[:, [drive]]
         found[0] += effect.loaded_position_error(name, load)[:, 0]
         if read is not None and read.windup is not None:

@@ -21,6 +21,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ConvergenceError, MotionError
 from pprs_dynamics.measurement.files.samples import Progress
+from pprs_dynamics.measurement.motion.differentiation import Smoothing
 from pprs_dynamics.measurement.motion.drive_motion import (
     DriveMotion,
     smooth_drives,
@@ -299,7 +300,7 @@ def reconstruct(
 def read_by(reconstruction: Reconstruction, model: ForceModel) -> Reconstruction:
     """Return the same reconstruction with the drives where another model's encoders are.
 
-    Smoothing and blocks do not depend on them.
+    Blocks do not depend on them.
 
     Raises
     ------
@@ -310,16 +311,18 @@ def read_by(reconstruction: Reconstruction, model: ForceModel) -> Reconstruction
         model, reconstruction.recorded, reconstruction.read, reconstruction.time,
         reconstruction.windup)
     return replace(reconstruction, position=drives.position, velocity=drives.velocity,
-                   acceleration=drives.acceleration, motion=followed.motion,
+                   acceleration=drives.acceleration, smoothing=drives.smoothing,
+                   motion=followed.motion,
                    near_branch=followed.near_branch, jumps=followed.jumps)
 
 
 def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recording: Recording,
-            read: DriveMotion, drive: int | None = None) -> tuple[Array, Array, Array]:
+            read: DriveMotion, drive: int | None = None, smoothing: Smoothing | None = None,
+            ) -> tuple[Array, Array, Array]:
     """Return the errors of position, velocity and acceleration that were measured, (N, D) each.
 
-    Smoothed as these are, but for functions of the position, whose rates follow from its own; of
-    one drive (N, 1).
+    Smoothed as these are, or otherwise, but for functions of the position, whose rates follow from
+    its own; of one drive (N, 1).
     """
     chosen = slice(None) if drive is None else [drive]
 
@@ -339,7 +342,7 @@ def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recordin
     if not others:
         return found
     smoothed = smoothed_as(read, recording,
-                           lambda position: errors(others, position[:, chosen]))
+                           lambda position: errors(others, position[:, chosen]), smoothing)
     return found[0] + smoothed[0], found[1] + smoothed[1], found[2] + smoothed[2]
 
 

@@ -141,9 +141,10 @@ def smooth_drives(recording: Recording, window: float | None = None,
 
 def smoothed_again(motion: DriveMotion, recording: Recording,
                    made: Callable[[Array], Array]) -> DriveMotion:
-    """Return a motion with the window that suits what is made of its positions, if it is shorter.
+    """Return a motion with the window that suits what is made of its positions.
 
-    Bursts of an encoder that is not where its drive is are nothing that a window could suit.
+    Bursts of an encoder that is not where its drive is shorten the window that suits what it
+    reads, and lengthen it where they look like noise.
 
     Parameters
     ----------
@@ -155,39 +156,52 @@ def smoothed_again(motion: DriveMotion, recording: Recording,
     smoothing = choose_smoothing(representative([
         Stretch(made(grid.at_steps(recording.position[part])), grid.step)
         for grid, part in zip(motion.grids, _segments_of(motion, recording), strict=True)]))
-    if smoothing.duration >= motion.smoothing.duration:
-        return motion
-    q, q_dot, q_ddot = smoothed_as(replace(motion, smoothing=smoothing), recording, made)
+    q, q_dot, q_ddot = smoothed_as(motion, recording, made, smoothing)
     from_velocity, from_acceleration = motion.from_recorded
-    return replace(motion, position=q,
+    return replace(motion, position=q, smoothing=smoothing,
                    velocity=np.where(from_velocity, motion.velocity, q_dot),
                    acceleration=np.where(from_acceleration, motion.acceleration, q_ddot))
 
 
-def smoothed_as(motion: DriveMotion, recording: Recording,
-                made: Callable[[Array], Array]) -> tuple[Array, Array, Array]:
+def smoothed_as(motion: DriveMotion, recording: Recording, made: Callable[[Array], Array],
+                smoothing: Smoothing | None = None) -> tuple[Array, Array, Array]:
     """Return what is made of measured positions, with its rates, (N, D) each, as these are.
 
     Parameters
     ----------
     motion : DriveMotion
-        Whose samples and smoothing are taken.
+        Whose samples are taken.
     recording : Recording
     made : callable
         Takes the positions of a segment at equal steps, (n, D), and returns as many.
+    smoothing : Smoothing, optional
+        Other than the motion's, which stays at the ends of segments that a longer window does not
+        reach.
     """
     parts = []
     for span, grid, part in zip(motion.segments, motion.grids, _segments_of(motion, recording),
                                 strict=True):
-        filter_ = motion.smoothing.polynomial(grid.step)
-        kept = slice(int(motion.index[span.start]) - part.start,
-                     int(motion.index[span.stop - 1]) + 1 - part.start)
+        first = int(motion.index[span.start]) - part.start
+        kept = slice(first, int(motion.index[span.stop - 1]) + 1 - part.start)
         values = made(grid.at_steps(recording.position[part]))
         if not np.any(values):
             parts.append([np.zeros((kept.stop - kept.start, *values.shape[1:]))] * 3)
             continue
-        parts.append([grid.at_samples(one, filter_.half, kept)
-                      for one in filter_.differentiated(values)])
+        filter_ = (smoothing or motion.smoothing).polynomial(grid.step)
+        inside = grid.inside(filter_.half)
+        inside = slice(max(kept.start, inside.start), min(kept.stop, inside.stop))
+        if inside == kept or inside.start >= inside.stop:
+            filter_ = filter_ if inside == kept else motion.smoothing.polynomial(grid.step)
+            parts.append([grid.at_samples(one, filter_.half, kept)
+                          for one in filter_.differentiated(values)])
+            continue
+        ends = motion.smoothing.polynomial(grid.step)
+        rates = [grid.at_samples(one, ends.half, kept).copy()
+                 for one in ends.differentiated(values)]
+        for rate, one in zip(rates, filter_.differentiated(values), strict=True):
+            rate[inside.start - first:inside.stop - first] = grid.at_samples(
+                one, filter_.half, inside)
+        parts.append(rates)
     q, q_dot, q_ddot = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return q, q_dot, q_ddot
 

@@ -50,9 +50,9 @@ class Counterbalance(DriveEffect):
         'pressure; F_b and K are force and stiffness times b and b^2, b and rho b the distances '
         'of its ends from the axis',
         'a curve over the position of one joint, the same both ways, at any speed and with any '
-        'load: zero where its ends are in line with the axis, steepest near the nearer one; like '
-        'a mass on the link, but not with the sine of an angle from the vertical, nor in other '
-        'joints',
+        'load: zero where its ends are in line with the axis, steepest near that of these '
+        'positions where both are on one side; like a mass on the link, but not with the sine of '
+        'an angle from the vertical, nor in other joints',
         'the balancer of a heavy robot: springs, a gas cylinder, or a hydraulic cylinder with a '
         'gas accumulator; a gas spring at a door or an arm; its pressure falls over the years',
         'read its pressure, or take it off with the arm propped: the error must be gone; let the '

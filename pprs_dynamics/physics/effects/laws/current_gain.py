@@ -54,7 +54,7 @@ class CurrentGain(GainEffect):
         'measured effort = (1 + kappa (T - T_0) + a sin(2 pi q / p + phi)) F',
         'an error in proportion to the effort itself, weight, inertia and friction alike, that '
         'grows with the temperature of the drive, or is a wave over its position that is higher '
-        'the larger the effort is, and of force_ripple none where the effort is 0',
+        'the larger the effort is, and is gone where the effort is 0 (that of force_ripple stays)',
         'magnets lose 0.1 to 0.2 % of their flux per kelvin; windings and poles that differ, '
         'offsets and gains of current sensors that differ by phase make torque ripple with the '
         'current',

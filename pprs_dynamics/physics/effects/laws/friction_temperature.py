@@ -46,7 +46,8 @@ class FrictionTemperature(DriveEffect):
         'F_T (T - T_0) sgn(q_dot) + c_T T_d (1 - exp(-(T - T_0) / T_d)) q_dot, T the measured '
         'temperature of the drive',
         'the step at each reversal, or the slope over velocity, shrinks or grows with the '
-        'temperature of the drive, up and down; friction_drift follows the clock alone',
+        'temperature of the drive, up and down; friction_drift follows the clock, or the '
+        'work of the drive itself',
         'oil and grease thin as they warm: viscous friction falls to a half in 15 to 30 K; seals '
         'and preload change the dry part, either way',
         'warm the drive by work, let it cool, and run the same slow and fast strokes on the way: '

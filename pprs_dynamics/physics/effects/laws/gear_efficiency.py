@@ -31,11 +31,11 @@ class GearEfficiency(DriveEffect):
         'a step at each reversal that grows with the load, like load_friction, but another one '
         'where a load is lifted than where it is let down: as if it were heavier and rubbed',
         'every worm, screw, harmonic and planetary gear: teeth slide in proportion to what they '
-        'transmit, and more so while the motor drives; no value, with grease, wear and preload, is '
-        "the maker's for long",
+        'transmit, and more so while the motor drives; grease, wear and preload change what is in '
+        'the data sheet',
         'lift a load slowly, hold it, let it down slowly, then with twice the load: both steps '
         'from the held effort must double, each in its own size; where they are alike it is '
-        'load_friction, where the middle of both is off it is a mass or the current gain',
+        'load_friction; a mass or a current gain that is off changes lifting and lowering alike',
         'Wang, Kim, Directional efficiency in geared transmissions: characterization of '
         'backdrivability towards improved proprioceptive control, ICRA, 2015')
 

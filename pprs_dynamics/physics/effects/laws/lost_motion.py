@@ -7,7 +7,7 @@ The encoder reads q + e. With backlash, e is half of it towards the side to whic
 the gear, b / 2 sgn(tau): the link falls from one flank to the other while the motor, and with it
 the encoder, goes on as before. With play, the link stays behind at reversals: the encoder first
 travels all of the play without it, and what the link does meanwhile no encoder says; it is taken
-to pass smoothly from its motion before to that after. What winds up is `elastic_joint`.
+to go on smoothly from its motion before to that after. What winds up is `elastic_joint`.
 
 References
 ----------
@@ -27,8 +27,12 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
 
-# On either side of the travel through the play, of its length: there the link's speed is read.
-MARGIN = 0.5
+# On either side of the travel through the play, of its length: there the link may part from the
+# flank. What lies as long beside that tells its motion, by a polynomial that is as good as the
+# smoothing's for accelerations.
+MARGIN, ORDER = 0.5, 5
+# Of the play: flanks give way, and a link turns over that has nearly come to the other.
+CROSSED = 0.9
 # Clearances of screws and gears [m, rad].
 USUAL = (5e-4, math.radians(1.0))
 
@@ -38,7 +42,6 @@ class LostMotion(MeasurementEffect):
 
     name: ClassVar[str] = 'lost_motion'
     acts_in = frozenset({PLATFORM, ARM})
-    idealised: ClassVar[bool] = False
     nonlinear: ClassVar[bool] = True
     not_linear_in: ClassVar[tuple[str, ...]] = ('play',)
     linear = (
@@ -49,12 +52,13 @@ class LostMotion(MeasurementEffect):
     variants = (('backlash',), ('play',))
     unphysical_below: ClassVar[Mapping[str, float]] = {'backlash': 0.0, 'play': 0.0}
     card = Card(
-        'measured position = q + e, e = b sgn(tau) / 2, or b_r / 2 before and -b_r / 2 '
-        'after a reversal',
+        'measured position = q + e, e = b sgn(tau) / 2, or b_r sgn(q_dot) / 2 once the encoder '
+        'has come back by b_r',
         'weight and inertia as of a drive that stands aside, to another side where the load '
         'changes sign; with play a burst at each reversal, where the encoder moves fast and the '
         'drive does not, which looks like a delay or like hysteresis',
-        'worn teeth, a loose coupling, key or belt, a nut with clearance, an encoder on the motor',
+        'worn teeth, a loose coupling, key or belt, a nut with clearance, between an encoder on '
+        'the motor and the link',
         'lock the motor and move the link to and fro by hand with a dial gauge on it: what it '
         'moves freely is backlash, what it gives per force is elastic_joint; reverse slowly and '
         'watch when the link follows the encoder',
@@ -91,9 +95,9 @@ class LostMotion(MeasurementEffect):
 def behind_play(position: Array, play: float) -> Array:
     """Return where a link is that an encoder moves through a play, (N,).
 
-    While the encoder travels through the play the link passes smoothly, by a cubic, from its
-    motion before to that after. Of a negative play, in the encoder's own coupling, the link leads
-    the encoder.
+    While the encoder travels through the play, and a little before and after it, the link's motion
+    is that of a polynomial through its motion beside it. Of a negative play, in the encoder's own
+    coupling, the link leads the encoder.
 
     Parameters
     ----------
@@ -102,36 +106,40 @@ def behind_play(position: Array, play: float) -> Array:
     play : float
         [m, rad]
     """
-    width = abs(play)
-    turns = reversals(position, width)
+    turns = reversals(position, CROSSED * abs(play))
     if not turns:
         return position.copy()
     link = position + play / 2 * turns[0][2]  # before the first of them
     lasts = [0, *(end for _, end, _ in turns)]
     nexts = [*(start for start, _, _ in turns[1:]), len(position) - 1]
+    is_known, passages = np.ones(len(link), dtype=bool), []
     for (start, end, side), last, following in zip(turns, lasts, nexts, strict=False):
         link[start:] = position[start:] - play / 2 * side
         margin = int(MARGIN * (end - start)) + 1
-        a, z = max(start - margin, last), min(end + margin, following)
-        link[start:end] = position[start] + play / 2 * side
-        if a < start and z > end:
-            _bridge(link, position, a, start, end, z, play / 2 * side)
+        first, until = max(start - margin, last), min(end + margin, following)
+        is_known[first + 1:until] = False
+        passages.append((first, until))
+    beside = np.flatnonzero(is_known)
+    for first, until in passages:
+        _bridge(link, beside, first, until)
     return link
 
 
-def _bridge(link: Array, position: Array, a: int, start: int, end: int, z: int, half: float,
-            ) -> None:
-    """Have a link go from sample a to z by a cubic, at the speeds before and after."""
-    n = z - a
-    before, after = position[a] + half, position[z] - half
-    reach_before = max(1, min(start - a, a))
-    reach_after = max(1, min(z - end, len(position) - 1 - z))
-    v0 = (position[a] - position[a - reach_before]) / reach_before if a else 0.0
-    v1 = ((position[z + reach_after] - position[z]) / reach_after
-          if z + reach_after < len(position) else 0.0)
-    s = np.arange(n + 1) / n
-    link[a:z + 1] = ((1 + 2 * s) * (1 - s) ** 2 * before + s * (1 - s) ** 2 * n * v0
-                     + s ** 2 * (3 - 2 * s) * after - s ** 2 * (1 - s) * n * v1)
+def _bridge(link: Array, beside: np.ndarray, first: int, until: int) -> None:
+    """Have a link go from a sample to another by a polynomial through those known beside them.
+
+    Through as many of these on either side as are between; where a recording ends before, a
+    straight line.
+    """
+    reach = max(until - first, ORDER + 1)
+    at = int(np.searchsorted(beside, first, side='right'))
+    known = beside[max(at - reach, 0):at + reach]
+    order = ORDER if min(at, len(beside) - at) > ORDER else 1
+    middle, scale = (first + until) / 2, (known[-1] - known[0]) / 2
+    powers, origin = np.arange(order + 1), link[first]
+    c, *_ = np.linalg.lstsq(((known - middle) / scale)[:, None] ** powers, link[known] - origin)
+    inside = np.arange(first + 1, until)
+    link[inside] = origin + ((inside - middle) / scale)[:, None] ** powers @ c
 
 
 def reversals(position: Array, width: float) -> list[tuple[int, int, float]]:
