@@ -306,5 +306,5 @@ def change_point(time: Array, gains: Array) -> float | None:
 
 def _names(answer: Diagnosis, effect: FoundEffect) -> frozenset[str]:
     """Return the names under which a window may know an effect: its own and its rivals'."""
-    return frozenset({effect.name}).union(*(names for names in answer.indistinguishable
-                                           if effect.name in names))
+    return frozenset({effect.name}).union(*(
+        names for names in answer.indistinguishable if effect.name in names))
