@@ -5,7 +5,8 @@
 
 The catalogue's friction, springs and cords are only nearly of the form that real ones have, and so
 is the model's own friction: they may leave a small share of their force. Masses, gravity and
-sensors are exact, and nothing else's lack of fit looks like them by much.
+sensors (but for a play, of which no encoder says how a link passes through it) are exact, and
+nothing else's lack of fit looks like them by much.
 """
 
 from __future__ import annotations
