@@ -107,6 +107,30 @@ def test_what_can_only_be_nothing_does_not_void_what_is_there() -> None:
     assert without.cost < held.cost
 
 
+def test_a_ripple_longer_than_the_stroke_is_no_free_curve() -> None:
+    """Amplitudes a thousand times the error could cancel within the stroke to any curve."""
+    moved = motion()
+    curve = 60 * moved.position + 2e4 * moved.position ** 3
+    fits = FittedSets(Design.of(MODEL, [recorded(MODEL.drive_forces(moved).total + curve)]),
+                      DECISIONS)
+    error = root_mean_square(fits.design.residuals.error)
+    ripple, spring = catalogue()['force_ripple'], catalogue()['drive_spring']
+
+    def wave(pitch: float) -> Component:
+        return Component.of(ripple, 0, {'pitch': pitch}, ripple.variants[-1])
+    long = fits.evaluate((EffectCandidate.of([wave(50 * np.ptp(moved.position))]),))
+    assert np.abs(long.coefficients(*long.blocks)).max() < 20 * error
+    straight = fits.evaluate((EffectCandidate.of([Component.of(spring, 0, {},
+                                                               spring.variants[0])]),))
+    assert straight.cost < long.cost
+    # Of waves that come back the prior is the one of every other effect.
+    short = wave(np.ptp(moved.position) / 10)
+    rows = fits.components.term(short).rows[0]
+    usual = fits.regression.block({0: rows}).precision
+    assert np.linalg.slogdet(fits.components.block(short).precision)[1] == pytest.approx(
+        np.linalg.slogdet(usual)[1], abs=1.0)
+
+
 def test_a_drive_constant_that_is_another_unit_is_no_effect() -> None:
     """Told apart from mass and friction that all are too small only where gains may be large."""
     loose = build_model({**MODEL.values, 'tolerances.effort_gain.gain': 1.0})

@@ -128,7 +128,8 @@ class Answer:
     def diagnosis(self, unconfirmed: tuple[FoundEffect, ...]) -> Diagnosis:
         first, final, effects = self.ranking.first.design, self.final, self.effects
         regression = self.fits.regression
-        noise = {self.drives[d]: one for d, one in regression.noise(self.map_set.fit).items()}
+        noise = {self.drives[d]: spectrum
+                 for d, spectrum in regression.noise(self.map_set.fit).items()}
         seen = noise_floors(self.fits, best=self.map_set.fit)
         # Where the noise cannot be told it is at most what the best set leaves.
         floors = {self.drives[d]: seen.get(self.drives[d], regression.noise_floor(
@@ -148,8 +149,8 @@ class Answer:
                       for effect in effects)
         verdict = ('unknown' if depends or above or little or passing else 'ambiguous' if sets
                    else 'effect' if effects else 'adequate')
-        moved = [one for one in calibrations(final.fits, final.fitted, final.widths)
-                 if abs(one.after - one.before) > self.decisions.sure * one.std]
+        moved = [number for number in calibrations(final.fits, final.fitted, final.widths)
+                 if abs(number.after - number.before) > self.decisions.sure * number.std]
         absorbed = () if self.is_dated else self.ranking.absorbed
         return Diagnosis(
             verdict, tuple(effects), sets, unconfirmed, self._candidates(),
@@ -268,13 +269,13 @@ class Answer:
     def _dated_model(self) -> ForceModel:
         """Return the model with what is there at the end, and stays."""
         base, placed = parts_of(self.dated_fits, self.dated)
-        there = [one for one, component in zip(placed, self.dated.blocks, strict=True)
+        there = [effect for effect, component in zip(placed, self.dated.blocks, strict=True)
                  if component.course is None or component.course.kind == SINCE]
         return model_at(self.design, base, there)
 
     def _noise_beside_courses(self) -> tuple[dict[str, NoiseSpectrum], dict[str, float]]:
         regression, fit = self.dated_fits.regression, self.dated.fit
-        return ({self.drives[d]: one for d, one in regression.noise(fit).items()},
+        return ({self.drives[d]: spectrum for d, spectrum in regression.noise(fit).items()},
                 {self.drives[d]: regression.noise_floor(fit, d) for d in regression.drives})
 
     def _in_model(self, candidate: EffectCandidate, keys: Iterable[str]) -> dict[str, float]:
@@ -297,8 +298,8 @@ class Answer:
     def _nearly(self, candidate: EffectCandidate) -> list[tuple[float, Estimates]]:
         """Return what sets that are nearly as good say of an effect, and what they cost more."""
         near = self.ranking.nearly(self.decisions.rival_margin)[:MOST_AVERAGED]
-        return [(more, estimate(self.fits, one, same)) for more, one in near
-                for same in one.effects if same.effect is candidate.effect]
+        return [(cost, estimate(self.fits, fitted, same)) for cost, fitted in near
+                for same in fitted.effects if same.effect is candidate.effect]
 
     def _certainty(self, candidate: EffectCandidate) -> float:
         """Return by how many standard errors held-out data are predicted better with an effect."""
@@ -308,7 +309,7 @@ class Answer:
             return hold_out(self.fits, at_noise).gain(hold_out(self.fits, self.reported)).certainty
         before, after = (measure_residuals(one, self.validate)[0] for one in (
             settled(self.fits, without).model, self.final.model))
-        noise = {self.drives[d]: one for d, one in self.fits.regression.noise(
+        noise = {self.drives[d]: spectrum for d, spectrum in self.fits.regression.noise(
             self.reported.fit).items()}
         return paired_gain(before, after, noise).certainty
 
@@ -351,8 +352,8 @@ class Answer:
                 statements.append(word_statement(
                     by_drive[d], candidate, self.dated.fit.of(block), evidence))
         drifting = levels(self.fits.regression.residuals, dict(noise), self.decisions)
-        statements += [one for name, one in drifting.items()
-                       if one.amplitude > self._lack_of_fit[self.drives.index(name)]]
+        statements += [statement for name, statement in drifting.items()
+                       if statement.amplitude > self._lack_of_fit[self.drives.index(name)]]
         return tuple(sorted(statements, key=lambda one: -one.evidence))
 
     @cached_property
@@ -371,13 +372,13 @@ class Answer:
     def _candidates(self) -> tuple[RankedEffect, ...]:
         """Return the effects that were fitted as the only one, the best first."""
         none = self.ranking.nothing.cost
-        return tuple(self._ranked(self.ranking.first, one, one.effects[0], none - one.cost)
-                     for one in self.ranking.alone.values())
+        return tuple(self._ranked(self.ranking.first, fitted, fitted.effects[0], none - fitted.cost)
+                     for fitted in self.ranking.alone.values())
 
     def _suspects(self) -> tuple[RankedEffect, ...]:
         """Return effects that nearly pay beside those adopted: slow noise would do as well."""
-        return tuple(self._ranked(self.fits, one, candidate, self.map_set.cost - one.cost)
-                     for candidate, one in self.ranking.suspects(self.decisions.suspect_margin))
+        return tuple(self._ranked(self.fits, fitted, candidate, self.map_set.cost - fitted.cost)
+                     for candidate, fitted in self.ranking.suspects(self.decisions.suspect_margin))
 
     def _ranked(self, fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
                 evidence: float) -> RankedEffect:

@@ -207,7 +207,7 @@ class Comparison:
         if self.relative < DECISIONS.negligible:
             return f'{left}next to nothing'
         if not beyond:
-            placed = sorted({one.drive for one in self.where})
+            placed = sorted({place.drive for place in self.where})
             return f'{left}noise accounts for ' + (
                 f'most of it on {listed(placed)}, for all of it elsewhere' if placed
                 else 'it on every drive')

@@ -107,9 +107,10 @@ def _standing_out(fits: FittedSets, fitted: CandidateSet, block: Block, own: flo
 def _of_one_number(fits: FittedSets) -> Iterator[Component]:
     """Yield the effects that have a number and no shape, on each drive that they may be on."""
     components = fits.components
-    yield from (one for one in (*components.structure, *components.spanning)
-                if len(one.names) == 1 and not one.shape and not (
-                    issubclass(one.effect, MeasurementEffect) and one.effect.not_linear_in))
+    yield from (component for component in (*components.structure, *components.spanning)
+                if len(component.names) == 1 and not component.shape and not (
+                    issubclass(component.effect, MeasurementEffect)
+                    and component.effect.not_linear_in))
     for d, local in components.local.items():
         for effect in local.effects:
             if not effect.shape and len(effect.variants) == len(effect.variants[0]) == 1:

@@ -65,15 +65,15 @@ def diagnose(
                  if drive not in before or before[drive].kind != one.kind}
     # No law of the drive's own motion describes what its controller and its elasticity do.
     sticking = {} if as_it_is or other else {
-        drive: one for drive, one in sticking_drives(recordings).items()
-        if one.share > decisions.stick_slip}
+        drive: slip for drive, slip in sticking_drives(recordings).items()
+        if slip.share > decisions.stick_slip}
     if other or sticking:
         bare = Answer(without_search(model, recordings, decisions, report), validate, decisions,
                       try_courses=False).diagnosis(())
         return replace(bare, verdict='unknown', warnings=(), effort_looks_like=other,
                        stick_slip=sticking, depends_on=tuple(
-                           word_stick_slip(drive, one, bare.residuals)
-                           for drive, one in sticking.items()))
+                           word_stick_slip(drive, slip, bare.residuals)
+                           for drive, slip in sticking.items()))
     answer = Answer(select(model, recordings, decisions, lambda share: report(0.9 * share),
                            None if reference is None else reference.carried_over),
                     validate, decisions)

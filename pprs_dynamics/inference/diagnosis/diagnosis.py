@@ -184,7 +184,7 @@ class Diagnosis:
             'verdict': self.verdict,
             'effects': [effect.to_dict() for effect in self.effects],
             'indistinguishable': [list(names) for names in self.indistinguishable],
-            'unconfirmed': [one.to_dict() for one in self.unconfirmed],
+            'unconfirmed': [effect.to_dict() for effect in self.unconfirmed],
             'candidates': [candidate.to_dict() for candidate in self.candidates],
             'depends_on': [
                 {'drive': s.drive, 'variable': s.variable, 'share_of_error': s.share_of_error,
@@ -193,14 +193,14 @@ class Diagnosis:
             'suspects': [{key: value for key, value in s.to_dict().items() if key != 'error_after'}
                          for s in self.suspects],
             'sets': [fitted.to_dict() for fitted in self.sets],
-            'barred': [one.to_dict() for one in self.barred],
+            'barred': [ranked.to_dict() for ranked in self.barred],
             'calibrated': [number.to_dict() for number in self.calibrated],
-            'detectable': [one.to_dict() for one in self.detectable],
+            'detectable': [detectable.to_dict() for detectable in self.detectable],
             'held_out_on': self.held_out_on, 'above_noise': dict(self.above_noise),
             'effort_looks_like': kinds_of(self.effort_looks_like),
-            'stick_slip': {drive: {'frequency': one.frequency, 'speed': one.speed,
-                                   'step': one.step, 'share_of_time': one.share}
-                           for drive, one in self.stick_slip.items()},
+            'stick_slip': {drive: {'frequency': slip.frequency, 'speed': slip.speed,
+                                   'step': slip.step, 'share_of_time': slip.share}
+                           for drive, slip in self.stick_slip.items()},
             'explained': _for_json(explained_shares(self.residuals)),
             'little_explained': dict(self.little),
             'explained_after': _for_json(explained_shares(self.residuals, self.remaining)),

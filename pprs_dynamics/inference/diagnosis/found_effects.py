@@ -147,8 +147,9 @@ class FoundEffect(FittedEffect):
                 'alike': [list(names) for names in self.places if len(names) > 1],
                 'since': self.course.begin if self.course and self.course.kind == SINCE else None,
                 'course': self.course.kind if self.course else None,
-                'parameters': {key: one.to_dict() for key, one in self.parameters.items()},
-                **({'moments': {key: one.to_dict() for key, one in self.moments.items()}}
+                'parameters': {key: estimate.to_dict()
+                               for key, estimate in self.parameters.items()},
+                **({'moments': {key: estimate.to_dict() for key, estimate in self.moments.items()}}
                    if self.moments else {}),
                 **({'in_model': dict(self.in_model)} if self.in_model else {}),
                 'evidence': self.evidence,

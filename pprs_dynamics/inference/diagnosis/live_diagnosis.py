@@ -99,10 +99,10 @@ class LiveEffect:
         what = with_drives(self.found.name.replace('_', ' '), self.found.drives, every)
         given = self.found.in_model
         values = ', '.join(
-            f'{key} {with_uncertainty(one.value, one.std, one.unit)}'
-            + (f' ({with_uncertainty(given[key], 0.0, one.unit)} in the model)'
+            f'{key} {with_uncertainty(estimate.value, estimate.std, estimate.unit)}'
+            + (f' ({with_uncertainty(given[key], 0.0, estimate.unit)} in the model)'
                if key in given else '')
-            for key, one in list(self.found.parameters.items())[:MOST_VALUES])
+            for key, estimate in list(self.found.parameters.items())[:MOST_VALUES])
         since = 'from the start' if self.since is None else (
             f'since {datetime.fromtimestamp(self.since):%H:%M:%S}')
         return f'{what}: {values}, {since}'
@@ -304,7 +304,7 @@ def change_point(time: Array, gains: Array) -> float | None:
     return None if first == 0 else float(time[min(first, len(time) - 1)])
 
 
-def _names(answer: Diagnosis, found: FoundEffect) -> frozenset[str]:
+def _names(answer: Diagnosis, effect: FoundEffect) -> frozenset[str]:
     """Return the names under which a window may know an effect: its own and its rivals'."""
-    return frozenset({found.name}).union(*(names for names in answer.indistinguishable
-                                           if found.name in names))
+    return frozenset({effect.name}).union(*(
+        names for names in answer.indistinguishable if effect.name in names))

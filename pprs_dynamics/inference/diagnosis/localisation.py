@@ -73,7 +73,7 @@ class Localisation:
     @property
     def patterns(self) -> dict[str, tuple[Array, ...]]:
         """The patterns that were found on each drive, (k, M) each."""
-        return {name: found.patterns for name, found in self.drives.items()}
+        return {name: findings.patterns for name, findings in self.drives.items()}
 
 
 def localise(residuals: Residuals, progress: Callable[[float], None] | None = None,
@@ -99,7 +99,7 @@ def localise(residuals: Residuals, progress: Callable[[float], None] | None = No
 
     drives = dict(zip(thin.drives, each(search_drive, range(len(thin.drives))), strict=True))
     for name, statement in levels(thin, {
-            name: found.noise for name, found in drives.items()}, DECISIONS).items():
+            name: findings.noise for name, findings in drives.items()}, DECISIONS).items():
         drives[name] = replace(drives[name], statements=(*drives[name].statements, statement))
     ranked = sorted((statement for findings in drives.values()
                      for statement in findings.statements), key=lambda one: -one.evidence)

@@ -152,10 +152,10 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
                 files.command('next-experiment', '--output', 'next.csv'))
     if diagnosis.unconfirmed and not diagnosis.effects:
         if diagnosis.since is None and diagnosis.model.is_described and any(
-                one.objection for one in diagnosis.unconfirmed):
+                effect.objection for effect in diagnosis.unconfirmed):
             # What no machine can have says that the model is of another: no motion mends that.
             return first_step(diagnosis.model, files)
-        names = listed([one.name for one in diagnosis.unconfirmed])
+        names = listed([effect.name for effect in diagnosis.unconfirmed])
         return (f'Do not add {names} on this evidence. Record another motion, and '
                 'diagnose both recordings', repeat)
     if len(diagnosis.effects) == 1:
@@ -181,8 +181,8 @@ def _need_another_load(names: Sequence[str]) -> bool:
 
 def _curve(diagnosis: Diagnosis) -> str | None:
     """Return the curve that takes what no effect explains, as `adopt` takes it."""
-    for one in diagnosis.depends_on:
-        name, _, other = one.variable.partition(' of ')
+    for statement in diagnosis.depends_on:
+        name, _, other = statement.variable.partition(' of ')
         if name in (OF if other else OWN):
-            return f'{MeasuredCurve.name}:{one.drive}@{one.variable}'
+            return f'{MeasuredCurve.name}:{statement.drive}@{statement.variable}'
     return None

@@ -101,12 +101,12 @@ class PartialResidual:
     span: slice
 
 
-def partial_residual(diagnosis: Diagnosis, found: FittedEffect) -> PartialResidual:
+def partial_residual(diagnosis: Diagnosis, effect: FittedEffect) -> PartialResidual:
     """Return what the recordings say of one effect when all others are in the model."""
-    drive = int(np.argmax(np.sqrt(np.mean(found.force ** 2, axis=0))))
-    force = found.force[:, drive]
-    left = found.remaining if isinstance(found, RivalEffect) else diagnosis.remaining
-    without = _with_error(diagnosis.residuals, left + found.force)
+    drive = int(np.argmax(np.sqrt(np.mean(effect.force ** 2, axis=0))))
+    force = effect.force[:, drive]
+    left = effect.remaining if isinstance(effect, RivalEffect) else diagnosis.remaining
+    without = _with_error(diagnosis.residuals, left + effect.force)
     variable, share = _most_telling(without, drive, force)
     profile, fitted = None, np.zeros(0)
     noise = diagnosis.noise.get(without.drives[drive])

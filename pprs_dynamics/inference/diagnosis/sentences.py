@@ -161,9 +161,10 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(Finding(*describe_unexplained(group, bool(diagnosis.effects)))
               for group in unexplained_groups(diagnosis)),
         tuple(_suspect(diagnosis, suspect) for suspect in diagnosis.suspects),
-        tuple(_within_model_error(diagnosis, one) for one in diagnosis.within_model_error),
-        tuple(f'{_set(diagnosis, one)} may not be, whatever it costs: {one.barred}. It '
-              f'{_cost(one)}' for one in diagnosis.barred),
+        tuple(_within_model_error(diagnosis, absorbed)
+              for absorbed in diagnosis.within_model_error),
+        tuple(f'{_set(diagnosis, ranked)} may not be, whatever it costs: {ranked.barred}. It '
+              f'{_cost(ranked)}' for ranked in diagnosis.barred),
         tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated),
         diagnosis.warnings, following, command,
         word_reference(diagnosis.since))
@@ -172,14 +173,15 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
 def unexplained_groups(diagnosis: Diagnosis) -> list[tuple[Statement, ...]]:
     """Return the statements on what no effect explains, those of one pattern together."""
     groups: dict[object, list[Statement]] = {}
-    for one in diagnosis.depends_on:
-        groups.setdefault((one.variable, one.kind, one.range), []).append(one)
+    for statement in diagnosis.depends_on:
+        key = (statement.variable, statement.kind, statement.range)
+        groups.setdefault(key, []).append(statement)
     return [tuple(group) for group in groups.values()]
 
 
 def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
     """Return all that was fitted and not left at zero, in the order of adoption and of drives."""
-    return [one for effect in diagnosis.effects for one in _fitted(diagnosis, effect)]
+    return [value for effect in diagnosis.effects for value in _fitted(diagnosis, effect)]
 
 
 def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
@@ -191,8 +193,9 @@ def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
 def detectable_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     """Return from which size on other effects would have been told, on any drive or joint."""
     rows: dict[tuple[type[CatalogueEffect], Parameter, str], list[float]] = {}
-    for one in diagnosis.detectable:
-        rows.setdefault((one.effect, one.parameter, one.unit), []).append(one.size)
+    for detectable in diagnosis.detectable:
+        key = (detectable.effect, detectable.parameter, detectable.unit)
+        rows.setdefault(key, []).append(detectable.size)
     return [(effect.name, (f'{parameter.name} ' if len(effect.linear) > 1 else '')
              + in_fitting_unit((min(sizes), max(sizes)), unit))
             for (effect, parameter, unit), sizes in rows.items()]
@@ -204,9 +207,9 @@ def word_detectable(diagnosis: Diagnosis) -> str:
     return f'Would have been seen, each alone: {", ".join(told)}' if told else ''
 
 
-def _set(diagnosis: Diagnosis, found: RankedSet) -> str:
+def _set(diagnosis: Diagnosis, ranked: RankedSet) -> str:
     return ' and '.join(with_drives(_plain_name(name), drives, diagnosis.residuals.drives)
-                        for name, drives in found.names) or 'nothing missing'
+                        for name, drives in ranked.names) or 'nothing missing'
 
 
 def word_terms(terms: CostTerms) -> str:
@@ -215,10 +218,10 @@ def word_terms(terms: CostTerms) -> str:
                      for name, value in terms.to_dict().items() if abs(value) >= TOLD_COST)
 
 
-def _cost(found: RankedSet) -> str:
+def _cost(ranked: RankedSet) -> str:
     """Return how much more a set costs, and of what."""
-    why = word_terms(found.terms)
-    return (f'costs {abs(found.cost):.1f} {"less" if found.cost < 0 else "more"}'
+    why = word_terms(ranked.terms)
+    return (f'costs {abs(ranked.cost):.1f} {"less" if ranked.cost < 0 else "more"}'
             + (f': {why}' if why else ''))
 
 
@@ -227,7 +230,7 @@ def runner_up(diagnosis: Diagnosis) -> str:
 
     By what is told: what is within the model error of others was never named as missing.
     """
-    within = {one.name for one in diagnosis.within_model_error} - {
+    within = {absorbed.name for absorbed in diagnosis.within_model_error} - {
         effect.name for effect in diagnosis.effects}
     untold = within & {name for fitted in diagnosis.sets[:1] for name, _ in fitted.names}
     sets = [(fitted, {pair for pair in fitted.names if pair[0] not in untold})
@@ -279,11 +282,11 @@ def _headline(diagnosis: Diagnosis) -> str:
     held, unit = diagnosis.effects, diagnosis.residuals.unit
     doubt = _doubt(diagnosis)
     if diagnosis.effort_looks_like:
-        told = dict.fromkeys(one.what for one in diagnosis.effort_looks_like.values())
+        told = dict.fromkeys(looks.what for looks in diagnosis.effort_looks_like.values())
         return f'{" ".join(map(sentence, told))} No effect is claimed.'
     if diagnosis.stick_slip:
-        sticking = [f'{drive} at {one.frequency:.3g} Hz'
-                    for drive, one in diagnosis.stick_slip.items()]
+        sticking = [f'{drive} at {slip.frequency:.3g} Hz'
+                    for drive, slip in diagnosis.stick_slip.items()]
         return (f'Stick-slip: {listed(sticking)} stand, are loaded until they break away, and '
                 'slip. What else may be missing cannot be seen in such a motion: no effect is '
                 'claimed.')
@@ -302,7 +305,7 @@ def _headline(diagnosis: Diagnosis) -> str:
         above = (f', and the error of {in_unit(left, unit)} is more than the noise, {noise}'
                  if left > AT_NOISE * diagnosis.noise_floor else '')
         return f'{lacks}Nothing that was found holds{above}.{doubt}'
-    if any(one.course is not None and one.course.kind != SINCE for one in held):
+    if any(effect.course is not None and effect.course.kind != SINCE for effect in held):
         return (f'Something changes within the recording, as if {_lacking(diagnosis)}.{fall}. No '
                 f'constant effect does that.{doubt}')
     if diagnosis.verdict == 'unknown':
@@ -333,7 +336,8 @@ def _headline(diagnosis: Diagnosis) -> str:
              # Only the widths of reversals are fitted and yet not part of the model.
              else f'. The noise is {noise}; the rest lies near reversals, where friction turns '
              'over in another width than the model\'s.')
-    which = ': this data cannot tell which' if any(_rivals(diagnosis, one) for one in held) else ''
+    which = ': this data cannot tell which' if any(
+        _rivals(diagnosis, effect) for effect in held) else ''
     missing = _lacking(diagnosis)
     begin = 'T' if missing.startswith('the model') else missing[:1]
     return f'{begin}{missing[1:]}{which}.{fall}{level}{doubt}'
@@ -347,37 +351,39 @@ def _lacking(diagnosis: Diagnosis) -> str:
                                for effect in diagnosis.effects if effect.in_model)])
 
 
-def _otherwise(diagnosis: Diagnosis, found: FoundEffect) -> str:
+def _otherwise(diagnosis: Diagnosis, effect: FoundEffect) -> str:
     """Return what the model says of an effect that it has, and what the recordings say."""
-    fitted = [one for one in _fitted(diagnosis, found) if one.given is not None]
-    several = len({one.drive for one in fitted}) > 1
+    fitted = [value for value in _fitted(diagnosis, effect) if value.given is not None]
+    several = len({value.drive for value in fitted}) > 1
 
-    def told(one: FittedValue, text: str) -> str:
-        symbol = f'{one.parameter.symbol} ' if len(found.effect.parameters) > 1 else ''
-        return symbol + text + (f' on {one.drive}' if several else '')
+    def told(value: FittedValue, text: str) -> str:
+        symbol = f'{value.parameter.symbol} ' if len(effect.effect.parameters) > 1 else ''
+        return symbol + text + (f' on {value.drive}' if several else '')
 
     fitted = fitted[:MOST_CHANGED]
-    given = ', '.join(told(one, with_uncertainty(
-        one.given, 0.0, one.estimate.unit, one.size)) for one in fitted if one.given is not None)
-    said = ', '.join(told(one, one.text) for one in fitted)
-    rivals = _rivals(diagnosis, found)
+    given = ', '.join(
+        told(value, with_uncertainty(value.given, 0.0, value.estimate.unit, value.size))
+        for value in fitted if value.given is not None)
+    said = ', '.join(told(value, value.text) for value in fitted)
+    rivals = _rivals(diagnosis, effect)
     other = f' (or the model lacks {listed(rivals, "or")})' if rivals else ''
-    return (f'{_title(diagnosis, found)} is in the model with {given}; '
+    return (f'{_title(diagnosis, effect)} is in the model with {given}; '
             f'this recording says {said}{other}')
 
 
 def _doubt(diagnosis: Diagnosis) -> str:
     """Return what was fitted and does not hold, a sentence for each."""
     told = []
-    for one in diagnosis.unconfirmed:
-        title = _title(diagnosis, one)
-        if one.objection:
-            told.append(f' {title} was fitted as well and is no finding: {one.objection}.')
+    for effect in diagnosis.unconfirmed:
+        title = _title(diagnosis, effect)
+        if effect.objection:
+            told.append(f' {title} was fitted as well and is no finding: {effect.objection}.')
             continue
+        unit = diagnosis.residuals.unit
         worse = (f'with it the error on held-out data '
-                 f'{change(one.held_out_before, one.held_out_after, diagnosis.residuals.unit)}'
-                 if one.held_out_after >= one.held_out_before else
-                 f'held-out data are predicted worse with it, by {-one.certainty:.2g} standard '
+                 f'{change(effect.held_out_before, effect.held_out_after, unit)}'
+                 if effect.held_out_after >= effect.held_out_before else
+                 f'held-out data are predicted worse with it, by {-effect.certainty:.2g} standard '
                  'errors in units of the noise')
         told.append(f' {title} was fitted as well and is no finding: {worse}.')
     return ''.join(told)
@@ -392,11 +398,11 @@ def _or_rivals(diagnosis: Diagnosis, effect: FoundEffect) -> str:
     return listed([title, *rivals], 'or') + several
 
 
-def _title(diagnosis: Diagnosis, found: FittedEffect) -> str:
+def _title(diagnosis: Diagnosis, effect: FittedEffect) -> str:
     """Return the effect and where it is, all links and joints that are alike among them."""
-    places = listed([listed(names, 'or') for names in found.places])
-    return (f'{found.name} on {places}' if places else
-            with_drives(found.name, found.drives, diagnosis.residuals.drives)) + found.when
+    places = listed([listed(names, 'or') for names in effect.places])
+    return (f'{effect.name} on {places}' if places else
+            with_drives(effect.name, effect.drives, diagnosis.residuals.drives)) + effect.when
 
 
 def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
@@ -404,18 +410,18 @@ def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
             if names[0] == effect.name for name in names[1:]]
 
 
-def _effect(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> Finding:
-    card = found.effect.card_in(diagnosis.model.kind)
-    title = _title(diagnosis, found)
-    what = (_otherwise(diagnosis, found) if found.in_model else
-            f'The model lacks {title}: {_parameters(diagnosis, found)}')
-    if issubclass(found.effect, MeasurementEffect):
+def _effect(diagnosis: Diagnosis, effect: FoundEffect, is_first: bool) -> Finding:
+    card = effect.effect.card_in(diagnosis.model.kind)
+    title = _title(diagnosis, effect)
+    what = (_otherwise(diagnosis, effect) if effect.in_model else
+            f'The model lacks {title}: {_parameters(diagnosis, effect)}')
+    if issubclass(effect.effect, MeasurementEffect):
         what += ('. This is what the sensor says, not what the drive must do: it enters '
                  'comparisons and the monitor, never a command')
     return Finding(
-        title, f'{what}.', _why(diagnosis, found, is_first), sentence(card.causes),
+        title, f'{what}.', _why(diagnosis, effect, is_first), sentence(card.causes),
         sentence(card.confirm), sentence(card.looks_like),
-        tuple(_remarks(diagnosis, found)))
+        tuple(_remarks(diagnosis, effect)))
 
 
 def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
@@ -431,16 +437,16 @@ def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
         sentence(card.confirm), sentence(card.looks_like))
 
 
-def _parameters(diagnosis: Diagnosis, found: FittedEffect) -> str:
-    fitted = _fitted(diagnosis, found)
-    drives = {one.drive for one in fitted}
+def _parameters(diagnosis: Diagnosis, effect: FittedEffect) -> str:
+    fitted = _fitted(diagnosis, effect)
+    drives = {value.drive for value in fitted}
     if len(drives) <= MOST_LISTED:
         return ', '.join(
-            f'{one.parameter.description} ({one.parameter.symbol}) {one.text}'
-            + (f' on {one.drive}' if len(drives) > 1 else '') for one in fitted)
+            f'{value.parameter.description} ({value.parameter.symbol}) {value.text}'
+            + (f' on {value.drive}' if len(drives) > 1 else '') for value in fitted)
     phrases = []
-    for parameter in found.effect.parameters:
-        mine = sorted((one for one in fitted if one.parameter is parameter),
+    for parameter in effect.effect.parameters:
+        mine = sorted((value for value in fitted if value.parameter is parameter),
                       key=lambda one: one.estimate.value)
         if mine:
             ends = mine[:1] if len(mine) == 1 else [mine[0], mine[-1]]
@@ -449,19 +455,19 @@ def _parameters(diagnosis: Diagnosis, found: FittedEffect) -> str:
     return ', '.join(phrases)
 
 
-def _fitted(diagnosis: Diagnosis, found: FittedEffect) -> list[FittedValue]:
+def _fitted(diagnosis: Diagnosis, effect: FittedEffect) -> list[FittedValue]:
     """Return what was fitted of an effect and not left at zero, in the order of drives."""
-    known = {parameter.name: parameter for parameter in found.effect.parameters}
+    known = {parameter.name: parameter for parameter in effect.effect.parameters}
     order = ['', *diagnosis.residuals.drives]
     values = []
-    for key, estimate in found.parameters.items():
-        drive, name = found.effect.place_and_parameter(key)
-        given = found.in_model.get(key) if isinstance(found, FoundEffect) else None
+    for key, estimate in effect.parameters.items():
+        drive, name = effect.effect.place_and_parameter(key)
+        given = effect.in_model.get(key) if isinstance(effect, FoundEffect) else None
         if estimate.value or given:
-            values.append(FittedValue(found.name, drive, known[name], estimate, given))
-    if isinstance(found, FoundEffect):
-        values += [FittedValue(found.name, '', one, found.moments[one.name])
-                   for one in sure_moments(found.effect, found.parameters, found.moments)]
+            values.append(FittedValue(effect.name, drive, known[name], estimate, given))
+    if isinstance(effect, FoundEffect):
+        values += [FittedValue(effect.name, '', moment, effect.moments[moment.name])
+                   for moment in sure_moments(effect.effect, effect.parameters, effect.moments)]
     return sorted(values, key=lambda one: order.index(one.drive))
 
 
@@ -469,8 +475,8 @@ def sure_moments(effect: type[CatalogueEffect], parameters: Mapping[str, Estimat
                  moments: Mapping[str, Estimate]) -> list[Parameter]:
     """Return the first moments of bodies that are sure where the mass is not."""
 
-    def is_vague(one: Estimate) -> bool:
-        return INTERVAL * one.std > VAGUE * abs(one.value)
+    def is_vague(estimate: Estimate) -> bool:
+        return INTERVAL * estimate.std > VAGUE * abs(estimate.value)
 
     known = {coefficient.name: coefficient for coefficient in effect.coefficients}
     masses = {key: parameters.get(f'{key.rpartition("moment_")[0]}mass') for key in moments}
@@ -478,58 +484,58 @@ def sure_moments(effect: type[CatalogueEffect], parameters: Mapping[str, Estimat
             if mass is not None and is_vague(mass) and not is_vague(moments[key])]
 
 
-def _why(diagnosis: Diagnosis, found: FoundEffect, is_first: bool) -> str:
+def _why(diagnosis: Diagnosis, effect: FoundEffect, is_first: bool) -> str:
     fresh, unit = diagnosis.held_out_on == 'validation', diagnosis.residuals.unit
     held_out = ('On the recordings given with --validate, which took no part in the fit, it ' if
                 fresh else 'On blocks of the same recording, each predicted from the others, it ')
-    held_out += change(found.held_out_before, found.held_out_after, unit)
+    held_out += change(effect.held_out_before, effect.held_out_after, unit)
     if not fresh:
         held_out += ('; that is the weaker evidence, a recording of another motion with '
                      '--validate is the stronger' if is_first else ' (the weaker evidence)')
-    return (f'It takes away {percent(found.share)} of the error, each drive in units of its noise. '
-            f'With it the error {change(found.error_before, found.error_after, unit)}. '
-            f'{held_out}. Evidence {found.evidence:.0f}, where 0 is the threshold'
-            + ('.' if found.without is None else
-               f': the best set without it, {_set(diagnosis, found.without)}, '
-               f'{_cost(found.without)}.'))
+    return (f'It takes away {percent(effect.share)} of the error, each drive in units of its '
+            f'noise. With it the error {change(effect.error_before, effect.error_after, unit)}. '
+            f'{held_out}. Evidence {effect.evidence:.0f}, where 0 is the threshold'
+            + ('.' if effect.without is None else
+               f': the best set without it, {_set(diagnosis, effect.without)}, '
+               f'{_cost(effect.without)}.'))
 
 
-def _remarks(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:
-    if rivals := _rivals(diagnosis, found):
-        yield (f'This data cannot tell {found.name} from {listed(rivals, "or")}, which would '
+def _remarks(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
+    if rivals := _rivals(diagnosis, effect):
+        yield (f'This data cannot tell {effect.name} from {listed(rivals, "or")}, which would '
                'explain it about as well.')
-    yield from _negative(diagnosis, found)
-    for names in found.places:
+    yield from _negative(diagnosis, effect)
+    for names in effect.places:
         if len(names) > 1:
             yield (f'No motion tells {names[0]} from {listed(names[1:], "or")}: they move alike. '
                    'The numbers are for the one that is named with them.')
-    if found.effect is AsymmetricFriction:
-        yield from _two_in_one(diagnosis, found)
-    if found.at_bound:
-        yield (f'{listed(found.at_bound)} stand{"s" * (len(found.at_bound) == 1)} at the edge of '
+    if effect.effect is AsymmetricFriction:
+        yield from _two_in_one(diagnosis, effect)
+    if effect.at_bound:
+        yield (f'{listed(effect.at_bound)} stand{"s" * (len(effect.at_bound) == 1)} at the edge of '
                'what was tried: no finding but that it is there or beyond.')
 
 
-def _negative(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:
-    for one in _fitted(diagnosis, found):
+def _negative(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
+    for one in _fitted(diagnosis, effect):
         value, what = one.estimate.value, one.parameter.description
-        lowest = found.effect.unphysical_below.get(one.parameter.name)
+        lowest = effect.effect.unphysical_below.get(one.parameter.name)
         if lowest is None or value >= lowest:
             continue
-        place = f'{found.name} on {one.drive}' if one.drive else found.name
-        kind = 'friction' if 'friction' in found.name else what
+        place = f'{effect.name} on {one.drive}' if one.drive else effect.name
+        kind = 'friction' if 'friction' in effect.name else what
         doubt = ('' if value + INTERVAL * one.estimate.std < lowest else
                  ', though zero is within its uncertainty')
         yield (f'{place}: {what} is negative, {one.text}{doubt}. There is no negative {kind}: '
                'either the model has too much of it already, or something else looks like it.')
 
 
-def _two_in_one(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:
+def _two_in_one(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
     """Tell how the dry part of asymmetric friction reads as two other effects."""
     forces: dict[str, dict[str, float]] = {}
-    for one in _fitted(diagnosis, found):
-        if one.parameter.name.startswith('force_'):
-            forces.setdefault(one.drive, {})[one.parameter.name] = one.estimate.value
+    for value in _fitted(diagnosis, effect):
+        if value.parameter.name.startswith('force_'):
+            forces.setdefault(value.drive, {})[value.parameter.name] = value.estimate.value
     for drive, values in forces.items():
         unit = diagnosis.residuals.units_of(drive).effort
         forward, backward = (values.get(f'force_{way}', 0.0) for way in ('forward', 'backward'))
@@ -539,16 +545,16 @@ def _two_in_one(diagnosis: Diagnosis, found: FoundEffect) -> Iterator[str]:
                'one from the two, a reading at rest can.')
 
 
-def _suspect(diagnosis: Diagnosis, one: RankedEffect) -> str:
-    return (f'{with_drives(one.name, one.drives, diagnosis.residuals.drives)}: may be there, but '
-            f'slow noise would explain the same (evidence {one.evidence:.0f}, where 0 is the '
-            'threshold); repeat the recording')
+def _suspect(diagnosis: Diagnosis, ranked: RankedEffect) -> str:
+    return (f'{with_drives(ranked.name, ranked.drives, diagnosis.residuals.drives)}: may be there, '
+            f'but slow noise would explain the same (evidence {ranked.evidence:.0f}, where 0 is '
+            'the threshold); repeat the recording')
 
 
-def _within_model_error(diagnosis: Diagnosis, one: WithinModelError) -> str:
-    return (f'{with_drives(one.name, one.drives, diagnosis.residuals.drives)}, '
-            f'{in_unit(one.rms, diagnosis.residuals.unit)} rms, is within the model error of '
-            f'{listed(one.of)}: a real machine is only nearly of the form that the catalogue '
+def _within_model_error(diagnosis: Diagnosis, absorbed: WithinModelError) -> str:
+    return (f'{with_drives(absorbed.name, absorbed.drives, diagnosis.residuals.drives)}, '
+            f'{in_unit(absorbed.rms, diagnosis.residuals.unit)} rms, is within the model error of '
+            f'{listed(absorbed.of)}: a real machine is only nearly of the form that the catalogue '
             'gives it. Not adopted')
 
 
@@ -561,15 +567,15 @@ def _rounded(after: float, before: float) -> float:
                  if (value := float(f'{after:.{digits}g}')) != before), after)
 
 
-def _calibrated(diagnosis: Diagnosis, one: Calibration) -> str:
-    after = with_uncertainty(one.after, one.std, one.unit) if one.std else (
-        f'about {with_uncertainty(_rounded(one.after, one.before), 0.0, one.unit)}')
-    moved = f'{one.label}: {with_uncertainty(one.before, 0.0, one.unit)} becomes {after}'
-    tolerance = diagnosis.model.values.get(f'tolerances.{one.key}')
+def _calibrated(diagnosis: Diagnosis, number: Calibration) -> str:
+    after = with_uncertainty(number.after, number.std, number.unit) if number.std else (
+        f'about {with_uncertainty(_rounded(number.after, number.before), 0.0, number.unit)}')
+    moved = f'{number.label}: {with_uncertainty(number.before, 0.0, number.unit)} becomes {after}'
+    tolerance = diagnosis.model.values.get(f'tolerances.{number.key}')
     if not tolerance:
         return f'{moved}: calibrated'
-    change = abs(one.after - one.before)
-    within = change <= tolerance * abs(one.before) + INTERVAL * one.std
+    change = abs(number.after - number.before)
+    within = change <= tolerance * abs(number.before) + INTERVAL * number.std
     return (f'{moved}, within its tolerance of {tolerance:.2g} ({tolerance:.0%}): calibrated, not '
             'an effect' if within else
             f'{moved}, beyond its tolerance of {tolerance:.0%}: check that number first')

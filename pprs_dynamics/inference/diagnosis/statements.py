@@ -274,14 +274,14 @@ def _ends(
     return float(np.median(shape[order[:few]])), float(np.median(shape[order[-few:]]))
 
 
-def word_stick_slip(drive: str, found: StickSlip, residuals: Residuals) -> Statement:
+def word_stick_slip(drive: str, slip: StickSlip, residuals: Residuals) -> Statement:
     """Return the statement that a drive sticks and slips."""
     unit = residuals.units_of(drive).position
     return Statement(
-        drive, 'frequency', (found.frequency, found.frequency), 1.0, found.share,
-        f'{drive}: it sticks and slips {found.frequency:.3g} times a second, by '
-        f'{found.step:.2g} {unit}, at speeds up to {found.speed:.2g} {unit}/s, in '
-        f'{percent(found.share)} of the time', np.inf, STICK_SLIP, 0.0, 0.0)
+        drive, 'frequency', (slip.frequency, slip.frequency), 1.0, slip.share,
+        f'{drive}: it sticks and slips {slip.frequency:.3g} times a second, by '
+        f'{slip.step:.2g} {unit}, at speeds up to {slip.speed:.2g} {unit}/s, in '
+        f'{percent(slip.share)} of the time', np.inf, STICK_SLIP, 0.0, 0.0)
 
 
 def describe_unexplained(
@@ -289,9 +289,10 @@ def describe_unexplained(
 ) -> tuple[str, str, str, str, str]:
     """Return title, what, why, cause and how to confirm, of one pattern on one or more drives."""
     first = group[0]
-    drives = listed([one.drive for one in group])
-    texts = '; '.join(one.text if len(group) > 1 else one.text.removeprefix(f'{one.drive}: ')
-                      for one in group)
+    drives = listed([statement.drive for statement in group])
+    texts = '; '.join(
+        statement.text if len(group) > 1 else statement.text.removeprefix(f'{statement.drive}: ')
+        for statement in group)
     if first.kind == STICK_SLIP:
         return (f'stick_slip on {drives}', f'Stick-slip on {drives}: {texts}.',
                 'The drive stands while its effort builds up, and the effort falls while it slips, '
@@ -304,7 +305,7 @@ def describe_unexplained(
     what = (f'Something on {drives} that no effect of the catalogue explains, '
             f'{place_of(first.variable)}. Its shape is '
             f'{SHAPES.get(first.kind, "drawn in the report")}: in {left}, {texts}.')
-    evidence = max(one.evidence for one in group)
+    evidence = max(statement.evidence for statement in group)
     why = ('Its noise is compared with that of the other drives, which move alike.'
            if first.kind == 'level' else
            f'Noise like this one does not do that (evidence {evidence:.0f}, where 0 is '
@@ -315,7 +316,7 @@ def describe_unexplained(
 
 def place_on(group: Sequence[Statement]) -> str:
     """Return on which drives and depending on what a pattern lies."""
-    return f'on {listed([one.drive for one in group])}, {place_of(group[0].variable)}'
+    return f'on {listed([statement.drive for statement in group])}, {place_of(group[0].variable)}'
 
 
 def place_of(variable: str) -> str:

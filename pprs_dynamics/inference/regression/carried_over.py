@@ -63,8 +63,9 @@ class CarriedOver:
     def at_full_rate(self, recordings: Sequence[FullRate], time: Array) -> list[Array]:
         """Return the forces at every sample of recordings, (N, D) [N]; `time` (M,) of means."""
         found, end = [], 0
-        for one in recordings:
-            part = slice(end, end := end + len(one.treat))
-            found.append(self.repeating(one.position, one.velocity, 0.0) + np.stack(
-                [np.interp(one.time, time[part], row) for row in self.of_base[part].T], axis=1))
+        for recording in recordings:
+            part = slice(end, end := end + len(recording.treat))
+            of_base = [np.interp(recording.time, time[part], row) for row in self.of_base[part].T]
+            found.append(self.repeating(recording.position, recording.velocity, 0.0)
+                         + np.stack(of_base, axis=1))
         return found

@@ -182,19 +182,20 @@ class Design:
         """
         design = self._evaluated(
             point.model, self.given, self.reconstructed(point.model), None,
-            {one.effect for one in point.effects} if alone else None,
-            {(one.drive, one.number) for one in self.base if isinstance(one, ReversalShape)},
+            {effect.effect for effect in point.effects} if alone else None,
+            {(column.drive, column.number) for column in self.base
+             if isinstance(column, ReversalShape)},
             self.joining).beside(self.carried)
         shift = np.zeros_like(design.residuals.model)
         for column, c in zip(design.base, point.base, strict=True):
             if column.in_model:
                 for d, row in column.rows.items():
                     shift[:, d] += c * row
-        for one in point.effects:
-            term = design.find_term(one.effect, one.drive, one.shape)
-            if issubclass(one.effect, AddedBody) and self.present(one.effect, None) is None:
-                term = replace(term, rows=one.effect.around(term.rows, one.coefficients))
-            weights = np.array([one.coefficients[name] for name in term.names] or [1.0])
+        for effect in point.effects:
+            term = design.find_term(effect.effect, effect.drive, effect.shape)
+            if issubclass(effect.effect, AddedBody) and self.present(effect.effect, None) is None:
+                term = replace(term, rows=effect.effect.around(term.rows, effect.coefficients))
+            weights = np.array([effect.coefficients[name] for name in term.names] or [1.0])
             for d, rows in term.rows.items():
                 shift[:, d] += weights @ rows
             for d, row in design.known_change(term).items():
@@ -223,8 +224,8 @@ class Design:
     def _shown_late(self) -> Array:
         """Return by how much sensors show efforts otherwise than those of the given model do."""
         late = np.zeros_like(self.residuals.model)
-        sensors, given = ([(one.name, repr(one.drives)) for one in model.effects
-                           if isinstance(one, MeasurementEffect)]
+        sensors, given = ([(effect.name, repr(effect.drives)) for effect in model.effects
+                           if isinstance(effect, MeasurementEffect)]
                           for model in (self.model, self.given))
         if sensors != given:
             before = replace(self, model=self.given)
@@ -254,10 +255,11 @@ class Design:
         """Return the motion of the recordings as a model's encoders tell it."""
         if model.misreadings == self.model.misreadings:
             return self.reconstructions
-        key = tuple((one.name, repr(one.drives)) for one in model.misreadings)
+        key = tuple((misreading.name, repr(misreading.drives)) for misreading in model.misreadings)
         if key not in self._moved:
             self._moved.clear()
-            self._moved[key] = tuple(read_by(one, model) for one in self.reconstructions)
+            self._moved[key] = tuple(read_by(reconstruction, model)
+                                     for reconstruction in self.reconstructions)
         return self._moved[key]
 
     @classmethod
@@ -290,8 +292,8 @@ class Design:
         stacked = stacked_columns(tables)
         residuals = join_tables(model, tables)
         count = len(model.drives)
-        there = [(PRESENT + one.name, type(one)) for one in given.effects
-                 if isinstance(one, StructureEffect)]
+        there = [(PRESENT + effect.name, type(effect)) for effect in given.effects
+                 if isinstance(effect, StructureEffect)]
         structure = tuple(
             Term(effect, None, {}, _by_drive(stacked[name], count),
                  _by_drive(stacked[BARE + name], count) if BARE + name in stacked else None)

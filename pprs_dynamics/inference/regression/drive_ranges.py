@@ -19,24 +19,24 @@ LONGEST_DELAY = 0.3  # [s], that a recording may show at once
 
 def drive_range(model: ForceModel, recordings: Sequence[FullRate], drive: int) -> DriveRange:
     """Return what a drive of a model did in recordings."""
-    position = np.concatenate([one.position[:, drive] for one in recordings])
-    velocity = np.concatenate([one.velocity[:, drive] for one in recordings])
+    position = np.concatenate([recording.position[:, drive] for recording in recordings])
+    velocity = np.concatenate([recording.velocity[:, drive] for recording in recordings])
     longest = max(recordings, key=lambda recording: len(recording.time))
     return DriveRange(float(longest.time[-1] - longest.time[0]),
                       float(np.median(np.diff(longest.time))),
                       float(np.ptp(position)), float(np.abs(velocity).max()),
                       model.gear_ratios[drive], _delay(longest, drive),
                       model.units[drive].turns,
-                      any(np.any(one.friction_load[:, drive]) for one in recordings),
+                      any(np.any(recording.friction_load[:, drive]) for recording in recordings),
                       _channels(recordings, drive), float(position.min() + position.max()) / 2)
 
 
 def _channels(recordings: Sequence[FullRate], drive: int) -> dict[str, tuple[float, float]]:
     """Return the ranges of what was measured of a drive beside motion and effort."""
     found = {}
-    for name in {name for one in recordings for name in one.channels}:
-        values = np.concatenate([one.channels[name][:, drive] for one in recordings
-                                 if name in one.channels])
+    for name in {name for recording in recordings for name in recording.channels}:
+        values = np.concatenate([recording.channels[name][:, drive] for recording in recordings
+                                 if name in recording.channels])
         if np.isfinite(values).any():
             found[name] = float(np.nanmin(values)), float(np.nanmax(values))
     return found

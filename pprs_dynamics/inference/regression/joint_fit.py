@@ -167,7 +167,18 @@ class Regression:
         if not term.names:
             return self.block(term.rows, CERTAIN * np.eye(1), np.ones(1))
         chosen = [term.names.index(name) for name in names]
-        return self.block({d: rows[chosen] for d, rows in term.rows.items()})
+        return self.block({d: rows[chosen] for d, rows in term.rows.items()},
+                          self._wave_prior(term, len(chosen)) if term.effect.is_wave else None)
+
+    def _wave_prior(self, term: Term, count: int) -> Array:
+        """Return the precision of amplitudes whose force is of the size of the error.
+
+        Over whole waves, of mean square a half. By the g-prior amplitudes a thousand times the
+        error would cost nothing where they cancel within the stroke: they make any smooth curve.
+        """
+        scales = [max(self.error_scale[d], 1e-12) for d in term.rows if d in self.series]
+        precision: Array = 0.5 * float(np.mean(np.square(scales) ** -1.0)) * np.eye(count)
+        return precision
 
     def g_prior(self, grams: Mapping[int, Array]) -> Array:
         """Return the precision of coefficients by their rows' sums of products, (..., k, k)."""
@@ -398,7 +409,7 @@ class Columns:
                 return found
 
             with_base = weighted(None)
-            known = np.concatenate([with_base[:, :-1], *(weighted(one) for one in acting)], axis=1)
+            known = np.concatenate([with_base[:, :-1], *map(weighted, acting)], axis=1)
             side += with_base[:, -1] - known @ fit.coefficients[index]
             taken[:, index] += known
         return taken, side

@@ -287,7 +287,7 @@ class NormalEquations:
             acting = tuple(block for block in blocks if d in block.rows)
             self.drives.append(regression.equations(d, acting))
             self.indices.append(np.concatenate([regression.base_index[d], *(
-                np.arange(self.places[one].start, self.places[one].stop) for one in acting)]))
+                np.arange(self.places[block].start, self.places[block].stop) for block in acting)]))
             self._pairs.append(np.add.outer(place * self.indices[-1], self.indices[-1]).ravel())
 
     def weighted(self, weights: Array) -> tuple[Array, Array]:

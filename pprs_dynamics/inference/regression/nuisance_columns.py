@@ -98,7 +98,7 @@ def joint_reversal_rows(design: Design, term: Term, names: Sequence[str]) -> dic
     if not (effect.is_friction and issubclass(effect, PassiveJointEffect)):
         return {}
     units = [effect.at({name: 1.0}) for name in names]
-    sensors = [one for one in model.effects if isinstance(one, MeasurementEffect)]
+    sensors = [effect for effect in model.effects if isinstance(effect, MeasurementEffect)]
 
     def rows(forces: Any) -> dict[str, Array]:
         state = forces.mechanism
@@ -109,6 +109,7 @@ def joint_reversal_rows(design: Design, term: Term, names: Sequence[str]) -> dic
         return {'rows': columns.transpose(2, 0, 1, 3)}
 
     stacked = np.concatenate([
-        treated_forces(model, one, more=rows)['rows'] * one.recorded_share(model)
-        for one in design.reconstructed(model)]).transpose(3, 1, 2, 0)
+        treated_forces(model, reconstruction, more=rows)['rows']
+        * reconstruction.recorded_share(model)
+        for reconstruction in design.reconstructed(model)]).transpose(3, 1, 2, 0)
     return {d: one for d, one in enumerate(stacked) if np.any(one)}

@@ -138,12 +138,14 @@ class Sensitivities:
             and given.offers(effect) and effect.name not in present
             if issubclass(bound := given.bound(effect), StructureEffect) and bound.coefficients)
         self.of_zeros, self.homing_stride = any(
-            one.shifts_positions() and given.offers(one) for one in catalogue().values()), 0
+            effect.shifts_positions() and given.offers(effect)
+            for effect in catalogue().values()), 0
 
     def restrict(self, effects: Container[type[CatalogueEffect]]) -> None:
         """Leave out columns that effects other than these would need."""
         self.searched = tuple(one for one in self.searched if one in effects)
-        if not any(one.shifts_positions() and one in effects for one in catalogue().values()):
+        if not any(effect.shifts_positions() and effect in effects
+                   for effect in catalogue().values()):
             self.of_zeros = False
 
     def columns(self, forces: Any) -> dict[str, Array]:
@@ -187,7 +189,8 @@ class Sensitivities:
 
     def dry(self, state: Any) -> Array:
         """Return the size of the drives' dry friction in full motion, (N, D) [N, N m]."""
-        friction: Any = next(one for one in self.model.effects if one.name == ACTIVE_FRICTION)
+        friction: Any = next(effect for effect in self.model.effects
+                             if effect.name == ACTIVE_FRICTION)
         size: Array = friction.dry(state.friction_load)
         return size
 
@@ -210,11 +213,12 @@ class Sensitivities:
 
         def column(drive: int) -> Array:
             change = (efforts(drive, -step) - before) / step
-            return np.stack([np.interp(every, samples, one) for one in change.T], axis=1)
+            return np.stack([np.interp(every, samples, column) for column in change.T], axis=1)
 
         def inertia(drive: int) -> Array:
             change = still - self._at(self.model, seldom.accelerated(drive, 1.0)).rigid_force
-            return np.stack([np.interp(every, samples[::SLOWER], one) for one in change.T], axis=1)
+            return np.stack([np.interp(every, samples[::SLOWER], column)
+                             for column in change.T], axis=1)
 
         before, still = efforts(0, 0.0), self._at(self.model, seldom).rigid_force
         drives = range(len(self.model.drives))
@@ -327,8 +331,8 @@ class Sensitivities:
                 change = self.sensed((moved.force(state) - before.force(state)) / step, state)
                 return change, change
             found = moved.apply(state) if present is None else self._at(replace(
-                self.model, effects=tuple(moved if one is present else one
-                                          for one in self.model.effects)), state)
+                self.model, effects=tuple(moved if effect is present else effect
+                                          for effect in self.model.effects)), state)
             return (self.sensed((self._efforts(self.model, found) - reference) / step, state),
                     self.sensed((found.rigid_force - state.rigid_force) / step, state))
 

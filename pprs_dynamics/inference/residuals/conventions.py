@@ -132,7 +132,7 @@ def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]
     # With all positions negated many arms weigh as with all efforts negated, and friction too.
     is_either = (best is not None and best.reading.kind == POSITION_SIGN
                  and best.reading.cost == ALL_NEGATED
-                 and any({*one.drives} >= {*contents} for one in signs))
+                 and any({*sign.drives} >= {*contents} for sign in signs))
     if best is not None and not is_either:
         found += _of_fit(model, best)
     else:
@@ -368,10 +368,10 @@ def _of_signs(model: ForceModel, recorded: Recording, contents: Mapping[str, Eff
     """Return what weight, inertia and friction say of the efforts' sign, for whatever friction."""
     measured = [k for k, drive in enumerate(recorded.drives)
                 if np.isfinite(recorded.effort[:, k]).any()]
-    are_all = not any(one.is_upright for one in contents.values())
+    are_all = not any(content.is_upright for content in contents.values())
     # Of a drive among others that are right its weight or inertia must say so, too.
-    negated = tuple(model.drives.index(drive) for drive, one in contents.items()
-                    if one.is_negated and (are_all or one.factor))
+    negated = tuple(model.drives.index(drive) for drive, content in contents.items()
+                    if content.is_negated and (are_all or content.factor))
     if not negated:
         return []
     if are_all:
@@ -413,7 +413,7 @@ def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Defect]:
     drives, ends = recording.drives, np.maximum(-lower, upper)
     reach = np.abs(recording.position).max(axis=0)
     for turns, names in ((False, LENGTHS), (True, ANGLES)):
-        alike = [k for k, one in enumerate(model.units) if one.turns == turns]
+        alike = [k for k, units_of_drive in enumerate(model.units) if units_of_drive.turns == turns]
         far = tuple(k for k in alike if reach[k] > FAR_OUT * ends[k])
         if not far:
             continue
@@ -440,9 +440,9 @@ def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False)
         says.
     """
     mistakes = find_mistakes(model, recording)
-    others = [one for one in mistakes if isinstance(one, OtherReading)]
+    others = [mistake for mistake in mistakes if isinstance(mistake, OtherReading)]
     if refuse and others:
-        raise MisreadError(recording.name, [one.what for one in others], [
+        raise MisreadError(recording.name, [other.what for other in others], [
             columns_line(others, model.recorded.columns is not None)])
     return replace(recording, findings=(*mistakes, *recording.findings))
 

@@ -42,18 +42,18 @@ def excerpts_within_memory(model: ForceModel, recordings: Sequence[Recording]) -
     What is left out is among their findings. Those that are short enough stay as they are, and so
     do excerpts.
     """
-    whole = [one for one in recordings if not _is_excerpt(one)]
-    blocks = sum(_blocks(one, 1) for one in whole)
+    whole = [recording for recording in recordings if not _is_excerpt(recording)]
+    blocks = sum(_blocks(recording, 1) for recording in whole)
     if blocks > MOST_WHOLE and model.blocks_per_period:
-        blocks = sum(_blocks(one, _block(model, one)) for one in whole)
+        blocks = sum(_blocks(recording, _block(model, recording)) for recording in whole)
     if blocks <= MOST_WHOLE:
         return list(recordings)
-    return [one if _is_excerpt(one) else _excerpt(one, MOST_BLOCKS / blocks)
-            for one in recordings]
+    return [recording if _is_excerpt(recording) else _excerpt(recording, MOST_BLOCKS / blocks)
+            for recording in recordings]
 
 
 def _is_excerpt(recording: Recording) -> bool:
-    return any(one.kind == TOO_LONG for one in recording.findings)
+    return any(finding.kind == TOO_LONG for finding in recording.findings)
 
 
 def _step(recording: Recording) -> float:
@@ -100,7 +100,7 @@ def _excerpt(recording: Recording, share: float) -> Recording:
     segments = [chosen[0]]
     for part in chosen[1:]:
         if part.start == segments[-1].stop and part.start not in {
-                one.start for one in recording.segments}:
+                segment.start for segment in recording.segments}:
             segments[-1] = slice(segments[-1].start, part.stop)
         else:
             segments.append(part)

@@ -204,10 +204,12 @@ def find_no_measurements(model: ForceModel, recording: Recording,
         return (NoMeasurement.of(COMMAND, model.drives, every, 'the efforts are commands, as the '
                                  f'model file says with {EFFORT_KIND}: {COMMANDED}'),)
     contents = effort_contents(model, recording) if contents is None else contents
-    kinds = {drive: one.kind for drive, one in contents.items()}
+    kinds = {drive: content.kind for drive, content in contents.items()}
     # What one drive shows for certain holds for all: they are recorded in the same way.
-    weighs = any(one.shows_gravity and not one.lacks_gravity for one in contents.values())
-    moves = any(one.shows_inertia and not one.lacks_inertia for one in contents.values())
+    weighs = any(content.shows_gravity and not content.lacks_gravity
+                 for content in contents.values())
+    moves = any(content.shows_inertia and not content.lacks_inertia
+                for content in contents.values())
     excluded = ({WITHOUT_GRAVITY} if weighs else set()) | (
         {COMMAND, POSITION_ERROR} if moves else set())
     kinds = {drive: '' if kind in excluded else kind for drive, kind in kinds.items()}
@@ -219,14 +221,14 @@ def looks_like(model: ForceModel, recordings: Sequence[Recording]) -> dict[str, 
     """Return the finding for each drive whose effort is no measurement in one of the recordings."""
     found: dict[str, NoMeasurement] = {}
     for recording in recordings:
-        for one in find_no_measurements(model, recording):
-            found = {**dict.fromkeys(one.drives, one), **found}
+        for finding in find_no_measurements(model, recording):
+            found = {**dict.fromkeys(finding.drives, finding), **found}
     return {drive: found[drive] for drive in model.drives if drive in found}
 
 
 def kinds_of(findings: Mapping[str, NoMeasurement]) -> dict[str, str] | None:
     """Return the kind of each drive's finding; None where there is none."""
-    return {drive: one.kind for drive, one in findings.items()} or None
+    return {drive: finding.kind for drive, finding in findings.items()} or None
 
 
 def effort_contents(model: ForceModel, recording: Recording) -> dict[str, EffortContent]:
@@ -294,7 +296,7 @@ def _fitted(effort: Array, columns: Sequence[Array]) -> tuple[list[float], list[
 def _rigid_parts(model: ForceModel, excerpt: Excerpt) -> tuple[Array, Array]:
     """Return the model's forces by inertia and by gravity on an excerpt, (N, D) each."""
     bodies = {RIGID_BODY, DriveInertia.name, *(
-        one.name for one in model.effects if isinstance(one, BodyEffect))}
+        effect.name for effect in model.effects if isinstance(effect, BodyEffect))}
     position = excerpt.motion.position
     moved = replace(excerpt.motion, position=position - model.position_error(position))
     still = np.zeros_like(moved.velocity)

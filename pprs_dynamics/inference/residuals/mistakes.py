@@ -55,7 +55,8 @@ class NoMeasurement(Mistake):
 
 def effort_looks_like(findings: Iterable[Iterable[Defect]]) -> dict[str, str] | None:
     """Return the kind of each drive's effort that findings call no measurement; None for none."""
-    return {drive: one.kind for one in no_measurements(findings) for drive in one.drives} or None
+    return {drive: finding.kind for finding in no_measurements(findings)
+            for drive in finding.drives} or None
 
 
 def no_measurements(findings: Iterable[Iterable[Defect]]) -> list[NoMeasurement]:
@@ -84,7 +85,7 @@ def columns_line(findings: Iterable[OtherReading], has_columns: bool = False) ->
     Where the file has `columns` already, what is to be added to the columns of each drive.
     """
     blocks: dict[str, list[str]] = {}
-    for drive, key, value in (scale for one in findings for scale in one.scales):
+    for drive, key, value in (scale for finding in findings for scale in finding.scales):
         blocks.setdefault(drive, []).append(f'{key}: {value:.7g}')
     entries = [entry if not drive else f'{drive}: {{{entry}}}' for drive, entry in (
         (drive, ', '.join(keys)) for drive, keys in blocks.items())]

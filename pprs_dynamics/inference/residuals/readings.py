@@ -84,7 +84,7 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits]) -> Iterator[R
     yield Reading('reversed_time', 'the recording looks as if it were played backwards: friction '
                   'drives the motion', tuple(range(count)), same, same, backwards=True)
     for names, turns in ((LENGTHS, False), (ANGLES, True)):
-        alike = tuple(k for k, one in enumerate(units) if one.turns == turns)
+        alike = tuple(k for k, units_of_drive in enumerate(units) if units_of_drive.turns == turns)
         for unit, name in names.items():
             for group in _groups(drives, alike):
                 yield rescaled(drives, group, unit, name)

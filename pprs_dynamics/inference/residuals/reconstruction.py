@@ -270,7 +270,7 @@ def reconstruct(
         raise MotionError('drives', f'they are {", ".join(recording.drives)}',
                           f'be {", ".join(names)}{order}', 'shape')
     if isinstance(model, ForceModel):
-        unit = 'rad' if all(one.turns for one in model.units) else 'm'
+        unit = 'rad' if all(units.turns for units in model.units) else 'm'
         drives = smooth_drives(recording, window, model.blocks_per_period, unit)
     else:
         drives = smooth_drives(recording, window)
@@ -297,7 +297,7 @@ def reconstruct(
         recorded=recording, read=read, windup=windup)
 
 
-def read_by(found: Reconstruction, model: ForceModel) -> Reconstruction:
+def read_by(reconstruction: Reconstruction, model: ForceModel) -> Reconstruction:
     """Return the same reconstruction with the drives where another model's encoders are.
 
     Blocks do not depend on them.
@@ -307,9 +307,10 @@ def read_by(found: Reconstruction, model: ForceModel) -> Reconstruction:
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    drives, followed = _followed_rightly(model, found.recorded, found.read, found.time,
-                                         found.windup)
-    return replace(found, position=drives.position, velocity=drives.velocity,
+    drives, followed = _followed_rightly(
+        model, reconstruction.recorded, reconstruction.read, reconstruction.time,
+        reconstruction.windup)
+    return replace(reconstruction, position=drives.position, velocity=drives.velocity,
                    acceleration=drives.acceleration, smoothing=drives.smoothing,
                    motion=followed.motion,
                    near_branch=followed.near_branch, jumps=followed.jumps)
@@ -332,12 +333,12 @@ def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recordin
         return found
 
     q, v, a = (each[:, chosen] for each in (read.position, read.velocity, read.acceleration))
-    functions = [one for one in effects if one.is_of_position]
+    functions = [effect for effect in effects if effect.is_of_position]
     before, at, after = (errors(functions, q + step) for step in (-POSITION_STEP, 0.0,
                                                                   POSITION_STEP))
     slope = (after - before) / (2 * POSITION_STEP)
     found = at, slope * v, slope * a + (after - 2 * at + before) / POSITION_STEP ** 2 * v ** 2
-    others = [one for one in effects if not one.is_of_position]
+    others = [effect for effect in effects if not effect.is_of_position]
     if not others:
         return found
     smoothed = smoothed_as(read, recording,
@@ -355,7 +356,7 @@ def _followed_rightly(
     q, q_dot, q_ddot = misread(model.misreadings, model.drives, recording, read)
     drives = replace(read, position=read.position - q, velocity=read.velocity - q_dot,
                      acceleration=read.acceleration - q_ddot)
-    if np.any(q_dot) and not all(one.is_of_position for one in model.misreadings):
+    if np.any(q_dot) and not all(misreading.is_of_position for misreading in model.misreadings):
         drives = smoothed_again(drives, recording,
                                 lambda position: position - model.position_error(position))
     followed = follow(model, time, drives, progress)

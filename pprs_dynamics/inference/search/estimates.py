@@ -138,7 +138,7 @@ def averaged(own: Estimates, others: Sequence[tuple[float, Estimates]]) -> Estim
     share = weights / weights.sum()
     parameters = {}
     for key, estimate in own.parameters.items():
-        there = [estimate, *(said.parameters.get(key, estimate) for _, said in others)]
+        there = [estimate, *(estimates.parameters.get(key, estimate) for _, estimates in others)]
         squares = [other.std ** 2 + (other.value - estimate.value) ** 2 for other in there]
         parameters[key] = replace(estimate, std=float(np.sqrt(share @ squares)))
     return replace(own, parameters=parameters)
@@ -192,8 +192,8 @@ def _left_out(fits: FittedSets, other: CandidateSet, candidate: EffectCandidate,
         # Of what the recordings do not show at all no more is known than its bounds.
         widest = {prefix + p.name: p.widest.upper - p.widest.lower
                   for p in candidate.effect.linear}
-        estimates.update({key: replace(one, std=min(one.std, widest[key]))
-                          for key, one in some.items() if key not in fitted})
+        estimates.update({key: replace(estimate, std=min(estimate.std, widest[key]))
+                          for key, estimate in some.items() if key not in fitted})
     return estimates
 
 

@@ -99,4 +99,4 @@ def _square_of_part(regression: Regression, fitted: CandidateSet, name: str,
     if force is None:
         return 0.0
     white = [regression.whitened(fitted.fit, d, force[:, d]) for d in drives]
-    return sum(float(one @ one) for one in white)
+    return sum(float(error @ error) for error in white)

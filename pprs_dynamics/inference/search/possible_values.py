@@ -47,20 +47,20 @@ def _sizes(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
            ) -> dict[str, Estimate]:
     """Return the numbers that make an effect as large as it is, without those left at 0."""
     linear = {parameter.name for parameter in effect.linear}
-    return {key: one for key, one in parameters.items()
-            if effect.place_and_parameter(key)[1] in linear and one.value}
+    return {key: number for key, number in parameters.items()
+            if effect.place_and_parameter(key)[1] in linear and number.value}
 
 
 def _reasons(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
              decisions: Decisions) -> Iterator[str]:
-    for key, one in _sizes(effect, parameters).items():
+    for key, number in _sizes(effect, parameters).items():
         drive, _ = effect.place_and_parameter(key)
         at = f' of {drive}' if drive else ''
         if effect is EffortGain:
-            factor = 1 + one.value
+            factor = 1 + number.value
             if max(factor, 1 / factor if factor > 0 else np.inf) > decisions.most_gain:
                 yield (f'the effort{at} would be measured {factor:.3g} times too large, which is '
                        'another unit or another drive constant, to be written into the model file')
-        elif effect is BaseTilt and abs(one.value) > decisions.most_tilt:
-            yield (f'a base that leans by {np.degrees(abs(one.value)):.3g} degrees was put up so: '
-                   'gravity in the model file says how')
+        elif effect is BaseTilt and abs(number.value) > decisions.most_tilt:
+            yield (f'a base that leans by {np.degrees(abs(number.value)):.3g} degrees was put up '
+                   'so: gravity in the model file says how')

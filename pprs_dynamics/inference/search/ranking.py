@@ -278,11 +278,11 @@ class Ranking:
 
         Each is within the lack of fit of the other, however much more one of them costs.
         """
-        names = {one.name for one in self.reported.effects}
-        for one in self.absorbed:
-            for other, found in one.instead:
+        names = {effect.name for effect in self.reported.effects}
+        for absorbed in self.absorbed:
+            for other, found in absorbed.instead:
                 if other.name in names and found.is_admissible:
-                    yield Rival(found, (other.name,), (one.candidate.name,))
+                    yield Rival(found, (other.name,), (absorbed.candidate.name,))
 
     def _is_beaten(self, other: CandidateSet, margin: float) -> bool:
         """Return whether a set is no rival by the exact forces of its own model."""

@@ -229,6 +229,9 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     shows_at_reversals : bool
         True where the effect shows most where friction turns over, so that friction which does so
         otherwise than modelled looks like it.
+    is_wave : bool
+        True where coefficients are amplitudes of waves over whole periods: each is as large as a
+        force, also where less than a period is seen and large ones would cancel there.
     is_of_one_place : bool
         True where each variant is at a place of its own, a link or a joint: that a motion does
         not show every one of them is not worth telling.
@@ -254,6 +257,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     nonlinear: ClassVar[bool] = False
     idealised: ClassVar[bool] = True
     shows_at_reversals: ClassVar[bool] = False
+    is_wave: ClassVar[bool] = False
     is_of_one_place: ClassVar[bool] = False
     at_one_load: ClassVar[str] = ''
     alike: ClassVar[tuple[tuple[str, ...], ...]] = ()

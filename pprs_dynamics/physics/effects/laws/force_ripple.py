@@ -47,6 +47,7 @@ class ForceRipple(DriveEffect):
             ('second_sine', 'A_2 cos phi_2', 'amplitude of the second sine'),
             ('second_cosine', 'A_2 sin phi_2', 'amplitude of the second cosine')))
     scanned = ('sine', 'cosine')
+    is_wave: ClassVar[bool] = True
     variants = (('sine', 'cosine'), ('sine', 'cosine', 'second_sine', 'second_cosine'))
     card = Card(
         'A sin(2 pi q / p + phi) + A_2 sin(4 pi q / p + phi_2)',
