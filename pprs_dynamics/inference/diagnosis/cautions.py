@@ -112,9 +112,9 @@ def _unexcited(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
         if (term.effect.name in adopted or term.effect.is_of_one_place
                 or fits.design.present(term.effect, None) is not None):
             continue
-        own = regression.own_information(best.fit, regression.block(term.rows))
+        information = regression.own_information(best.fit, regression.block(term.rows))
         scales = np.array([c.scale for c in term.effect.coefficients])
-        sizes = np.diag(own) * scales ** 2
+        sizes = np.diag(information) * scales ** 2
         present = {c.name: size for c, size in zip(term.effect.coefficients, sizes, strict=True)}
         names = [name for name, size in present.items() if size < fits.decisions.unexcited]
         if names:

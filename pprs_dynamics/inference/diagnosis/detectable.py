@@ -71,17 +71,18 @@ def detectable_sizes(fits: FittedSets, fitted: CandidateSet) -> tuple[Detectable
         if component.effect.name in known:
             continue
         block = fits.components.block(component)
-        own = float(fits.regression.own_information(fitted.fit, block)[0, 0])
+        information = float(fits.regression.own_information(fitted.fit, block)[0, 0])
         prior = float(block.precision[0, 0])
-        if own <= prior:  # the recordings say less of it than is expected anyway
+        if information <= prior:  # the recordings say less of it than is expected anyway
             continue
         candidate = EffectCandidate.of([component])
         asked = (fits.components.prior_cost(candidate).total
-                 + fits.decisions.rival_margin + np.log1p(own / prior))
+                 + fits.decisions.rival_margin + np.log1p(information / prior))
         lack, _ = lack_of_fit(fits.design, fits.regression, fits.decisions, fitted, candidate,
                               set(block.rows))
-        beyond_forms = min(np.sqrt(lack / own), _standing_out(fits, fitted, block, own))
-        c = np.array([max(np.sqrt(asked * (own + prior)) / own, beyond_forms)])
+        beyond_forms = min(np.sqrt(lack / information),
+                           _standing_out(fits, fitted, block, information))
+        c = np.array([max(np.sqrt(asked * (information + prior)) / information, beyond_forms)])
         units = units_of(fits.design.given, component.drive)
         values = component.values(c)
         numbers = [p for p in component.effect.linear if values[p.name]]
@@ -94,10 +95,11 @@ def detectable_sizes(fits: FittedSets, fitted: CandidateSet) -> tuple[Detectable
     return tuple(found)
 
 
-def _standing_out(fits: FittedSets, fitted: CandidateSet, block: Block, own: float) -> float:
+def _standing_out(fits: FittedSets, fitted: CandidateSet, block: Block, information: float,
+                  ) -> float:
     """Return the coefficient with which what is left of a drive stands out of its noise."""
     regression = fits.regression
-    share = own / sum(float(rows[0] ** 2 @ regression.series[d].spread(
+    share = information / sum(float(rows[0] ** 2 @ regression.series[d].spread(
         regression.weights(fitted.fit, d))) for d, rows in block.rows.items())
     sizes = [root_mean_square(rows) / max(regression.noise_floor(fitted.fit, d), 1e-300)
              for d, rows in block.rows.items()]

@@ -364,11 +364,11 @@ def _otherwise(diagnosis: Diagnosis, effect: FoundEffect) -> str:
     given = ', '.join(
         told(value, with_uncertainty(value.given, 0.0, value.estimate.unit, value.size))
         for value in fitted if value.given is not None)
-    said = ', '.join(told(value, value.text) for value in fitted)
+    recorded = ', '.join(told(value, value.text) for value in fitted)
     rivals = _rivals(diagnosis, effect)
     other = f' (or the model lacks {listed(rivals, "or")})' if rivals else ''
     return (f'{_title(diagnosis, effect)} is in the model with {given}; '
-            f'this recording says {said}{other}')
+            f'this recording says {recorded}{other}')
 
 
 def _doubt(diagnosis: Diagnosis) -> str:

@@ -184,11 +184,11 @@ def word_statement(
         # The mean error there, which the table and a plot show; the coefficient is what this
         # pattern has beside the others that overlap it.
         signed = float(error @ columns[0] / (columns[0] @ columns[0]))
-    said = _sentence(variable, pattern, drive_patterns, signed, amplitude, share, time, shape)
+    text = _sentence(variable, pattern, drive_patterns, signed, amplitude, share, time, shape)
     if other_variables:
         others = listed([in_words(name) for name in other_variables], 'or')
-        said += f'; {others} would explain it about as well'
-    return Statement(drive, variable, limits, share, time, f'{drive}: {said}', evidence,
+        text += f'; {others} would explain it about as well'
+    return Statement(drive, variable, limits, share, time, f'{drive}: {text}', evidence,
                      pattern.kind, amplitude, float(np.mean(shape ** 2)), other_variables)
 
 
@@ -200,8 +200,8 @@ def word_scatter(drive_patterns: DrivePatterns, variable: str, pattern: Pattern,
     held = column > 0.5
     total = max(float(error @ error), 1e-300)
     share, time = float(error[held] @ error[held]) / total, float(held.mean())
-    said = _sentence(variable, pattern, drive_patterns, 0.0, 0.0, share, time, np.zeros(0))
-    return Statement(drive, variable, pattern.limits, share, time, f'{drive}: {said}',
+    text = _sentence(variable, pattern, drive_patterns, 0.0, 0.0, share, time, np.zeros(0))
+    return Statement(drive, variable, pattern.limits, share, time, f'{drive}: {text}',
                      evidence, 'scatter', 0.0, total / len(error) * max(share - time, 0.0))
 
 

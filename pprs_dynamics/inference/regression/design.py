@@ -483,12 +483,12 @@ class Design:
             moved = read({**before, c.name: before[c.name] + step})
             if all(map(np.array_equal, old, moved)):
                 return None
-            q, q_ddot, own = np.concatenate([
+            q, q_ddot, rubbing = np.concatenate([
                 recording.treat(self._felt(recording, drive, new - as_read).T).T
                 for recording, as_read, new in zip(self.recordings, old, moved, strict=True)],
                 axis=1)
             return {d: self.homing[drive][d] * q + self.inertia[drive][d] * q_ddot
-                    + own * (d == drive) for d in range(len(self.drives))}
+                    + rubbing * (d == drive) for d in range(len(self.drives))}
 
         error = np.nan_to_num(self.residuals.error[:, drive])
         none = dict.fromkeys(range(len(self.drives)), np.zeros_like(error))
@@ -515,13 +515,13 @@ class Design:
         """
         q, q_dot, q_ddot = change
         friction, v = self.friction(), recording.velocity[:, drive]
-        own = np.zeros_like(q)
+        rubbing = np.zeros_like(q)
         if friction is not None and np.any(q_dot):
             width = float(self.model.reversal.widths(len(self.drives))[drive])
             turned = smooth_sign(v - q_dot, width) - recording.direction[:, drive]
-            own = (friction.dry(recording.friction_load)[:, drive] * turned
+            rubbing = (friction.dry(recording.friction_load)[:, drive] * turned
                    - np.broadcast_to(friction.viscous, len(self.drives))[drive] * q_dot)
-        return np.stack((q, q_ddot, own))
+        return np.stack((q, q_ddot, rubbing))
 
     def _misread(self, effect: MeasurementEffect, recording: FullRate,
                  read: Reconstruction | None, drive: int) -> Array:
@@ -603,8 +603,9 @@ class Design:
 
     def friction(self) -> ActiveFriction | AxisFriction | None:
         """Return the friction that the model has in its drives."""
-        own = (ActiveFriction, AxisFriction)
-        return next((effect for effect in self.model.effects if isinstance(effect, own)), None)
+        frictions = (ActiveFriction, AxisFriction)
+        return next((effect for effect in self.model.effects
+                     if isinstance(effect, frictions)), None)
 
 
 def searched_in_drives(design: Design) -> list[type[DriveEffect]]:

@@ -48,10 +48,10 @@ class SecondEncoders:
             if not np.any(lead):
                 continue
             if np.ptp(load):
-                stiffness, damping, said = told_by_windup(load, lead)
+                stiffness, damping, windup = told_by_windup(load, lead)
                 if stiffness > 0:
                     windups[d] = Windup(1 / stiffness, damping / stiffness,
-                                        float(np.var(said) / np.var(load)))
+                                        float(np.var(windup) / np.var(load)))
             clearances[d] = max(
                 _clearance(lead[0], direction, 'motion'),
                 _clearance(lead[0], np.sign(load), 'load'), key=lambda one: one.explained)

@@ -285,8 +285,8 @@ def _fitted(effort: Array, columns: Sequence[Array]) -> tuple[list[float], list[
     values, doubts = [0.0] * len(columns), [np.inf] * len(columns)
     for k, column in enumerate(used):
         others = np.delete(unit, k, axis=1)
-        own = unit[:, k] - others @ np.linalg.lstsq(others, unit[:, k], rcond=CONDITION)[0]
-        alone = root_mean_square(own)
+        beyond = unit[:, k] - others @ np.linalg.lstsq(others, unit[:, k], rcond=CONDITION)[0]
+        alone = root_mean_square(beyond)
         if alone > CONDITION:
             values[column] = float(solution[k] / sizes[column])
             doubts[column] = left / (alone * float(sizes[column]))

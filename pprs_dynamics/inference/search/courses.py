@@ -69,9 +69,9 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
     below : float
         What some other set costs, which the first effect that changes has to be better than.
     """
-    own = [(kept, candidate) for candidate in kept.effects if _is_new(candidate)]
+    constant = [(kept, candidate) for candidate in kept.effects if _is_new(candidate)]
     alone = [(other, other.effects[0]) for other in others if _is_new(other.effects[0])]
-    begun = [*_offers(fits, [(kept, 0.0)], own, _courses(fits)),
+    begun = [*_offers(fits, [(kept, 0.0)], constant, _courses(fits)),
              *_offers(fits, _bases(fits, kept), alone, _few_courses(fits))]
     drives = {d for unknown in kept.unknowns for d in unknown.drives} | {
         d for offer in begun if offer.is_worth_a_fit(fits) for d in offer.drives}
@@ -80,16 +80,18 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
     # Sets of their own: those of the search are of constant forms, and so are its rivals.
     dated = FittedSets(fits.design, fits.decisions, fits.regression.error_scale)
     best = dated.evaluate(kept.candidates)
-    more = [(other, candidate) for other, candidate in (*alone, *_alone_on_drives(fits, drives))
-            if _is_new(candidate)]
+    alternatives = [(other, candidate)
+                    for other, candidate in (*alone, *_alone_on_drives(fits, drives))
+                    if _is_new(candidate)]
     likely: list[EffectCandidate] = []
     for _ in range(MOST_COURSES):
         held = [(best, candidate) for candidate in best.effects
                 if not candidate.course and _is_new(candidate)]
         # Patterns of no catalogue imitate what changes: offers are beside effects alone.
         plain = dated.at_noise_of(best, best.effects) if best.unknowns else best
-        offers = sorted(_offers(dated, _bases(dated, plain), [*held, *more], _courses(dated)),
-                        key=lambda offer: -offer.gain)
+        offers = sorted(
+            _offers(dated, _bases(dated, plain), [*held, *alternatives], _courses(dated)),
+            key=lambda offer: -offer.gain)
         found, offered = best, _best_of_each(offers)
         likely += [offer.candidate for offer in offered]
         for offer in offered:
@@ -101,7 +103,7 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
             break
         best = _refined(dated, found)
     best = _simplest(dated, best, {candidate.effect: candidate for candidate in (
-        *(candidate for _, candidate in own), *likely)}.values())
+        *(candidate for _, candidate in constant), *likely)}.values())
     best, _ = beyond_discrepancy(dated, best)
     return (dated, best) if any(candidate.course for candidate in best.effects) else (fits, kept)
 
@@ -278,10 +280,10 @@ def _simplest(fits: FittedSets, fitted: CandidateSet, effects: Iterable[EffectCa
     for effect in effects:
         beside = tuple(present for present in constant if present.effect is not effect.effect)
         # What begins may end where nothing else begins.
-        more = [Course(DURING, begin, end) for begin in edges for end in ends
-                if end > begin] if effect.effect in dated else []
+        passing = [Course(DURING, begin, end) for begin in edges for end in ends
+                   if end > begin] if effect.effect in dated else []
         simpler += [fits.evaluate((*rest, _with_course(effect, course)))
-                    for course in (*tried, *more) for rest in dict.fromkeys(((), beside))]
+                    for course in (*tried, *passing) for rest in dict.fromkeys(((), beside))]
     best: dict[tuple[str, str], CandidateSet] = {}
     for other in sorted(simpler, key=lambda fitted: fitted.cost):
         changing = next(effect for effect in other.effects if effect.course is not None)

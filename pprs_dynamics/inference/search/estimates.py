@@ -124,12 +124,12 @@ def estimate(fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
     return Estimates(parameters, tuple(bound), moments)
 
 
-def averaged(own: Estimates, others: Sequence[tuple[float, Estimates]]) -> Estimates:
+def averaged(reported: Estimates, others: Sequence[tuple[float, Estimates]]) -> Estimates:
     """Return estimates whose uncertainty has what other sets say differently.
 
     Parameters
     ----------
-    own : Estimates
+    reported : Estimates
         Their values stay.
     others : sequence of (float, Estimates)
         Each with what its set costs more, which weighs it by exp(-cost / 2).
@@ -137,11 +137,11 @@ def averaged(own: Estimates, others: Sequence[tuple[float, Estimates]]) -> Estim
     weights = np.array([1.0, *(np.exp(-0.5 * max(more, 0.0)) for more, _ in others)])
     share = weights / weights.sum()
     parameters = {}
-    for key, estimate in own.parameters.items():
+    for key, estimate in reported.parameters.items():
         there = [estimate, *(estimates.parameters.get(key, estimate) for _, estimates in others)]
         squares = [other.std ** 2 + (other.value - estimate.value) ** 2 for other in there]
         parameters[key] = replace(estimate, std=float(np.sqrt(share @ squares)))
-    return replace(own, parameters=parameters)
+    return replace(reported, parameters=parameters)
 
 
 def _told_elsewhere(fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,

@@ -86,8 +86,8 @@ def estimate_widths(fits: FittedSets, fitted: CandidateSet) -> dict[int, float]:
 
         def loss(logarithm: float, d: int = d, width: float = width, rest: Array = rest,
                  root: Array = root, column: Callable[[float], Array] = column) -> float:
-            own = regression.series[d].transform(column(width * float(np.exp(logarithm)))) * root
-            return -float(2 * own @ (rest * root) - own @ own)
+            moved = regression.series[d].transform(column(width * float(np.exp(logarithm)))) * root
+            return -float(2 * moved @ (rest * root) - moved @ moved)
 
         grid = np.linspace(np.log(NARROWEST), np.log(WIDEST), TRIALS)
         best = int(np.argmin([loss(trial) for trial in grid]))

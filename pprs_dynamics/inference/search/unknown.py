@@ -104,8 +104,8 @@ class _Scanned:
             pairs = np.arange(len(S)).reshape(-1, 2)
             found: Array = S[pairs[:, :, None], pairs[:, None, :]]
             return found
-        own = np.sum(family.weights @ S * family.weights, axis=1)
-        positive: Array = np.maximum(own, 0.0)[:, None, None]
+        squares = np.sum(family.weights @ S * family.weights, axis=1)
+        positive: Array = np.maximum(squares, 0.0)[:, None, None]
         return positive
 
     def gains(self, fit: JointFit, weights: Array) -> Array:
@@ -326,8 +326,8 @@ class DrivePatterns:
             held = (share >= LEAST_SHARE) & (share <= MOST_SHARE)
             x = self.series.transform(rows)
             taken, side = Columns(self.regression, {self.d: x}).projected(fit)
-            own = x ** 2 @ weights - np.einsum('ip,pq,iq->i', taken, fit.covariance, taken)
-            gains = np.where(held, side ** 2 / np.maximum(own, 1e-9), -np.inf)
+            information = x ** 2 @ weights - np.einsum('ip,pq,iq->i', taken, fit.covariance, taken)
+            gains = np.where(held, side ** 2 / np.maximum(information, 1e-9), -np.inf)
             top = int(np.argmax(gains))
             if gains[top] > best:
                 best, limits[end] = float(gains[top]), float(trials[top])
