@@ -137,24 +137,25 @@ def _few_courses(fits: FittedSets) -> Iterator[Course]:
 def _courses(fits: FittedSets) -> Iterator[Course]:
     first, last = fits.design.residuals.time[[0, -1]].tolist()
     yield Course(DRIFT, first, last)
-    for at in np.linspace(first, last, COURSE_TIMES + 1)[1:-1].tolist():
-        if _is_amid_motion(fits, at):
-            yield Course(SINCE, at, last)
+    for at in _amid_motion(fits, np.linspace(first, last, COURSE_TIMES + 1)[1:-1].tolist()):
+        yield Course(SINCE, at, last)
     edges = np.linspace(first, last, STRETCHES + 1).tolist()
     for length in STRETCH_LENGTHS:
         for begin, end in zip(edges, edges[length:], strict=False):
             yield Course(DURING, begin, end)
 
 
-def _is_amid_motion(fits: FittedSets, time: float) -> bool:
-    """Return whether a noteworthy share of the motion lies before a time, and after it.
+def _amid_motion(fits: FittedSets, times: Sequence[float]) -> list[float]:
+    """Return those times before and after which a noteworthy share of the motion lies.
 
     What a robot does at its start, or while it stands at the end, is friction that has not turned
     over or has not settled, and no other state of the machine.
     """
     moving = np.any([fits.design.moving(d) for d in fits.regression.drives], axis=0)
-    before = float(np.mean(fits.design.residuals.time[moving] < time)) if moving.any() else 0.0
-    return LEAST_MOVING <= before <= 1 - LEAST_MOVING
+    moved = fits.design.residuals.time[moving]
+    before = np.searchsorted(moved, times) / max(len(moved), 1)
+    return [at for at, share in zip(times, before, strict=True)
+            if LEAST_MOVING <= share <= 1 - LEAST_MOVING]
 
 
 def _bases(fits: FittedSets, best: CandidateSet) -> list[tuple[CandidateSet, float]]:
@@ -272,7 +273,7 @@ def _simplest(fits: FittedSets, fitted: CandidateSet, effects: Iterable[EffectCa
     first, last = fits.design.residuals.time[[0, -1]].tolist()
     ends = np.linspace(first, last, STRETCHES + 1).tolist()
     dated = {candidate.effect for candidate in fitted.effects if candidate.course is not None}
-    tried = [*(Course(SINCE, at, last) for at in edges if _is_amid_motion(fits, at)),
+    tried = [*(Course(SINCE, at, last) for at in _amid_motion(fits, edges)),
              *(Course(DURING, begin, end) for k, begin in enumerate(edges)
                for end in edges[k + 1:])]
     constant = tuple(candidate for candidate in fitted.effects if candidate.course is None)
@@ -301,7 +302,7 @@ def _lasting(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
     for candidate in fitted.effects:
         course = candidate.course
         if (course is not None and course.kind == DURING
-                and _is_amid_motion(fits, course.begin)):
+                and _amid_motion(fits, [course.begin])):
             stays = _with_course(candidate, Course(SINCE, course.begin, last))
             fitted = min(fitted, _refined(fits, fits.evaluate((*fitted.without(candidate), stays))),
                          key=lambda fitted: fitted.cost)

@@ -187,23 +187,28 @@ def smoothed_as(motion: DriveMotion, recording: Recording, made: Callable[[Array
         if not np.any(values):
             parts.append([np.zeros((kept.stop - kept.start, *values.shape[1:]))] * 3)
             continue
-        filter_ = (smoothing or motion.smoothing).polynomial(grid.step)
-        inside = grid.inside(filter_.half)
-        inside = slice(max(kept.start, inside.start), min(kept.stop, inside.stop))
-        if inside == kept or inside.start >= inside.stop:
-            filter_ = filter_ if inside == kept else motion.smoothing.polynomial(grid.step)
-            parts.append([grid.at_samples(one, filter_.half, kept)
-                          for one in filter_.differentiated(values)])
+        filter_, ends = (each.polynomial(grid.step)
+                         for each in (smoothing or motion.smoothing, motion.smoothing))
+        reached = grid.inside(filter_.half)
+        inside = slice(max(kept.start, reached.start), min(kept.stop, reached.stop))
+        if inside == kept:
+            parts.append(_differentiated(values, grid, filter_, kept))
             continue
-        ends = motion.smoothing.polynomial(grid.step)
-        rates = [grid.at_samples(one, ends.half, kept).copy()
-                 for one in ends.differentiated(values)]
-        for rate, one in zip(rates, filter_.differentiated(values), strict=True):
-            rate[inside.start - first:inside.stop - first] = grid.at_samples(
-                one, filter_.half, inside)
+        rates = [rate.copy() for rate in _differentiated(values, grid, ends, kept)]
+        if inside.start < inside.stop:
+            for rate, better in zip(rates, _differentiated(values, grid, filter_, inside),
+                                    strict=True):
+                rate[inside.start - first:inside.stop - first] = better
         parts.append(rates)
     q, q_dot, q_ddot = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return q, q_dot, q_ddot
+
+
+def _differentiated(values: Array, grid: SamplingGrid, filter_: LocalPolynomial, samples: slice,
+                    ) -> list[Array]:
+    """Return values at equal steps, and their rates, at the samples of a recording."""
+    return [grid.at_samples(rate, filter_.half, samples)
+            for rate in filter_.differentiated(values)]
 
 
 def _segments_of(motion: DriveMotion, recording: Recording) -> list[slice]:
