@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 import yaml
 from pprs_command import pprs
+from shared_cases import shared_case
 from short_recordings import short_recordings
 
 from benchmarks.hidden import recordings
@@ -380,11 +381,7 @@ OTHERS = {  # folder, model, recording: kinds of what is told, and a clause of i
 @pytest.mark.parametrize('case', OTHERS)
 def test_recordings_of_other_people(case: str) -> None:
     folder, model_file, run, clause = OTHERS[case]
-    place = ROOT.resolve().parent / 'shared' / 'cases' / folder
-    if not place.is_dir():
-        pytest.skip('no recordings in ../shared/cases')
-    model = load_model(place / model_file)
-    whole = read_recording(place / run, model.recorded)
+    model, whole = shared_case(folder, model_file, run)
     count = len(whole.time)
     for part in (slice(0, count), slice(0, count // 2), slice(count // 3, count)):
         piece = Recording.from_arrays('piece', whole.time[part], whole.position[part], None,

@@ -10,6 +10,7 @@ from pathlib import Path
 import made_up_arm as arm
 import numpy as np
 import pytest
+from shared_cases import shared_case
 
 from pprs_dynamics import JointMotion, MechanismModel
 from pprs_dynamics.arrays import Array, root_mean_square
@@ -21,14 +22,13 @@ from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.possible_values import is_possible, why_impossible
-from pprs_dynamics.measurement.files.recording import Recording, read_recording
+from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
-from pprs_dynamics.physics.model.model_file import build_model, load_model
+from pprs_dynamics.physics.model.model_file import build_model
 
 MODEL = MechanismModel.load('config/single_axis.yaml')
 MASS, VISCOUS, COULOMB = (MODEL.values[f'axis.{key}'] for key in ('mass', 'viscous', 'coulomb'))
 TIME = np.arange(0, 20, 0.005)
-IIWA = Path(__file__).parents[3] / 'shared' / 'cases' / 'kuka_lag'
 
 
 def motion() -> JointMotion:
@@ -157,10 +157,8 @@ def test_what_cannot_be_stands_for_nothing_that_is_left_out() -> None:
     Three effects are within the model error of others. A gain of 1.6 would stand for them, and
     voided the filter that was found with it.
     """
-    if not IIWA.is_dir():
-        pytest.skip('no recordings in ../shared/cases')
-    model = load_model(IIWA / 'j4.yaml')
-    found = diagnose(model, [read_recording(IIWA / 'j4_1_half.csv.gz', model.recorded)])
+    model, recording = shared_case('kuka_lag', 'j4.yaml', 'j4_1_half.csv.gz')
+    found = diagnose(model, [recording])
     assert found.verdict == 'unknown'
     assert all(not one.objection for one in found.unconfirmed)
     (late,) = [one for one in found.effects if one.name in ('effort_filter', 'time_delay')]

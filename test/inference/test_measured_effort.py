@@ -17,6 +17,7 @@ from typing import Any
 import made_up_arm as arm
 import numpy as np
 import pytest
+from shared_cases import shared_case
 
 from pprs_dynamics import DriveModel, JointMotion, MechanismModel
 from pprs_dynamics.app.commands.pprs import main
@@ -31,9 +32,8 @@ from pprs_dynamics.inference.residuals.measured_effort import (
 from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model, load_model
+from pprs_dynamics.physics.model.model_file import build_model
 
-CASES = Path(__file__).resolve().parents[3] / 'shared' / 'cases'
 RATE = 200.0  # [Hz]
 DURATION = 20.0  # [s]
 # The first joint of the arm is upright, and carries none.
@@ -251,10 +251,6 @@ CASES_OF = {
 
 @pytest.mark.parametrize('case', CASES_OF)
 def test_other_peoples_recordings(case: str) -> None:
-    if not CASES.is_dir():
-        pytest.skip('no recordings in ../shared/cases')
     for recording, model, kinds in CASES_OF[case]:
-        read = load_model(CASES / case / model)
-        found = find_no_measurements(read, read_recording(CASES / case / recording,
-                                                          read.recorded))
+        found = find_no_measurements(*shared_case(case, model, recording))
         assert {one.kind for one in found} == kinds, recording

@@ -1,0 +1,23 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Recordings of other people, which lie beside the project and not in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pprs_dynamics import Recording, load_model, read_recording
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+CASES = Path(__file__).resolve().parents[3] / 'shared' / 'cases'
+
+
+def shared_case(folder: str, model: str, recording: str) -> tuple[ForceModel, Recording]:
+    """Return a model and a recording of it; the test is skipped where there are none."""
+    if not CASES.is_dir():
+        pytest.skip('no recordings in ../shared/cases')
+    read = load_model(CASES / folder / model)
+    return read, read_recording(CASES / folder / recording, read.recorded)
