@@ -16,7 +16,6 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -120,8 +119,7 @@ def test_the_drives_motion_that_comes_with_the_forces_is_the_mechanisms(plainly,
 def test_forces_are_copied_and_pickled_with_their_mechanism():
     model, motion = paper_model(), random_motion(np.random.default_rng(7), 3)
     forces = model.drive_forces(motion)
-    for same in (copy.deepcopy(forces), pickle.loads(pickle.dumps(forces)),
-                 replace(forces, total=forces.total)):
+    for same in copy.deepcopy(forces), pickle.loads(pickle.dumps(forces)):
         assert_array_equal(sum(same.parts.values()), forces.total)
         assert_array_equal(same.mechanism.position, forces.mechanism.position)
     assert model.drive_forces(motion).mechanism.motion is motion
