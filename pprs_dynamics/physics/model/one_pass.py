@@ -121,10 +121,8 @@ class OnePass:
         the caller must check every sample then.
         """
         rows = motion.rows
-        samples = len(rows)
-        table = np.empty((7 if samples <= SHORT else FORCES, samples, 6))
-        doubtful = evaluate(forces_kernel, self.parameters, rows, table)
-        return table if doubtful < 0 else None
+        table = np.empty((FORCES + 3 if len(rows) <= SHORT else FORCES, len(rows), 6))
+        return table if evaluate(forces_kernel, self.parameters, rows, table) < 0 else None
 
     @staticmethod
     def parts(table: Array) -> dict[str, Array]:
