@@ -124,7 +124,7 @@ class DriveTrajectory(NamedTuple):
     def ends_as(self, held: ForceCommand) -> bool:
         """Return whether the last point is a pose at rest with the efforts of a command."""
         return (self.ends_at_rest and not self.drive_motion[2][-1].any()
-                and np.allclose(self.effort[-1], held.effort[0], rtol=0, atol=SAME_EFFORT))
+                and bool((np.abs(self.effort[-1] - held.effort[0]) <= SAME_EFFORT).all()))
 
 
 class _Leaving(NamedTuple):
@@ -367,7 +367,7 @@ class Feedforward:
         forces = self._model.sound_at(motion).drive_forces(motion)
         assert path.time is not None  # `stop` gives it
         return DriveTrajectory(
-            np.round(path.time * NANOSECONDS).astype(np.int64), forces.drive_motion,
+            np.array([round(moment * NANOSECONDS) for moment in path.time]), forces.drive_motion,
             self._allowed(forces, gravity))
 
     def _accepted(self) -> ForceCommand:
