@@ -127,7 +127,7 @@ class ControllerWatch:
         if not self._stands or len(self._went) < 2:
             return None
         (_, before), (_, now) = list(self._went)[-2:]
-        return now if np.array_equal(before, now) else None
+        return now if (before == now).all() else None
 
     def complaint(self) -> str:
         """Return that the controller does not follow, and the likely reason; '' where it does."""
