@@ -329,7 +329,8 @@ def test_efforts_in_percent_of_the_largest_are_told(tmp_path: Path) -> None:
     (finding,) = find_mistakes(model, run)
     assert "percent of the drives' largest" in finding.what
     assert columns_line([finding]) == (
-        'columns: {turn: {effort_scale: 4}, swing: {effort_scale: 0.8}, reach: {effort_scale: 0.3}}')
+        'columns: {turn: {effort_scale: 4}, swing: {effort_scale: 0.8}, '
+        'reach: {effort_scale: 0.3}}')
 
 
 def test_beside_columns_the_line_that_is_told_is_added_to_theirs(
