@@ -186,10 +186,11 @@ class DriveModel(ForceModel):
             return self.forces_at(self.mechanism(motion), state)
         parts, mechanism = _parts(table), one_pass.mechanism(motion, table)
         added = self.effects[2:]
+        if added:
+            return self._with_effects(added, parts, mechanism, state, DriveForces)
         if state is not None:
-            state.begin(motion.time)
-        return (self._with_effects(added, parts, mechanism, state, DriveForces) if added
-                else DriveForces(table[0], parts, mechanism))
+            state.advance(motion.time, self.initial_state)
+        return DriveForces(table[0], parts, mechanism)
 
     def forces_at(self, mechanism: ThreePprsState, state: ModelState | None = None) -> DriveForces:
         """Return the forces at a solved state of the mechanism; see `drive_forces`."""

@@ -13,7 +13,7 @@ import copy
 import hashlib
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
@@ -88,6 +88,8 @@ class ModelState:
 
     Attributes
     ----------
+    end : float, optional
+        Time of the last sample [s].
     closed : dict of Structure to (C,) array
         Coordinates of a mechanism at the last sample, from which its loops close in fewer steps
         where the next one is near. No result depends on them.
@@ -95,12 +97,21 @@ class ModelState:
 
     def __init__(self, memories: dict[str, Any], start: float | None = None) -> None:
         self.memories, self.start = memories, start
+        self.end: float | None = None
         self.closed: dict[Any, Array] = {}
 
-    def begin(self, time: Array | None) -> None:
-        """Take the first sample of times (N,) as the start, where that is not known yet."""
-        if self.start is None and time is not None and len(time):
+    def advance(self, time: Array | None, fresh: Callable[[], ModelState]) -> None:
+        """Take note of the times (N,) of the next samples, the first of which is the start.
+
+        Times that go back are of another stream: everything begins anew, from a fresh state.
+        """
+        if time is None or not len(time):
+            return
+        if self.end is not None and time[0] < self.end:
+            self.memories, self.start = fresh().memories, None
+        if self.start is None:
             self.start = float(time[0])
+        self.end = float(time[-1])
 
     @property
     def has_memory(self) -> bool:
@@ -123,6 +134,7 @@ class ModelState:
                 raise EffectError(name, 'its memory cannot be copied '
                                   f'({type(error).__name__}: {error})') from error
         state = ModelState(copied, self.start)
+        state.end = self.end
         state.closed = dict(self.closed)
         return state
 
@@ -434,7 +446,7 @@ class ForceModel(ABC):
                       state: ModelState | None, kind: type[F]) -> F:
         """Return the forces of parts that are there and of effects."""
         state = self.initial_state() if state is None else state
-        state.begin(mechanism.time)
+        state.advance(mechanism.time, self.initial_state)
         for effect in self.effects:
             effect.check_memory(state.memories)
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
@@ -486,6 +498,7 @@ class ForceModel(ABC):
         used any more: memories are handed over, not copied.
         """
         continued = self.initial_state(state.start)
+        continued.end = state.end
         known = {effect.name for effect in model.effects} & state.memories.keys()
         for effect in self.effects:
             if effect.name in known:
