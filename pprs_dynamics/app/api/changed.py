@@ -14,7 +14,7 @@ from pprs_dynamics.app.api.inputs import Inputs, Model, Progress, Recordings
 from pprs_dynamics.app.api.result import Result, data_frame
 from pprs_dynamics.inference.diagnosis.changed_number import ChangedNumber
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.paired_errors import rms, rms_by_drive
+from pprs_dynamics.inference.residuals.residuals import rms, rms_by_drive
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.uncertainties import with_uncertainties
