@@ -40,7 +40,7 @@ from pprs_dynamics.inference.search.candidates import (
     EffectCandidate,
 )
 from pprs_dynamics.inference.search.cost_terms import CostTerms
-from pprs_dynamics.inference.search.courses import with_courses
+from pprs_dynamics.inference.search.courses import changing_drives, with_courses
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.estimates import (
     Estimates,
@@ -103,9 +103,11 @@ class Answer:
         What held-out data refute is not tried again.
         """
         ranking, reported = self.ranking, self.reported
-        alone = [] if ranking.refuted else list(ranking.alone.values())
+        alone = [] if ranking.is_less else list(ranking.alone.values())
         # Beside the MAP set: what is within the model error of others is none with a date, either.
-        constant = reported if ranking.refuted else self.map_set
+        constant = reported if ranking.is_less else self.map_set
+        if not changing_drives(self.fits, constant, alone):
+            return self.fits, reported
         fits, found = with_courses(self.fits, constant, alone)
         if alone and ranking.first is not self.fits:
             kept = ranking.first.evaluate(tuple(
