@@ -152,14 +152,14 @@ class DriveModel(ForceModel):
         table = None if one_pass is None else one_pass.forces(motion)
         if one_pass is None or table is None:
             return self.forces_at(self.mechanism(motion), state)
-        if state is not None:
-            state.begin(motion.time)
         added = self.effects[2:]
-        if not added:
-            return Forces(table[0], lambda: one_pass.parts(table),
-                          lambda: one_pass.mechanism(motion, table))
-        return self._with_effects(added, one_pass.parts(table),
-                                  one_pass.mechanism(motion, table), state)
+        if added:
+            return self._with_effects(added, one_pass.parts(table),
+                                      one_pass.mechanism(motion, table), state)
+        if state is not None:
+            state.advance(motion.time, self.initial_state)
+        return Forces(table[0], lambda: one_pass.parts(table),
+                      lambda: one_pass.mechanism(motion, table))
 
     @cached_property
     def _one_pass(self) -> OnePass | None:

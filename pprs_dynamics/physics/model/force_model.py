@@ -30,7 +30,7 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.model.keys import FILES, Key, title_of
+from pprs_dynamics.physics.model.keys import EFFORT_UNITS, FILES, Key, title_of
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.physics.model.recorded_names import effort_kind, joint_names, recorded_columns
 
@@ -104,6 +104,8 @@ class ModelState:
 
     Attributes
     ----------
+    end : float, optional
+        Time of the last sample [s].
     closed : dict of Structure to (C,) array
         Coordinates of a mechanism at the last sample, from which its loops close in fewer steps
         where the next one is near. No result depends on them.
@@ -111,12 +113,21 @@ class ModelState:
 
     def __init__(self, memories: dict[str, Any], start: float | None = None) -> None:
         self.memories, self.start = memories, start
+        self.end: float | None = None
         self.closed: dict[Any, Array] = {}
 
-    def begin(self, time: Array | None) -> None:
-        """Take the first sample of times (N,) as the start, where that is not known yet."""
-        if self.start is None and time is not None and len(time):
+    def advance(self, time: Array | None, fresh: Callable[[], ModelState]) -> None:
+        """Take note of the times (N,) of the next samples, the first of which is the start.
+
+        Times that go back are of another stream: everything begins anew, from a fresh state.
+        """
+        if time is None or not len(time):
+            return
+        if self.end is not None and time[0] < self.end:
+            self.memories, self.start = fresh().memories, None
+        if self.start is None:
             self.start = float(time[0])
+        self.end = float(time[-1])
 
     @property
     def has_memory(self) -> bool:
@@ -139,6 +150,7 @@ class ModelState:
                 raise EffectError(name, 'its memory cannot be copied '
                                   f'({type(error).__name__}: {error})') from error
         state = ModelState(copied, self.start)
+        state.end = self.end
         state.closed = dict(self.closed)
         return state
 
@@ -265,7 +277,9 @@ class ForceModel(ABC):
         return RecordedDrives(
             self.drives, joint_names(self.values, self.drives),
             recorded_columns(self.values, self.drives), self.gain, self.efforts_in_amperes,
-            self.units, tuple(self.effort_limits.tolist()))
+            self.units, tuple(self.effort_limits.tolist()),
+            next((EFFORT_UNITS[value] for key, value in self.values.items()
+                  if key.endswith('.effort_unit')), 1.0))
 
     @property
     def content(self) -> str:
@@ -448,7 +462,7 @@ class ForceModel(ABC):
                       state: ModelState | None) -> Forces:
         """Return the forces of parts that are there and of effects."""
         state = self.initial_state() if state is None else state
-        state.begin(mechanism.time)
+        state.advance(mechanism.time, self.initial_state)
         for effect in self.effects:
             effect.check_memory(state.memories)
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
@@ -500,6 +514,7 @@ class ForceModel(ABC):
         used any more: memories are handed over, not copied.
         """
         continued = self.initial_state(state.start)
+        continued.end = state.end
         known = {effect.name for effect in model.effects} & state.memories.keys()
         for effect in self.effects:
             if effect.name in known:
