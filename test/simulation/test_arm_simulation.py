@@ -171,7 +171,7 @@ def test_the_command_writes_recording_and_truth(tmp_path: Path,
                  '--duration', '5', '--json', str(truth)]) == 0
     assert json.loads(truth.read_text())['effects'][0]['parameters']['mass'] > 0
     assert main(['simulate', '--model', path, '--output', output, '--overwrite', '--effect',
-                 'rod_mass']) == 2
+                 'link_mass']) == 2
     assert 'no hidden effect of such a robot' in capsys.readouterr().err
 
 

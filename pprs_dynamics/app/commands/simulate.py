@@ -23,7 +23,6 @@ from pprs_dynamics.app.commands.arguments import (
 )
 from pprs_dynamics.app.commands.input_output import tell
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
-from pprs_dynamics.physics.effects.former_names import FORMER
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
@@ -44,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='.mcap, .csv, or the name of a rosbag2 folder to make')
     add_overwrite(parser)
     parser.add_argument('--effect', metavar='NAME', action='append', default=[],
-                        choices=(*dict.fromkeys((*HIDDEN_EFFECTS, *ARM_EFFECTS)), RANDOM, *FORMER),
+                        choices=(*dict.fromkeys((*HIDDEN_EFFECTS, *ARM_EFFECTS)), RANDOM),
                         help='physics that the model does not know of, drawn from the seed; may '
                         f'be repeated: random, {", ".join(HIDDEN_EFFECTS)}; of an arm or a '
                         f'robot with loops {", ".join(ARM_EFFECTS)}')
