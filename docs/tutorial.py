@@ -80,15 +80,13 @@ def main() -> None:
         IMAGES / 'tutorial_after.png', *residuals, answer['noise_floor'],
         f'On a motion that was not fitted, {HIDDEN} takes the error from {fall[0]:.3f} to '
         f'{fall[1]:.3f} N; noise alone is {answer["noise_floor"]:.3f} N')
-    for page, picture, opened in (
-            ('before', 'compare', ''), ('why', 'diagnose', ''),
-            ('why', 'tutorial_what_if', 'What if')):
-        photograph(folder / f'{page}.html', IMAGES / f'{picture}.png', opened)
+    for page, picture in (('before', 'compare'), ('why', 'diagnose')):
+        photograph(folder / f'{page}.html', IMAGES / f'{picture}.png')
     write_page(folder)
 
 
-def photograph(page: Path, picture: Path, opened: str) -> None:
-    """Take a picture of a page in Chromium, of its first screen or of a part that is opened."""
+def photograph(page: Path, picture: Path) -> None:
+    """Take a picture of the first screen of a page in Chromium."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as running:
@@ -96,13 +94,7 @@ def photograph(page: Path, picture: Path, opened: str) -> None:
                                           args=['--no-sandbox'])
         tab = browser.new_page(viewport={'width': 1280, 'height': 900})
         tab.goto(page.resolve().as_uri())
-        if opened:
-            summary = tab.locator(f'summary:has-text("{opened}")')
-            summary.click()
-            tab.wait_for_selector('#what-if[data-ready]')
-            summary.evaluate('(one) => one.scrollIntoView()')
-        else:
-            tab.wait_for_selector('.plot[data-drawn]')
+        tab.wait_for_selector('.plot[data-drawn]')
         tab.wait_for_timeout(500)  # [ms], for the last curve
         tab.screenshot(path=picture)
         browser.close()
