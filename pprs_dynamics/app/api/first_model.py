@@ -445,20 +445,25 @@ def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, ba
     place = os.path.relpath(robot.resolve(), output.resolve().parent)
     slides = all(description.joints[name].kind == PRISMATIC for name in drives)
     gain = ', '.join(['1.0'] * len(drives))
-    # Of an arm, joints that are not driven stand.
-    block, listed = (('robot', 'drives') if is_mjcf or description.loops else ('arm', 'joints'))
+    # Without loops nothing else determines joints that are not driven.
+    locked = {} if description.loops else {
+        name: joint.start if joint.start is not None else min(max(0.0, joint.lower), joint.upper)
+        for name, joint in description.joints.items()
+        if joint.kind in (*TURNING, PRISMATIC) and joint.mimic is None and name not in drives}
     lines = [
         f'# Model of {robot.name}'
         + (f', read beside {", ".join(recordings[:3])}' if recordings else '')
         + '. Lines with "guessed" or "not known" are to be checked.',
         '/**:',
         '  ros__parameters:',
-        f'    {block}:',
+        '    robot:',
         f'      {"mjcf" if is_mjcf else "urdf"}: {scalar(place)}  # from the folder of this file',
         f'      base: {scalar(base)}  # the link that stands',
         f'      tool: {scalar(branch.tool)}  # the link that carries the load',
-        f'      {listed}: [{", ".join(scalar(name) for name in drives)}]  # driven, in the order '
+        f'      drives: [{", ".join(scalar(name) for name in drives)}]  # driven, in the order '
         'of all results',
+        *([f'      locked: {{{", ".join(f"{scalar(name)}: {at:g}" for name, at in locked.items())}'
+           '}  # joints that do not move, and where they are'] if locked else ()),
         f'      effort_unit: {"N" if slides else "N m"}  # not known from the files; A where '
         'recorded efforts are currents',
         f'      {"" if currents else "# "}gain: [{gain}]  # not known: effort per ampere '
