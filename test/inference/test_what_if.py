@@ -97,9 +97,13 @@ def fitted(diagnosis: Diagnosis, tried: list[Tried]) -> tuple[JointFit, float]:
               for block in (fits.components.block(component), *one.nuisance.get(component, ()))]
     fit = fits.regression.at(blocks, selection.map_set.fit.amplitudes)
     components = [component for one, _ in tried for component in one.components]
-    prior_cost = sum(fits.components.prior_cost(one).total for one, _ in tried) + sum(
-        fits.prior_costs.of_wrong_signs(one, one.values(fit.of(fits.components.block(one))))
-        for one in components)
+    prior_cost = sum(fits.components.prior_cost(one).total for one, _ in tried)
+    for one in components:
+        place = fit.places[fits.components.block(one)]
+        std = np.sqrt(np.diag(fit.covariance)[place])
+        prior_cost += sum(fits.prior_costs.of_sign(value / deviation) for name, value, deviation
+                          in zip(one.names, fit.coefficients[place], std, strict=False)
+                          if name in one.signed)
     return fit, fit.deviance + prior_cost
 
 

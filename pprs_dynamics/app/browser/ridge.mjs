@@ -146,8 +146,14 @@ export class RidgeSystem {
     let priorCost = 0;
     for (const one of placements) {
       priorCost += one.prior_cost;
-      if (one.signs.some(([k, bound]) => c[k] < bound)) {
-        priorCost -= 2 * Math.log(wrong_sign_odds / (1 - wrong_sign_odds) / (2 ** one.signs.length - 1));
+      for (const [k, bound] of one.signs) { // as `PriorCosts.of_sign`
+        const column = this.whitened(this.factored.indexOf(k));
+        const z = (c[k] - bound) / Math.sqrt(dot(column, column));
+        const right = Math.log(1 - wrong_sign_odds) + logNormal(z);
+        const wrong = Math.log(wrong_sign_odds) + logNormal(-z);
+        const most = Math.max(right, wrong);
+        priorCost -= 2 * (Math.log(2) + most
+          + Math.log(Math.exp(right - most) + Math.exp(wrong - most)));
       }
     }
     for (const effect of effects) {
