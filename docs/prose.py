@@ -86,9 +86,9 @@ def faults(text: str) -> Iterator[str]:
 
 def pages() -> list[Path]:
     """Return the pages of the project."""
-    found = [PROJECT / 'README.md', PROJECT / 'CONTRIBUTING.md', *(PROJECT / 'docs').glob('*.md'),
-             *(PROJECT / 'docs' / 'example_effect').glob('*.md')]
-    return sorted(page for page in found if page.name != 'CONTRIBUTING.md' or page.parent == PROJECT)
+    docs = PROJECT / 'docs'
+    return [PROJECT / 'README.md', PROJECT / 'CONTRIBUTING.md', docs / 'example_effect/README.md',
+            *sorted(page for page in docs.glob('*.md') if page.name != 'CONTRIBUTING.md')]
 
 
 def docstrings() -> Iterator[tuple[str, str]]:
@@ -104,17 +104,16 @@ def docstrings() -> Iterator[tuple[str, str]]:
 
 
 def prose_of(docstring: str) -> str:
-    """Return a docstring without the names and types of its parameters, examples and code."""
-    lines, kept = docstring.splitlines(), []
-    for number, line in enumerate(lines):
-        following = lines[number + 1].strip() if number + 1 < len(lines) else ''
-        if set(following) == {'-'} or set(line.strip()) == {'-'} or line.strip().startswith('>>>'):
-            kept.append('')
-        elif re.match(r'\w[\w, *]* : ', line) or line.startswith('    ') and '::' in line:
-            kept.append('')
-        else:
-            kept.append(re.sub(r'``?[^`]+``?', 'CODE', line))
-    return re.sub(r'(?m)^ {4,}\S.*(?:=|\bpython\b|^ +pprs ).*$', '', '\n'.join(kept))
+    """Return a docstring without headings, names and types of parameters, commands and code."""
+    prose = []
+    lines = docstring.splitlines()
+    for line, following in zip(lines, [*lines[1:], ''], strict=True):
+        plain = line.strip()
+        heading = set(plain) == {'-'} or set(following.strip()) == {'-'}
+        name = re.match(r'\w[\w, *]* : ', line)
+        code = re.match(r'(>>>| {4,}.*(=|\bpython\b))', line) or plain.startswith('pprs ')
+        prose.append('' if heading or name or code else re.sub(r'``?[^`]+``?', 'CODE', line))
+    return '\n'.join(prose)
 
 
 def main() -> int:
