@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Runs the feedforward node's benchmarks and writes benchmarks/results/reliability.md from what they found.
+"""Run the benchmarks of the feedforward node and write their results.
 
     python -m benchmarks.node.reliability [--full] [PART ...]
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Words of benchmarks/results/reliability.md, which `reliability.py` writes."""
+"""Sections of the reliability results."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@
 """How often `diagnose` is right about physics hidden in recordings.
 
     python -m benchmarks.scores.diagnosis --quick
-    python -m benchmarks.scores.diagnosis --seeds 20 --nothing 200 --table benchmarks/results/diagnosis.md
+    python -m benchmarks.scores.diagnosis --table benchmarks/results/diagnosis.md
 
 Every case's outcome is appended to FILE at once, and cases that are there are not run again: the
 run can be stopped and continued, and `--seeds` raised later. The table is made from that file.
