@@ -18,7 +18,6 @@ if TYPE_CHECKING:
         adopt,
         adopt_all,
     )
-    from pprs_dynamics.app.api.changed import ChangeResult, changed
     from pprs_dynamics.app.api.compare import ComparisonResult, compare
     from pprs_dynamics.app.api.diagnose import DiagnosisResult, diagnose
     from pprs_dynamics.app.api.fit import FitResult, fit
@@ -63,21 +62,20 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.model.model_file import build_model, load_model
 
 __all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'Array', 'Card', 'CatalogueEffect',
-           'ChangeResult', 'ComparisonResult', 'ConvergenceError', 'DiagnosisResult',
-           'DriveEffect', 'DriveForces', 'DriveModel', 'DriveRange', 'DriveSamples', 'EffectError',
+           'ComparisonResult', 'ConvergenceError', 'DiagnosisResult', 'DriveEffect',
+           'DriveForces', 'DriveModel', 'DriveRange', 'DriveSamples', 'EffectError',
            'Excitation', 'ExperimentResult', 'FitResult', 'GainEffect', 'HelicalPath',
            'JointMotion', 'LimitError', 'MeasurementEffect', 'MechanismModel',
            'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError', 'MotionLimits',
            'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session', 'SimulationResult',
            'SingularityError', 'StructureEffect', 'UnknownNameError', 'UnreadableFileError',
-           'WorkspaceError', 'adopt', 'adopt_all', 'build_model', 'changed', 'compare', 'diagnose',
+           'WorkspaceError', 'adopt', 'adopt_all', 'build_model', 'compare', 'diagnose',
            'fit', 'load_model', 'next_experiment', 'read_recording', 'simulate', 'write_recording']
 __version__ = '0.1.0'
 
 # Loaded at first use: `pprs --help` and a node's refusal need neither numpy nor a model.
 _HOMES = {
     'app.api.adopt': ('AdoptionResult', 'AdoptionRunResult', 'adopt', 'adopt_all'),
-    'app.api.changed': ('ChangeResult', 'changed'),
     'app.api.compare': ('ComparisonResult', 'compare'),
     'app.api.diagnose': ('DiagnosisResult', 'diagnose'),
     'app.api.fit': ('FitResult', 'fit'),

@@ -15,12 +15,10 @@ import pytest
 from documents import PROJECT, text_of
 
 from pprs_dynamics.app.api.adopt import AdoptionRunResult
-from pprs_dynamics.app.api.changed import ChangeResult
 from pprs_dynamics.app.api.compare import ComparisonResult
 from pprs_dynamics.app.commands import diagnose, info
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun
-from pprs_dynamics.inference.diagnosis.changed_number import ChangedNumber
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect, RankedEffect, RankedSet
@@ -31,7 +29,7 @@ from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.measurement.files.recording import DriveSummary, Summary
 
 COMPARE, DIAGNOSE = 'From a recording to where the model fails', 'From where to why'
-CHANGED, ADOPT = 'Before and after a repair', 'Add it, and watch the error fall'
+ADOPT = 'Add it, and watch the error fall'
 
 # What writes keys, by the section of the page that lists them.
 WRITERS: dict[str, tuple[Callable[..., Any], ...]] = {
@@ -40,9 +38,8 @@ WRITERS: dict[str, tuple[Callable[..., Any], ...]] = {
     DIAGNOSE: (Diagnosis.to_dict, FoundEffect.to_dict, RankedEffect.to_dict, RankedSet.to_dict,
                Estimate.to_dict, Calibration.to_dict, diagnose._adopt_all, AdoptionRun.to_dict,
                AdoptionRunResult.to_dict, Refit.to_dict),
-    CHANGED: (ChangeResult.to_dict,), ADOPT: (Adoption.to_dict,)}
-WRITTEN_WHOLE = {COMPARE: (Summary, DriveSummary), DIAGNOSE: (CostTerms,),
-                 CHANGED: (ChangedNumber,)}
+    ADOPT: (Adoption.to_dict,)}
+WRITTEN_WHOLE = {COMPARE: (Summary, DriveSummary), DIAGNOSE: (CostTerms,)}
 
 
 def words_of(heading: str) -> set[str]:

@@ -303,8 +303,8 @@ def read_as_told(model: MechanismModel, folder: Path, run: Recording,
 ARM_MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     'degrees': ({'motion': [180 / np.pi, 180 / np.pi, 1.0]}, 'turn: {position_scale: 0.01745329}'),
     'millimetres': ({'motion': [1.0, 1.0, 1e3]}, 'reach: {position_scale: 0.001}'),
-    'sign': ({'effort': -1.0}, 'swing: {scale: -1}'),
-    'a sign': ({'effort': [1.0, -1.0, 1.0]}, 'swing: {scale: -1}')}
+    'sign': ({'effort': -1.0}, 'swing: {effort_scale: -1}'),
+    'a sign': ({'effort': [1.0, -1.0, 1.0]}, 'swing: {effort_scale: -1}')}
 
 
 @pytest.mark.parametrize('mistake', ARM_MISTAKES)
@@ -327,7 +327,8 @@ def test_efforts_in_percent_of_the_largest_are_told(tmp_path: Path) -> None:
     (finding,) = find_mistakes(model, run)
     assert "percent of the drives' largest" in finding.what
     assert columns_line([finding]) == (
-        'columns: {turn: {scale: 4}, swing: {scale: 0.8}, reach: {scale: 0.3}}')
+        'columns: {turn: {effort_scale: 4}, swing: {effort_scale: 0.8}, '
+        'reach: {effort_scale: 0.3}}')
 
 
 def test_beside_columns_the_line_that_is_told_is_added_to_theirs(

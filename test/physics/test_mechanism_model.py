@@ -151,7 +151,6 @@ FLOATING = ('<link name="world"/><joint name="free" type="floating"><parent link
 
 
 @pytest.mark.parametrize(('text', 'words'), [
-    (arm.urdf(kind='continuous'), 'continuous'),
     (arm.urdf(mimic='<mimic joint="turn"/>'), 'mimics turn'),
     (arm.urdf(more=TRANSMISSION), 'transmission'),
     (arm.urdf(more=FLOATING), 'floating'),

@@ -176,6 +176,15 @@ class Description:
     faults: tuple[str, ...] = ()
 
 
+def moved_along(joint: Joint, position: float) -> Frame:
+    """Return the frame of a joint at a position in its frame at 0."""
+    if joint.kind == PRISMATIC:
+        return Frame(p=position * joint.axis)
+    x, y, z = joint.axis
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return Frame(np.eye(3) + np.sin(position) * K + (1 - np.cos(position)) * (K @ K))
+
+
 def inertial_in(frame: Frame, parameters: Array) -> Array:
     """Return inertial parameters (10,) of a body in the frame that its own frame stands in."""
     T = np.eye(4)
@@ -201,10 +210,11 @@ def from_pseudo_inertia(P: Array) -> Array:
 def principal_inertia(parameters: Array) -> tuple[float, Array, Array, Array]:
     """Return mass, centre, principal moments about it and their axes as columns, of a body (10,).
 
-    The axes are right-handed.
+    The axes are right-handed. A body without mass, as of a rotor that only turns, has its centre at
+    the origin.
     """
     mass = float(parameters[0])
-    centre = parameters[1:4] / mass
+    centre = parameters[1:4] / mass if mass else np.zeros(3)
     xx, xy, yy, xz, yz, zz = parameters[4:]
     about = (np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
              - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre)))

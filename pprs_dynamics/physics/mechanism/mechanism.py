@@ -51,7 +51,7 @@ class Mechanism:
     ----------
     structure : Structure
     bodies : (B,) int array
-        Joints whose links have mass.
+        Joints whose links have mass or inertia.
     inertial : (B, 10) array
         Inertial parameters of what they move up to the next: m, m c, and the inertia xx xy yy xz
         yz zz about the joint's origin, in the joint's frame [kg, kg m, kg m^2].
@@ -132,7 +132,7 @@ class Mechanism:
         """The links with mass but that of the tool, each with its centre of mass."""
         found = []
         for k, name in enumerate(self.body_names):
-            if k != self.carrier:
+            if k != self.carrier and self.masses[k] > 0:
                 _, frame = self.structure.links[name]
                 x, y, z = frame.inverse.of_point(self.inertial[k, 1:4] / self.inertial[k, 0])
                 found.append(BodyPlace(name, (round(float(x), 6), round(float(y), 6),

@@ -33,9 +33,8 @@ from pprs_dynamics.physics.mechanism.description import (
     Mimic,
     body_at,
 )
-from pprs_dynamics.physics.mechanism.urdf import read_content
+from pprs_dynamics.physics.mechanism.urdf import WORLD, read_content, ring
 
-WORLD = 'world'
 # Numbers of parts that a mechanism here has not got, and what they are.
 FOREIGN_PARTS = {'ntendon': 'tendons', 'nflex': 'flexible bodies', 'nplugin': 'plugins'}
 
@@ -57,11 +56,53 @@ def read_mjcf(path: str) -> Description:
     except ImportError:
         raise MissingLibraryError('mujoco', 'a model from MJCF', 'sim') from None
     content = read_content(path)
-    try:
-        model = mujoco.MjModel.from_xml_path(path)
-    except (ValueError, mujoco.FatalError) as error:
-        raise UnreadableFileError(path, f'not MJCF that can be compiled: {error}') from None
+    model = compiled(mujoco, path)
     return _Reader(mujoco, model, path).description(hashlib.sha256(content).hexdigest())
+
+
+def compiled(mujoco: Any, path: str) -> Any:
+    """Return MuJoCo's model of an MJCF. Files of meshes that no mass needs may be missing.
+
+    Raises
+    ------
+    UnreadableFileError
+        If it cannot be compiled.
+    """
+    try:
+        return mujoco.MjModel.from_xml_path(path)
+    except (ValueError, mujoco.FatalError) as error:
+        reason = f'not MJCF that can be compiled: {" ".join(str(error).split())}'
+    weighed: list[str] = []
+    try:
+        spec = mujoco.MjSpec.from_file(path)
+        weighed = _without_shapes(mujoco, spec)
+        return spec.compile()
+    except (ValueError, mujoco.FatalError):
+        pass
+    if weighed:
+        reason += (f'; {", ".join(weighed)} have no <inertial>, so their mass follows from their '
+                   'shapes: bring the file, or write <inertial>')
+    raise UnreadableFileError(path, reason)
+
+
+def _without_shapes(mujoco: Any, spec: Any) -> list[str]:
+    """Delete the shapes that do not determine a mass; return the bodies of the others."""
+    of_shapes = spec.compiler.inertiafromgeom
+    always = of_shapes == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    never = of_shapes == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    weighed = []
+    for body in spec.bodies:
+        if body.geoms and body.name != WORLD and (
+                always or not (never or body.explicitinertial)):
+            weighed.append(body.name)
+            continue
+        for geom in body.geoms:
+            spec.delete(geom)
+    needed = {geom.meshname for geom in spec.geoms}
+    for part in (*spec.pairs, *spec.sensors, *spec.skins, *spec.hfields, *spec.materials,
+                 *spec.textures, *(mesh for mesh in spec.meshes if mesh.name not in needed)):
+        spec.delete(part)
+    return weighed
 
 
 class _Reader:
@@ -110,6 +151,11 @@ class _Reader:
                  and self.model.jnt_type[k] == self.mujoco.mjtJoint.mjJNT_BALL]
         if balls:
             yield f'the range of {", ".join(balls)} is not used: a ball has no limits here'
+        servos = [self.model.actuator(a).name or f'actuator_{a}' for a in range(self.model.nu)
+                  if self.model.actuator_biasprm[a, 1:3].any()]
+        if servos:
+            yield (f'the gains (kp, kv) of {", ".join(servos)} are not used: they belong to a '
+                   'controller, not to the robot')
 
     def _body(self, b: int, links: dict[str, Array], joints: dict[str, Joint]) -> None:
         model = self.model
@@ -182,10 +228,19 @@ class _Reader:
         largest = float(np.min(np.abs(model.jnt_actfrcrange[k]))) if (
             model.jnt_actfrclimited[k]) else np.inf
         for a in range(model.nu):
-            if (model.actuator_trntype[a] == self.mujoco.mjtTrn.mjTRN_JOINT
-                    and model.actuator_trnid[a, 0] == k and model.actuator_forcelimited[a]):
-                largest = min(largest, float(np.min(np.abs(model.actuator_forcerange[a]))
-                                             * abs(model.actuator_gear[a, 0])))
+            if (model.actuator_trntype[a] != self.mujoco.mjtTrn.mjTRN_JOINT
+                    or model.actuator_trnid[a, 0] != k):
+                continue
+            gear = abs(float(model.actuator_gear[a, 0]))
+            if model.actuator_forcelimited[a]:
+                largest = min(largest, gear * float(np.min(np.abs(model.actuator_forcerange[a]))))
+            # The control of a servo is a position or a velocity.
+            is_motor = (model.actuator_gaintype[a] == self.mujoco.mjtGain.mjGAIN_FIXED
+                        and model.actuator_biastype[a] == self.mujoco.mjtBias.mjBIAS_NONE)
+            if is_motor and model.actuator_ctrllimited[a]:
+                gain = abs(float(model.actuator_gainprm[a, 0]))
+                largest = min(largest, gear * gain
+                              * float(np.min(np.abs(model.actuator_ctrlrange[a]))))
         return largest
 
     def _inertial(self, b: int) -> Array:
@@ -196,7 +251,10 @@ class _Reader:
 
     def _constraints(self, joints: dict[str, Joint]) -> list[Loop]:
         model, kinds = self.model, self.mujoco.mjtEq
-        loops = []
+        loops: list[Loop] = []
+        if model.opt.disableflags & int(self.mujoco.mjtDisableBit.mjDSBL_EQUALITY):
+            return loops
+        set_by: dict[int, str] = {}
         for e in range(model.neq):
             if not model.eq_active0[e]:
                 continue
@@ -204,6 +262,10 @@ class _Reader:
             kind, a, b = int(model.eq_type[e]), int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
             numbers = model.eq_data[e]
             if kind == kinds.mjEQ_JOINT:
+                if a in set_by:
+                    raise ModelError('robot.mjcf', self.names[a], 'follow one joint, but '
+                                     f'{set_by[a]} and {name} each name one: delete one of them')
+                set_by[a] = name
                 self._couple(joints, name, a, b, numbers)
                 continue
             if kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
@@ -221,6 +283,10 @@ class _Reader:
                           Frame(p=numbers[:3].copy())]
             loops.append(Loop(name, 'spherical' if kind == kinds.mjEQ_CONNECT else 'fixed',
                               self.bodies[a], frames[0], self.bodies[b], frames[1]))
+        if found := ring({name: joint.mimic.joint for name, joint in joints.items()
+                          if joint.mimic is not None}):
+            raise ModelError('robot.mjcf', ', '.join(found), 'follow no joint that follows them: '
+                             'delete a <joint> of <equality>')
         return loops
 
     def _couple(self, joints: dict[str, Joint], name: str, a: int, b: int, numbers: Array) -> None:

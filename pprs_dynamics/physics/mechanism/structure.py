@@ -32,6 +32,7 @@ from pprs_dynamics.physics.mechanism.description import (
     Joint,
     Loop,
     inertial_in,
+    moved_along,
 )
 from pprs_dynamics.physics.mechanism.elimination import determining, given
 from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Integers, Tables
@@ -65,6 +66,8 @@ class Structure:
     mobility : Mobility
     size : float
         Mean distance of joints and closures from the base [m].
+    locked : dict of str to float
+        Positions of joints that nothing moves [rad, m].
     lower, upper, speed, effort : (D,) arrays
         Limits of the drives; infinite where there are none.
     """
@@ -80,6 +83,7 @@ class Structure:
     tool: str
     mobility: Mobility
     size: float
+    locked: dict[str, float]
     lower: Array
     upper: Array
     speed: Array
@@ -164,6 +168,7 @@ class _Builder:
         self.start: list[float] = []
         self.rows: dict[str, int] = {}
         self.links: dict[str, tuple[int, Frame]] = {}
+        self.locked: dict[str, float] = {}
 
     def hang(self, base: str, home: Mapping[str, float], poses: Mapping[str, Frame]) -> None:
         """Hang all links on the base, joint by joint."""
@@ -173,15 +178,15 @@ class _Builder:
             below.setdefault(joint.parent, []).append(joint)
         children = {joint.child for joint in joints.values()}
         root = next(link for link in self.description.links if link not in children)
-        self.links[root] = (0, self._root(root, base))
+        self.links[root] = (0, self._root(root, base, home))
         waiting = [root]
         followers: list[tuple[int, Joint]] = []
         while waiting:
             for joint in below.get(waiting.pop(0), []):
                 row, frame = self.links[joint.parent]
                 placed = frame @ joint.frame
-                if self._stands(joint):
-                    self.links[joint.child] = (row, placed)
+                if self._is_locked(joint):
+                    self.links[joint.child] = (row, frame @ self._locked_frame(joint, home))
                 elif joint.kind == FLOATING:
                     self._float(joint, row, frame, placed, poses)
                 else:
@@ -197,26 +202,41 @@ class _Builder:
         for added, joint in followers:
             self._follow(added, joint)
 
-    def _root(self, root: str, base: str) -> Frame:
-        """Return the root's frame in the base's, which stands."""
+    def _root(self, root: str, base: str, home: Mapping[str, float]) -> Frame:
+        """Return the root's frame in the base's; no drive moves one against the other."""
         link, frame = base, Frame()
         hung = {joint.child: joint for joint in self.description.joints.values()}
         while link != root:
             joint = hung[link]
-            if not self._stands(joint):
+            if not self._is_locked(joint):
                 raise ModelError(f'{self.block}.base', base,
                                  f'be a link that none of {self.block}.'
                                  f'{"joints" if self.lock_others else "drives"} moves')
-            frame, link = joint.frame @ frame, joint.parent
+            frame, link = self._locked_frame(joint, home) @ frame, joint.parent
         return frame.inverse
 
-    def _stands(self, joint: Joint) -> bool:
+    def _is_locked(self, joint: Joint) -> bool:
         if joint.kind == FIXED:
             return True
         leader = joint
         while leader.mimic is not None:
             leader = self.description.joints[leader.mimic.joint]
         return self.lock_others and leader.name not in self.drives
+
+    def _locked_frame(self, joint: Joint, home: Mapping[str, float]) -> Frame:
+        """Return the frame of the child of a locked joint in the parent's."""
+        if joint.kind in (FIXED, FLOATING):
+            return joint.frame
+        position = self.locked[joint.name] = self._locked_position(joint, home)
+        return joint.frame @ moved_along(joint, position)
+
+    def _locked_position(self, joint: Joint, home: Mapping[str, float]) -> float:
+        """Return the position of home, of the file, or the one within limits nearest to 0."""
+        if joint.mimic is not None:
+            leader = self.description.joints[joint.mimic.joint]
+            return joint.mimic.ratio * self._locked_position(leader, home) + joint.mimic.offset
+        position = home.get(joint.name, joint.start)
+        return min(max(0.0, joint.lower), joint.upper) if position is None else position
 
     def _add(self, parent: int, place: Frame, axis: Array, turns: bool) -> int:
         self.parent.append(parent)
@@ -342,7 +362,8 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
     block : str
         Of the model file, for errors.
     lock_others : bool
-        True where joints that are not driven stand at zero.
+        True where joints that are not driven are locked: at home, else at the position of the file,
+        else at that within their limits which is nearest to 0.
 
     Raises
     ------
@@ -372,9 +393,9 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
     q = _home(closing, start, free) if loops else start
     structure = Structure(
         description, t, drives,
-        tuple('revolute' if description.joints[name].kind in TURNING else PRISMATIC
+        tuple(REVOLUTE if description.joints[name].kind in TURNING else PRISMATIC
               for name in drives), tuple(build.coordinates), build.links, build.rows, loops, tool,
-        Mobility(none, none, none, q, len(q), 1.0), size,
+        Mobility(none, none, none, q, len(q), 1.0), size, build.locked,
         *(np.array([getattr(description.joints[name], limit) for name in drives])
           for limit in ('lower', 'upper', 'speed', 'effort')))
     mobility = closing.mobility(q, t.drives, _moves(structure) * closing.columns)
@@ -417,10 +438,9 @@ def _require_joints(description: Description, drives: tuple[str, ...], block: st
             raise ModelError(listed, name, 'be joints of the URDF: '
                              f'{", ".join(moving[:40]) or MISSING}')
         joint = joints[name]
-        if joint.kind not in ('revolute', PRISMATIC):
-            hint = ' (give it limits and the type revolute)' if joint.kind == 'continuous' else ''
-            raise ModelError(listed, name, 'be revolute or prismatic, but is of the type '
-                             f'{joint.kind} in the URDF{hint}')
+        if joint.kind not in (*TURNING, PRISMATIC):
+            raise ModelError(listed, name, 'be revolute, continuous or prismatic, but is of the '
+                             f'type {joint.kind} in the description')
         if joint.mimic is not None:
             raise ModelError(listed, name, f'move by itself, but mimics {joint.mimic.joint} in '
                              'the URDF')

@@ -34,6 +34,7 @@ from pprs_dynamics.physics.mechanism.arithmetic import (
     sqrt,
     tanh,
 )
+from pprs_dynamics.physics.mechanism.description import PARAMETERS
 from pprs_dynamics.physics.mechanism.vectors import Vector, dot, minus, plus, product, times
 
 Integers = np.typing.NDArray[np.int_]
@@ -711,9 +712,9 @@ def inverse_dynamics(t: Tables, m: Motion, inertial: Any, gravity: Any, o: Loads
     """
     g, links = Vector(gravity[0], gravity[1], gravity[2]), m.links
     for j in range(1, len(t.joints)):
-        mass, at = inertial[j, 0], OF_LINK * j
-        if mass == 0.0 and inertial[j, 4] == 0.0 and inertial[j, 1] == 0.0:
+        if _is_zero(inertial, j):
             continue
+        mass, at = inertial[j, 0], OF_LINK * j
         h = turned(links, at + R, Vector(inertial[j, 1], inertial[j, 2], inertial[j, 3]))
         a, w, wd = minus(vector(links, at + UD), g), vector(links, at + W), vector(links, at + WD)
         increase(o.links, OF_FORCES * j + FORCE, plus(
@@ -732,6 +733,13 @@ def inverse_dynamics(t: Tables, m: Motion, inertial: Any, gravity: Any, o: Loads
         increase(o.links, OF_FORCES * i + FORCE, f)
         increase(o.links, OF_FORCES * i + MOMENT, plus(n, product(arm, f)))
     to_drives(t, m, o.coordinates, o.efforts)
+
+
+def _is_zero(inertial: Any, j: int) -> bool:
+    for k in range(PARAMETERS):  # noqa: SIM110 Numba compiles no generators
+        if inertial[j, k] != 0.0:
+            return False
+    return True
 
 
 def _inertia_times(links: Any, j: int, inertial: Any, v: Vector) -> Vector:

@@ -42,6 +42,7 @@ from pprs_dynamics.physics.mechanism.description import (
 )
 from pprs_dynamics.system.input_files import require_file
 
+WORLD = 'world'
 LARGEST_FILE = 20_000_000  # bytes; descriptions of robots without meshes have some 100 kB
 Item = TypeVar('Item')
 KINDS = (REVOLUTE, CONTINUOUS, PRISMATIC, FIXED, FLOATING)
@@ -60,6 +61,7 @@ TINY = 1e-9  # [kg m^2] of it, whatever the size
 # Radius of gyration over the length of all links in a row: beyond it a body would be ten times as
 # long as its robot, while a wrong unit, mm^2 for m^2, makes it a thousand times as large.
 LARGEST_GYRATION = 3.0
+LARGEST_BODY = 1e9  # [kg, kg m^2]
 MOST_NAMES = 8  # in a sentence
 
 
@@ -123,6 +125,8 @@ def _described(content: bytes, path: str) -> Description:
         raise UnreadableFileError(path, f'not a URDF: its root is <{robot.tag}>, must be <robot>')
     links = _read(path, robot.findall('link'), _inertial)
     joints = _read(path, robot.findall('joint'), _joint)
+    if any(joint.parent == WORLD for joint in joints.values()):
+        links.setdefault(WORLD, np.zeros(PARAMETERS))  # Drake reads it without a link of its own
     _require_tree(path, links, joints)
     try:
         transmissions = tuple(map(_transmission, robot.findall('transmission')))
@@ -291,6 +295,9 @@ def _inertial(link: ElementTree.Element) -> np.ndarray:
     if mass < 0 or min(xx, yy, zz) < 0:
         raise ValueError(f'its mass is {mass:g} kg, its moments of inertia {xx:g}, {yy:g}, '
                          f'{zz:g} kg m^2: none may be negative')
+    if max(mass, xx, yy, zz) > LARGEST_BODY:
+        raise ValueError(f'its mass is {mass:g} kg, its moments of inertia {xx:g}, {yy:g}, '
+                         f'{zz:g} kg m^2: none may be above {LARGEST_BODY:g}')
     R = rotation_of(_numbers(origin, 'rpy', '0 0 0'))
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     return body_at(mass, _numbers(origin, 'xyz', '0 0 0'), R @ tensor @ R.T)
@@ -311,7 +318,7 @@ def _joint(joint: ElementTree.Element) -> Joint:
     lower, upper = _number(limit, 'lower', 0.0), _number(limit, 'upper', 0.0)
     if lower > upper and kind != CONTINUOUS:
         raise ValueError(f'its lower limit is {lower:g}, must be below its upper one, {upper:g}')
-    if not lower < upper:  # a URDF may leave them out
+    if not lower < upper or kind == CONTINUOUS:  # a URDF may omit them
         lower, upper = -np.inf, np.inf
     speed, effort = (_number(limit, key, 0.0) or np.inf for key in ('velocity', 'effort'))
     if min(speed, effort) < 0:
@@ -350,17 +357,17 @@ def _require_tree(path: str, links: dict[str, np.ndarray], joints: dict[str, Joi
             path, f'has {len(roots)} links that hang on none '
             f'({", ".join(roots[:6]) or "a ring"}), must have one')
     hanging = {joint.child: joint.parent for joint in joints.values()}
-    if ring := _ring(hanging):
+    if found := ring(hanging):
         raise UnreadableFileError(
-            path, f'{", ".join(ring[:6])} hang on one another: a URDF is a tree, close loops by '
+            path, f'{", ".join(found[:6])} hang on one another: a URDF is a tree, close loops by '
             'robot.loops')
-    if ring := _ring({name: joint.mimic.joint for name, joint in joints.items()
+    if found := ring({name: joint.mimic.joint for name, joint in joints.items()
                       if joint.mimic is not None}):
-        raise UnreadableFileError(path, f'{", ".join(ring[:6])}: a joint must mimic none that '
+        raise UnreadableFileError(path, f'{", ".join(found[:6])}: a joint must mimic none that '
                                   'mimics it')
 
 
-def _ring(following: dict[str, str]) -> list[str]:
+def ring(following: dict[str, str]) -> list[str]:
     """Return names of which each follows the next and the last the first, [] for none."""
     done: set[str] = set()
     for start in following:

@@ -31,7 +31,7 @@ from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.drive_states import DriveStates
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.model.keys import FILES, Key, title_of
+from pprs_dynamics.physics.model.keys import EFFORT_UNITS, FILES, Key, title_of
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.physics.model.recorded_names import effort_kind, joint_names, recorded_columns
 
@@ -249,7 +249,9 @@ class ForceModel(ABC):
         return RecordedDrives(
             self.drives, joint_names(self.values, self.drives),
             recorded_columns(self.values, self.drives), self.gain, self.efforts_in_amperes,
-            self.units, tuple(self.effort_limits.tolist()))
+            self.units, tuple(self.effort_limits.tolist()),
+            next((EFFORT_UNITS[value] for key, value in self.values.items()
+                  if key.endswith('.effort_unit')), 1.0))
 
     @property
     def content(self) -> str:

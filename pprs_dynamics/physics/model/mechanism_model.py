@@ -327,9 +327,10 @@ def _mechanism(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
     """Return the mechanism with its bodies, from the file where it has them."""
     block = mechanism_block(values)
     # Of an arm what each joint moves comes first, in the order of `joints`; then what follows them.
+    inert = np.flatnonzero(structure.inertial.any(axis=1)).tolist()
     driven = [structure.rows[name] for name in structure.drives] if block == ARM_BLOCK else []
-    with_mass = [int(row) for row in np.flatnonzero(structure.inertial[:, 0] > 0)]
-    bodies = np.array([*driven, *(row for row in with_mass if row not in driven)], dtype=np.int64)
+    bodies = np.array(sorted(inert, key=lambda row: (
+        driven.index(row) if row in driven else len(driven), row)), dtype=np.int64)
     inertial = structure.inertial[bodies]
     for key, first, size in (('links.mass', 0, 1), ('links.moment', 1, 3),
                              ('links.inertia', 4, 6)):
@@ -341,19 +342,18 @@ def _mechanism(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
                              f'for each of {names}')
         given = np.reshape(values[key], (-1, size))
         inertial[:, first:first + size] = given[:, FROM_FILES] if size == 6 else given
-    for row, mass in zip(bodies, inertial[:, 0], strict=True):
-        if not mass > 0:
+    for row, (mass, *moment) in zip(bodies, inertial[:, :4], strict=True):
+        if mass < 0 or (mass == 0 and any(moment)):
             name = next(name for name, at in structure.rows.items() if at == row)
             raise ModelError('links.mass', float(mass), f'be greater than 0 for what {name} moves')
     robot = Mechanism(structure, bodies, inertial, np.array(values[f'{block}.armature']),
                       gravity_in_efforts(values, f'{block}.gravity'), joint_radii(values),
                       motor_map(structure, values))
-    if block != ARM_BLOCK:
-        _require_driven_bodies(robot)
+    _require_driven_bodies(robot, block)
     return robot
 
 
-def _require_driven_bodies(robot: Mechanism) -> None:
+def _require_driven_bodies(robot: Mechanism, block: str) -> None:
     """Raise ModelError for a drive that moves no mass at home."""
     structure = robot.structure
     home = structure.home[None, structure.tables.drives]
@@ -364,11 +364,13 @@ def _require_driven_bodies(robot: Mechanism) -> None:
         with not_compiling_yet():
             moved, still = (robot.torques(home, rest, one)[0, d] for one in (pushed, rest))
         if not moved - still + robot.armature[d] > 0:
-            raise ModelError('robot.drives', name, 'move a body: no link that it moves has a mass')
+            raise ModelError(drives_key(block), name,
+                             'move a body: no link that it moves has a mass')
 
 
 def _require_bodies(effect: CatalogueEffect, robot: Mechanism) -> None:
     """Raise ModelError where an effect leaves bodies that cannot be."""
-    if not np.all(robot.masses > 0):
+    moments = robot.inertial[:, 1:4].any(axis=1)
+    if np.any((robot.masses < 0) | (robot.masses == 0) & moments):
         raise ModelError(f'effects.{effect.name}', effect.to_file(),
                          'leave masses greater than 0')

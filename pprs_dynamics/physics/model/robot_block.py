@@ -192,14 +192,12 @@ def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[st
 
 
 def _gravity(structure: Structure) -> tuple[float, ...]:
-    """Return gravity in the base: the description's, which is in the frame of its root."""
+    """Return gravity in the base, turned from the frame of the description's root."""
     description = structure.description
-    if description.gravity is None:
-        return STANDARD_GRAVITY
     hung = {joint.child for joint in description.joints.values()}
     root = next(link for link in description.links if link not in hung)
     _, frame = structure.links[root]
-    turned = frame.R @ np.array(description.gravity)
+    turned = frame.R @ np.array(description.gravity or STANDARD_GRAVITY)
     return tuple(float(each) for each in turned)
 
 

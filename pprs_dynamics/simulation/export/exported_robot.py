@@ -176,7 +176,7 @@ def _bodies(mechanism: Mechanism) -> Iterator[Body]:
 
 def _inertia(name: str, parameters: Array) -> tuple[float, Array, Array, Array]:
     """Return mass, centre, principal moments and their axes."""
-    if not parameters[0] > 0:
+    if not parameters.any():
         return LEAST, np.zeros(3), np.full(3, LEAST), np.eye(3)
     mass, centre, moments, axes = principal_inertia(parameters)
     slack = SOUND * max(float(np.abs(parameters[4:]).max()), LEAST)
@@ -187,7 +187,7 @@ def _inertia(name: str, parameters: Array) -> tuple[float, Array, Array, Array]:
     moments = np.maximum(moments, LEAST)
     # What rounding left of the triangle's rule, which simulators take to the letter.
     moments[2] = min(moments[2], moments[0] + moments[1])
-    return mass, centre, moments, axes
+    return max(mass, LEAST), centre, moments, axes
 
 
 def _platform(robot: Robot, model: DriveModel, kind: str) -> Mechanism:

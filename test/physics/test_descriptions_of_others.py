@@ -1,0 +1,216 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Descriptions as they are in circulation, against Pinocchio and MuJoCo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pprs_dynamics import JointMotion, MechanismModel, load_model
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.physics.effects.catalogue import find_effect
+
+pinocchio = pytest.importorskip('pinocchio')
+mujoco = pytest.importorskip('mujoco')
+
+STEP = 1e-5  # of a parameter; inertia is quadratic in the place of a mass
+LIMIT = '<limit lower="-3" upper="3" effort="10" velocity="2"/>'
+BODY = ('<inertial pos="0.1 0.02 0.03" mass="1" '
+        'fullinertia="0.03 0.04 0.05 0.001 0.002 -0.003"/>')
+
+
+def link(name: str, mass: float = 1.0, centre: str = '0.2 0.02 0.1') -> str:
+    return (f'<link name="{name}"><inertial><origin xyz="{centre}" rpy="0.1 0.2 0.3"/>'
+            f'<mass value="{mass}"/><inertia ixx="0.03" iyy="0.04" izz="0.02" ixy="0.001" '
+            'ixz="0.002" iyz="-0.001"/></inertial></link>')
+
+
+def joint(name: str, parent: str, child: str, axis: str = '0 1 0', kind: str = 'revolute',
+          more: str = '', limit: str = LIMIT) -> str:
+    return (f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+            f'<origin xyz="0.3 0.1 0.2" rpy="0.3 0.1 0.2"/><axis xyz="{axis}"/>{limit}{more}'
+            '</joint>')
+
+
+def load(folder: Path, urdf: str, block: str) -> MechanismModel:
+    (folder / 'robot.urdf').write_text(f'<robot name="robot">{urdf}</robot>')
+    return _load(folder, 'robot.urdf', block)
+
+
+def load_mjcf(folder: Path, mjcf: str, block: str) -> MechanismModel:
+    (folder / 'robot.xml').write_text(f'<mujoco>{mjcf}</mujoco>')
+    return _load(folder, 'robot.xml', block)
+
+
+def _load(folder: Path, name: str, block: str) -> MechanismModel:
+    kind = 'urdf' if name.endswith('urdf') else 'mjcf'
+    path = folder / 'robot.yaml'
+    path.write_text('/**:\n  ros__parameters:\n    '
+                    + block.replace('{', f'{{{kind}: {name}, ', 1) + '\n')
+    model = load_model(path)
+    assert isinstance(model, MechanismModel)
+    return model
+
+
+def efforts(model: MechanismModel, *motion: Any) -> Any:
+    return model.drive_forces(JointMotion(*(np.atleast_2d(each) for each in motion))).total
+
+
+def rnea(folder: Path, q: Any, v: Any, a: Any) -> Any:
+    """Return the efforts of all joints of the URDF, by Pinocchio."""
+    model = pinocchio.buildModelFromUrdf(str(folder / 'robot.urdf'))
+    return pinocchio.rnea(model, model.createData(), *(np.array(each, float) for each in (q, v, a)))
+
+
+def random_motion(drives: int) -> Any:
+    return np.random.default_rng(drives).normal(size=(3, drives))
+
+
+def test_a_body_without_mass_has_all_ten_columns(tmp_path: Path) -> None:
+    model = load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1', '0 0 1') + link('l1')
+                 + joint('j2', 'l1', 'l2') + link('l2') + '<link name="flange"/>'
+                 + joint('turn', 'l2', 'flange', '1 0 0', more='<mimic joint="j2"/>'),
+                 'robot: {base: base, tool: flange, drives: [j1, j2]}')
+    rng = np.random.default_rng(0)
+    state = model.mechanism(JointMotion(*rng.normal(size=(3, 50, 2))))
+    effect = model.bound(find_effect('payload_mass'))
+    body = {'mass': 1.0}
+    for coefficient in effect.coefficients:
+        alone = effect.at({coefficient.name: STEP}).force(state)
+        both = {**body, coefficient.name: body.get(coefficient.name, 0.0) + STEP}
+        added = effect.at(both).force(state) - effect.at(body).force(state)
+        assert np.abs(added).max() > STEP / 10, coefficient.name
+        assert alone == pytest.approx(added, abs=1e-3 * STEP), coefficient.name
+
+
+def test_a_rotor_without_mass_on_a_gear_has_its_inertia(tmp_path: Path) -> None:
+    rotor = ('<link name="rotor"><inertial><mass value="0"/><inertia ixx="0" iyy="0" izz="2e-6" '
+             'ixy="0" ixz="0" iyz="0"/></inertial></link>')
+    model = load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1', '0 0 1') + link('l1')
+                 + rotor + joint('motor', 'base', 'rotor', '0 0 1', 'continuous',
+                                 '<mimic joint="j1" multiplier="100"/>', ''),
+                 'robot: {base: base, tool: l1, drives: [j1]}')
+    q, v, a = random_motion(1)
+    gear = np.array([1.0, 100.0])
+    found = pinocchio.buildModelFromUrdf(str(tmp_path / 'robot.urdf'))
+    assert list(found.names[1:]) == ['j1', 'motor']
+    # The rotor turns continuously: Pinocchio takes cosine and sine.
+    place = [q[0], np.cos(100 * q[0]), np.sin(100 * q[0])]
+    expected = gear @ rnea(tmp_path, place, gear * v[0], gear * a[0])
+    assert efforts(model, q, v, a)[0, 0] == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(('more', 'limit', 'kind', 'at'), [
+    ('<mimic joint="leader" multiplier="-1" offset="1.2"/>', LIMIT, 'revolute', 1.2),
+    ('<mimic joint="leader" multiplier="-1" offset="0.2"/>', LIMIT, 'prismatic', 0.2),
+    ('', '<limit lower="0.5" upper="0.9" effort="1" velocity="1"/>', 'prismatic', 0.5),
+    ('', '<limit lower="-0.9" upper="-0.5" effort="1" velocity="1"/>', 'revolute', -0.5),
+    ('', LIMIT, 'revolute', 0.0)])
+def test_a_locked_joint_has_a_position_that_the_description_allows(
+    tmp_path: Path, more: str, limit: str, kind: str, at: float,
+) -> None:
+    model = load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1') + link('l1')
+                 + joint('leader', 'l1', 'l2', '1 0 1') + link('l2')
+                 + joint('locked', 'l2', 'l3', '0 1 1', kind, more, limit) + link('l3'),
+                 'arm: {base: base, tool: l3, joints: [j1]}')
+    q, v, a = random_motion(1)
+    expected = rnea(tmp_path, [q[0], 0, at], [v[0], 0, 0], [a[0], 0, 0])
+    assert efforts(model, q, v, a)[0, 0] == pytest.approx(expected[0], rel=1e-9)
+    assert model.robot.structure.locked == {'leader': 0.0, 'locked': at}
+
+
+@pytest.mark.parametrize('base', ['world', 'plate'])
+@pytest.mark.parametrize('angle', ['3.141592653589793 0 0', '0.4 1.2 0.3'])
+def test_gravity_is_in_the_frame_of_the_root(tmp_path: Path, base: str, angle: str) -> None:
+    model = load(
+        tmp_path, '<link name="world"/><link name="plate"/><joint name="mount" type="fixed">'
+        '<parent link="world"/><child link="plate"/>'
+        f'<origin xyz="0 0 2" rpy="{angle}"/></joint>'
+        + joint('j1', 'plate', 'l1') + link('l1'), f'arm: {{base: {base}, tool: l1, joints: [j1]}}')
+    q, v, a = random_motion(1)
+    assert efforts(model, q, v, a)[0] == pytest.approx(rnea(tmp_path, q, v, a), rel=1e-9)
+
+
+def test_a_continuous_joint_can_be_a_drive(tmp_path: Path) -> None:
+    model = load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1', kind='continuous',
+                                                         limit='<limit effort="39" velocity="2"/>')
+                 + link('l1'), 'arm: {base: base, tool: l1, joints: [j1]}')
+    q, v, a = random_motion(1)
+    expected = rnea(tmp_path, [np.cos(q[0]), np.sin(q[0])], v, a)
+    assert efforts(model, q, v, a)[0] == pytest.approx(expected, rel=1e-9)
+    structure = model.robot.structure
+    assert structure.turning == ('j1',)
+    assert (structure.lower[0], structure.upper[0]) == (-np.inf, np.inf)
+    assert (structure.effort[0], structure.speed[0]) == (39, 2)
+
+
+def test_the_base_may_be_a_world_that_is_no_link(tmp_path: Path) -> None:
+    model = load(tmp_path, joint('j1', 'world', 'l1') + link('l1'),
+                 'arm: {base: world, tool: l1, joints: [j1]}')
+    q, v, a = random_motion(1)
+    urdf = (tmp_path / 'robot.urdf').read_text()
+    (tmp_path / 'robot.urdf').write_text(urdf.replace('<joint', '<link name="world"/><joint', 1))
+    assert efforts(model, q, v, a)[0] == pytest.approx(rnea(tmp_path, q, v, a), rel=1e-9)
+
+
+@pytest.mark.parametrize('mass', ['1e300', '-1'])
+def test_masses_that_no_robot_has_are_refused(tmp_path: Path, mass: str) -> None:
+    with pytest.raises(PprsError, match='link l1: its mass is '):
+        load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1')
+             + link('l1').replace('mass value="1.0"', f'mass value="{mass}"'),
+             'arm: {base: base, tool: l1, joints: [j1]}')
+
+
+THREE = (f'<worldbody><body name="t0"><joint name="a" axis="0 1 0"/>{BODY}'
+         f'<body name="t" pos="0.3 0 0"><joint name="b" axis="0 0 1"/>{BODY}'
+         f'<body name="u" pos="0.3 0 0"><joint name="c" axis="0 0 1"/>{BODY}</body></body></body>'
+         '</worldbody>')
+
+
+@pytest.mark.parametrize(('equalities', 'words'), [
+    ('<joint joint1="b" joint2="c"/><joint joint1="c" joint2="b"/>', 'b, c'),
+    ('<joint joint1="b" joint2="b"/>', 'b'),
+    ('<joint name="x" joint1="c" joint2="a"/><joint name="y" joint1="c" joint2="b"/>', 'x.*y')])
+def test_joints_of_mjcf_that_follow_one_another_or_two_are_refused(
+    tmp_path: Path, equalities: str, words: str,
+) -> None:
+    with pytest.raises(PprsError, match=words):
+        load_mjcf(tmp_path, f'{THREE}<equality>{equalities}</equality>',
+                  'robot: {base: world, tool: u, drives: [a]}')
+
+
+def test_equalities_that_are_off_are_none(tmp_path: Path) -> None:
+    off = '<option><flag equality="disable"/></option>'
+    model = load_mjcf(tmp_path, f'{off}{THREE}<equality><joint joint1="b" joint2="a"/></equality>',
+                      'robot: {base: world, tool: u, drives: [a, b, c]}')
+    assert model.robot.structure.drives == ('a', 'b', 'c')
+
+
+def test_motors_have_the_effort_that_their_control_allows(tmp_path: Path) -> None:
+    motors = ('<actuator><motor joint="a" gear="50" ctrlrange="-1 2"/>'
+              '<general joint="b" gear="5" gainprm="3" ctrlrange="-2 2" forcerange="-4 4"/>'
+              '<position name="servo" joint="c" kp="100" kv="10" ctrlrange="-3 3"/></actuator>')
+    model = load_mjcf(tmp_path, THREE + motors, 'robot: {base: world, tool: u, drives: [a, b, c]}')
+    assert model.robot.structure.effort == pytest.approx([50, 20, np.inf])
+    remarks = model.robot.structure.description.remarks
+    assert any('servo' in each and 'controller' in each for each in remarks)
+
+
+def test_masses_and_joints_suffice_where_mesh_files_are_missing(tmp_path: Path) -> None:
+    shape = '<geom type="mesh" mesh="shell" pos="0.1 0 0"/>'
+    assets = ('<compiler meshdir="elsewhere" texturedir="elsewhere"/><asset>'
+              '<mesh name="shell" file="shell.stl"/><texture name="t" type="2d" file="t.png"/>'
+              '<material name="m" texture="t"/></asset>')
+    block = 'robot: {base: world, tool: u, drives: [a, b, c]}'
+    motion = random_motion(3)
+    plain = efforts(load_mjcf(tmp_path, THREE, block), *motion)
+    shaped = efforts(load_mjcf(tmp_path, assets + THREE.replace(BODY, BODY + shape), block),
+                     *motion)
+    assert shaped == pytest.approx(plain, rel=1e-12)
+    with pytest.raises(PprsError, match=r'shell\.stl.*t0, t, u have no'):
+        load_mjcf(tmp_path, assets + THREE.replace(BODY, shape), block)
