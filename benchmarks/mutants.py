@@ -50,7 +50,7 @@ TESTS = {
     'physics/model/limits.py': ('physics/test_limits.py',),
     'physics/model/ledger.py': ('physics/test_ledger.py',),
     'inference/residuals/noise.py': ('inference/test_noise.py',),
-    'inference/residuals/paired_errors.py': ('inference/test_gates.py',),
+    'inference/search/held_out.py': ('inference/test_gates.py',),
     'inference/regression/joint_fit.py': ('inference/test_joint_fit.py',
                                           'inference/test_noise.py'),
     'inference/regression/normal_equations.py': ('inference/test_joint_fit.py',),

@@ -21,8 +21,7 @@ from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.comparison_bag import write_comparison
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.mistakes import effort_looks_like, no_measurements
-from pprs_dynamics.inference.residuals.paired_errors import rms, rms_by_drive
-from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.inference.search.noise_floors import measure_columns, noise_floors
 from pprs_dynamics.physics.model.model_file import load_model
