@@ -190,3 +190,42 @@ def test_joints_with_a_prefix_are_refused_with_the_line_to_write(tmp_path: Path)
 
     with pytest.raises(UnreadableFileError, match='write joint_prefix: left_ in the model file'):
         read(ros2(tmp_path / 'left', left))
+
+
+@pytest.mark.parametrize('seed', range(6))
+def test_positions_are_those_of_the_chosen_topic_whatever_else_is_in_the_bag(
+    seed: int, tmp_path: Path,
+) -> None:
+    random = np.random.default_rng(seed)
+    late, offset = int(random.integers(0, 5_000_000)), float(random.choice([0.0, 0.5]))
+    has_velocity, has_effort = random.random(2) < 0.5
+    name = str(random.choice(['/joint_commands', '/a_first', '/robot/torque_states']))
+
+    def two(types: Any, k: int) -> dict[str, tuple[str, Any]]:
+        measured = state(types, k)
+        measured.effort = np.zeros(0) if has_effort else EFFORT[k]
+        time = types.types['builtin_interfaces/msg/Time'](*divmod(stamp(k) + late, 10**9))
+        other = types.types[STATE](
+            types.types['std_msgs/msg/Header'](time, ''), list(JOINTS),
+            offset * POSITION[k] + offset, np.ones(2) if has_velocity else np.zeros(0), EFFORT[k])
+        return {name: (STATE, other), '/joint_states': (STATE, measured)}
+
+    recording = read(ros2(tmp_path / 'bag', two))
+    stamps = np.rint(recording.time * 1e9).astype(int) + (recording.epoch - EPOCH) * 10**9
+    at = np.searchsorted(np.rint(TIME * 1e9).astype(int), stamps)
+    assert len(recording.time) >= N - 2
+    np.testing.assert_array_equal(recording.position, POSITION[at])
+    known = np.isfinite(recording.effort).all(axis=1)
+    assert known.sum() >= N - 2
+    np.testing.assert_allclose(recording.effort[known], EFFORT[at][known], atol=0.02)
+
+
+def test_efforts_on_two_other_topics_are_a_question(tmp_path: Path) -> None:
+    def three(types: Any, k: int) -> dict[str, tuple[str, Any]]:
+        measured = state(types, k)
+        measured.effort = np.zeros(0)
+        return {'/joint_states': (STATE, measured), '/asked': (STATE, state(types, k)),
+                '/felt': (STATE, state(types, k))}
+
+    with pytest.raises(UnreadableFileError, match='/asked, /felt each have the effort of a'):
+        read(ros2(tmp_path / 'bag', three))

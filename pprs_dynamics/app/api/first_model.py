@@ -54,8 +54,8 @@ from pprs_dynamics.system.plain_yaml import scalar
 Ask = Callable[[str, Sequence[str]], int]
 FILE_TIME = 'time'
 SETTLED = ('position', 'velocity', 'effort', 'current')
-SCALE_KEYS = {POSITION: 'position_scale', VELOCITY: 'velocity_scale', EFFORT: 'scale',
-              CURRENT: 'scale'}
+SCALE_KEYS = {POSITION: 'position_scale', VELOCITY: 'velocity_scale', EFFORT: 'effort_scale',
+              CURRENT: 'effort_scale'}
 
 
 class FirstModelError(PprsError, ValueError):

@@ -24,9 +24,8 @@ LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
 OUTPUTS = ('output', 'json', 'report', 'mcap', 'picture')
-INPUTS = ('model', 'recordings', 'before', 'after', 'validate', 'reference', 'beside', 'refit',
-          'file',
-          'manifest', 'store', 'path')
+INPUTS = ('model', 'recordings', 'validate', 'reference', 'beside', 'refit', 'file', 'manifest',
+          'store', 'path')
 
 DEFAULT_MODEL = 'config/paper.yaml'
 

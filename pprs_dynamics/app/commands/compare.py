@@ -24,8 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='write measured effort, model, parts and residual as joint states, '
                         'with layouts for PlotJuggler and Foxglove beside it')
     arguments.add_overwrite(parser)
-    parser.add_argument('--beside', metavar='FILE', help='another model file on the same '
-                        'recordings, or another recording: its errors stand beside')
+    parser.add_argument('--beside', metavar='FILE.yaml', help='another model file: its '
+                        'errors on the same recordings')
     arguments.add_report(parser)
 
 

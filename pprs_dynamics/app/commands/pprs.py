@@ -31,7 +31,7 @@ from pprs_dynamics.system.plain_text import displayed
 from pprs_dynamics.system.threads import use_one_thread
 
 # Each a module of this folder with a docstring, EXAMPLE, add_arguments and run.
-COMMANDS = ('adopt', 'changed', 'compare', 'diagnose', 'export', 'fit', 'history', 'info',
+COMMANDS = ('adopt', 'compare', 'diagnose', 'export', 'fit', 'history', 'info',
             'init', 'next-experiment', 'reproduce', 'simulate', 'survey', 'trend', 'workbench')
 # What all others take: models there are in the file or the store, and a session has no result.
 WITHOUT_MODEL, WITHOUT_JSON = ('history', 'init', 'trend'), ('workbench',)

@@ -9,14 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.drives import common_effort
 from pprs_dynamics.inference.adoption.fit_effect import SURE, EffectFit
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.quantities import as_fitted, with_uncertainty
-from pprs_dynamics.inference.residuals.paired_errors import PairedGain
-from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.diagnosis.quantities import (
+    as_fitted,
+    change,
+    with_uncertainty,
+)
+from pprs_dynamics.inference.residuals.residuals import Residuals, rms_by_drive
 from pprs_dynamics.inference.search.estimates import Estimate
+from pprs_dynamics.inference.search.held_out import PredictiveGain
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.force_model import (
@@ -26,7 +29,6 @@ from pprs_dynamics.physics.model.force_model import (
 )
 
 MOVING = 5.0  # widths in which friction turns over
-BENT = 1.5  # error of a fitted model over that of its linear fit
 PUSHES = 0.1  # of the moving time, in which a drive's friction may give power back
 # Standard errors by which the first effect, and further ones, must gain.
 FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0
@@ -77,49 +79,38 @@ def _evidence(fitted: EffectFit, diagnosis: Diagnosis) -> list[str]:
             f'{fitted.evidence:.3g}, where 0 is the threshold']
 
 
-def of_held_out_error(before: float, after: float, gain: PairedGain, model: ForceModel,
-                      where: str) -> list[str]:
-    """Return whether the error on held-out data fails to fall beyond its uncertainty.
+def of_prediction(gain: PredictiveGain, before: Residuals, after: Residuals, model: ForceModel,
+                  where: str) -> list[str]:
+    """Return why an effect does not lower the error beyond its uncertainty; nothing if it does.
 
     Parameters
     ----------
-    before, after : float
-        [N]
-    gain : PairedGain
-        Of the fitted model.
+    gain : PredictiveGain
+        Of the model with the effect.
+    before, after : Residuals
+        Of the two models, for the sentence.
     model : ForceModel
         As given: more is asked where it has effects already.
     where : str
-        What was held out, for the sentence.
+        What was predicted, for the sentence.
     """
-    unit = common_effort(model.units)
-    sure = gain.certainty
     asked = FURTHER_ERRORS if any(
         isinstance(effect, CatalogueEffect) for effect in model.effects) else FIRST_ERRORS
-    if after < before and sure > asked:
+    if gain.confirms(asked):
         return []
-    if after >= before:
-        return [f'the error on {where} does not fall: {before:.4g} {unit} before, '
-                f'{after:.4g} {unit} after']
-    return [f'the error on {where} falls from {before:.4g} to {after:.4g} {unit}, which is '
-            f'{sure:.2g} standard errors, must be more than {asked:g}']
+    if gain.losing:
+        drive = min(gain.losing, key=lambda name: gain.by_drive[name])
+        return [f'{word_change(drive, where, before, after)}, and is predicted worse by '
+                f'{-gain.by_drive[drive]:.2g} standard errors']
+    drive = max(gain.by_drive, key=lambda name: gain.by_drive[name])
+    return [f'{word_change(drive, where, before, after)}; all drives are predicted better by '
+            f'{gain.certainty:.2g} standard errors, must be more than {asked:g}']
 
 
-def of_linearity(promised: float, found: float, unit: str) -> list[str]:
-    """Return whether a fitted model is far from the linear fit that it was made of.
-
-    Columns of shapes and of numbers that bend forces hold near the model only.
-
-    Parameters
-    ----------
-    promised, found : float
-        Error on the recordings, of the linear fit and of the model.
-    unit : str
-    """
-    if found <= BENT * promised:
-        return []
-    return [f'fitted with it, the model would leave {found:.4g} {unit} where the fit promises '
-            f'{promised:.4g} {unit}: its parameters are too far from where they started']
+def word_change(drive: str, where: str, before: Residuals, after: Residuals) -> str:
+    """Return 'the error of DRIVE on WHERE falls from A to B', or that it does not fall."""
+    given, found = (rms_by_drive(one)[drive] for one in (before, after))
+    return f'the error of {drive} on {where} {change(given, found, before.units_of(drive).effort)}'
 
 
 def of_identifiability(fitted: EffectFit) -> list[str]:

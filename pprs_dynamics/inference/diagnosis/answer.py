@@ -30,7 +30,7 @@ from pprs_dynamics.inference.diagnosis.statements import (
 )
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.paired_errors import paired_gain, rms
+from pprs_dynamics.inference.residuals.residuals import rms
 from pprs_dynamics.inference.search.absorbed import Absorbed
 from pprs_dynamics.inference.search.candidates import (
     DURING,
@@ -41,7 +41,7 @@ from pprs_dynamics.inference.search.candidates import (
 )
 from pprs_dynamics.inference.search.constraints import empty_totals
 from pprs_dynamics.inference.search.cost_terms import CostTerms
-from pprs_dynamics.inference.search.courses import with_courses
+from pprs_dynamics.inference.search.courses import changing_drives, with_courses
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.estimates import (
     Estimates,
@@ -59,7 +59,7 @@ from pprs_dynamics.inference.search.fitted_model import (
     parts_of,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.held_out import hold_out
+from pprs_dynamics.inference.search.held_out import hold_out, predictive_gain
 from pprs_dynamics.inference.search.noise_floors import noise_floors
 from pprs_dynamics.inference.search.possible_values import why_impossible
 from pprs_dynamics.inference.search.ranking import Ranking
@@ -103,9 +103,11 @@ class Answer:
         What held-out data refute is not tried again.
         """
         ranking, reported = self.ranking, self.reported
-        alone = [] if ranking.refuted else list(ranking.alone.values())
+        alone = [] if ranking.is_less else list(ranking.alone.values())
         # Beside the MAP set: what is within the model error of others is none with a date, either.
-        constant = reported if ranking.refuted else self.map_set
+        constant = reported if ranking.is_less else self.map_set
+        if not changing_drives(self.fits, constant, alone):
+            return self.fits, reported
         fits, found = with_courses(self.fits, constant, alone)
         if alone and ranking.first is not self.fits:
             kept = ranking.first.evaluate(tuple(
@@ -309,9 +311,7 @@ class Answer:
             return hold_out(self.fits, at_noise).gain(hold_out(self.fits, self.reported)).certainty
         before, after = (measure_residuals(one, self.validate)[0] for one in (
             settled(self.fits, without).model, self.final.model))
-        noise = {self.drives[d]: spectrum for d, spectrum in self.fits.regression.noise(
-            self.reported.fit).items()}
-        return paired_gain(before, after, noise).certainty
+        return predictive_gain(before, after).certainty
 
     def _above_noise(self, floors: Mapping[str, float]) -> dict[str, float]:
         """Return the drives that keep more than noise and forms leave, as multiples of noise."""

@@ -84,7 +84,7 @@ def beyond_discrepancy(fits: FittedSets, map_set: CandidateSet,
             break
         gone = min(less, key=lambda candidate: less[candidate].total)
         absorbed.append(Absorbed(gone, rest, absorbable[gone], tuple(
-            (other, fits.evaluate(rest.without(other))) for other in absorbable
+            (other, fits.evaluate(rest.without(other))) for other in less
             if other is not gone and isinstance(other, EffectCandidate))
             if isinstance(gone, EffectCandidate) else ()))
         rest = less[gone]

@@ -71,10 +71,7 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
     """
     constant = [(kept, candidate) for candidate in kept.effects if _is_new(candidate)]
     alone = [(other, other.effects[0]) for other in others if _is_new(other.effects[0])]
-    begun = [*_offers(fits, [(kept, 0.0)], constant, _courses(fits)),
-             *_offers(fits, _bases(fits, kept), alone, _few_courses(fits))]
-    drives = {d for unknown in kept.unknowns for d in unknown.drives} | {
-        d for offer in begun if offer.is_worth_a_fit(fits) for d in offer.drives}
+    drives = changing_drives(fits, kept, others)
     if not drives:
         return fits, kept
     # Sets of their own: those of the search are of constant forms, and so are its rivals.
@@ -106,6 +103,17 @@ def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[Candidat
         *(candidate for _, candidate in constant), *likely)}.values())
     best, _ = beyond_discrepancy(dated, best)
     return (dated, best) if any(candidate.course for candidate in best.effects) else (fits, kept)
+
+
+def changing_drives(fits: FittedSets, kept: CandidateSet, others: Iterable[CandidateSet],
+                    ) -> set[int]:
+    """Return drives on which something may begin, end or grow, or a pattern is left."""
+    constant = [(kept, candidate) for candidate in kept.effects if _is_new(candidate)]
+    alone = [(other, other.effects[0]) for other in others if _is_new(other.effects[0])]
+    begun = [*_offers(fits, [(kept, 0.0)], constant, _courses(fits)),
+             *_offers(fits, _bases(fits, kept), alone, _few_courses(fits))]
+    return {d for unknown in kept.unknowns for d in unknown.drives} | {
+        d for offer in begun if offer.is_worth_a_fit(fits) for d in offer.drives}
 
 
 def _alone_on_drives(fits: FittedSets, drives: Iterable[int],

@@ -29,7 +29,6 @@ from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_model import linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.relinearisation import search_around_fitted
-from pprs_dynamics.inference.search.scan import Place
 from pprs_dynamics.inference.search.search import Search, patterns_of
 from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.measurement.files.recording import Recording
@@ -79,8 +78,6 @@ class Ranking:
         Those of the reported set, each the one that lowers most what those before it leave.
     path : tuple of CandidateSet
         From the patterns of the reported set to all of it, an effect more in each in that order.
-    refuted : frozenset of Place
-        What took no part in the search, as held-out data did not confirm it.
     exact : mapping of PlacedNames to float
         What the sets of the shortlist cost by the exact forces of their own fitted models.
     """
@@ -96,45 +93,35 @@ class Ranking:
     without: Mapping[Candidate, CandidateSet] = field(repr=False)
     order: tuple[EffectCandidate, ...] = field(repr=False)
     path: tuple[CandidateSet, ...] = field(repr=False)
-    refuted: frozenset[Place]
     exact: Mapping[PlacedNames, float] = field(
         default_factory=lambda: MappingProxyType({}), repr=False)
+    is_less: bool = False  # as held-out data did not confirm some effect
 
     @classmethod
-    def of(cls, first: FittedSets, last: Search, map_set: CandidateSet,
-           refuted: frozenset[Place] = frozenset()) -> Ranking:
+    def of(cls, first: FittedSets, last: Search, map_set: CandidateSet) -> Ranking:
         """Return the ranking of the sets of two searches, and of what the answer needs beside."""
         map_set, reported, absorbed = without_absorbed(last, map_set)
-        return cls._reporting(first, last.fits, last.patterns, map_set, reported, absorbed,
-                              refuted)
+        return cls._reporting(first, last.fits, last.patterns, map_set, reported, absorbed)
 
     @classmethod
     def _reporting(cls, first: FittedSets, last: FittedSets, patterns: tuple[DrivePatterns, ...],
                    map_set: CandidateSet, reported: CandidateSet, absorbed: tuple[Absorbed, ...],
-                   refuted: frozenset[Place]) -> Ranking:
+                   ) -> Ranking:
         without = {gone: last.evaluate(reported.without(gone)) for gone in reported.candidates}
         order, path = _falling(last, map_set, reported)
         return cls(first, last, patterns, _by_cost(first.sets), _by_cost(last.sets), map_set,
-                   reported, absorbed, MappingProxyType(without), order, path, refuted)
+                   reported, absorbed, MappingProxyType(without), order, path)
 
     def less(self, gone: EffectCandidate) -> Ranking:
-        """Return the ranking without one of the reported effects.
-
-        Where that one bent the columns, everything was found around it: the search begins again.
-        Else what paid only beside it goes with it.
-        """
-        places = {(component.effect, component.drive) for component in gone.components}
-        refuted = self.refuted | places
-        if gone.effect.nonlinear and not places <= self.refuted:
-            return _searched(FittedSets(self.first.design, self.first.decisions), refuted)
+        """Return the ranking without one of the reported effects, and what paid only beside it."""
         reported = self.last.pruned(self.without[gone])
         return replace(self._reporting(self.first, self.last, self.patterns, self.map_set, reported,
-                                       self.absorbed, refuted), exact=self.exact)
+                                       self.absorbed), exact=self.exact, is_less=True)
 
     def reporting_nothing(self) -> Ranking:
         """Return the ranking with nothing reported, under the noise that the best set leaves."""
         return self._reporting(self.first, self.last, self.patterns, self.map_set,
-                               self.last.evaluate(()), (), self.refuted)
+                               self.last.evaluate(()), ())
 
     @cached_property
     def shares(self) -> tuple[float, ...]:
@@ -376,7 +363,11 @@ def select(model: ForceModel, recordings: Sequence[Recording], decisions: Decisi
     report = progress or (lambda share: None)
     design = Design.of(model, recordings, lambda share: report(0.25 * share))
     design = design.beside(carry_over and carry_over(design))
-    return _searched(FittedSets(design, decisions), frozenset(), report)
+    first = FittedSets(design, decisions)
+    search = Search(first, patterns_of(first), lambda share: report(0.25 + 0.35 * share))
+    last, best, exact = search_around_fitted(search, report)
+    report(1.0)
+    return replace(Ranking.of(first, last, best), exact=MappingProxyType(exact))
 
 
 def without_search(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
@@ -390,16 +381,7 @@ def without_search(model: ForceModel, recordings: Sequence[Recording], decisions
     """
     fits = FittedSets(Design.of(model, recordings, progress), decisions)
     nothing = fits.evaluate(())
-    return Ranking._reporting(fits, fits, (), nothing, nothing, (), frozenset())
-
-
-def _searched(first: FittedSets, refuted: frozenset[Place],
-              report: Callable[[float], None] = lambda share: None) -> Ranking:
-    search = Search(first, patterns_of(first), refuted, lambda share: report(0.25 + 0.35 * share))
-    last, best, exact = search_around_fitted(search, report)
-    found = replace(Ranking.of(first, last, best, refuted), exact=MappingProxyType(exact))
-    report(1.0)
-    return found
+    return Ranking._reporting(fits, fits, (), nothing, nothing, ())
 
 
 def _has(fitted: CandidateSet, candidate: EffectCandidate) -> bool:

@@ -36,7 +36,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 # What the exact model may differ from the linear one by, in whitened squares, and the cost of a set
 # after it was relinearised around, from before: less changes no cost by more than a rival's margin.
 LEAST_DIFFERENCE, LEAST_CHANGE = 4.0, 2.0
-MOST_SEARCHES, MOST_STEPS, MOST_HALVINGS = 5, 6, 4  # how often all of this is repeated
+MOST_SEARCHES, MOST_STEPS, MOST_HALVINGS = 2, 6, 4  # how often all of this is repeated
 SHORTLIST = 4  # sets of different effects of a search that are ranked by exact forces
 
 
@@ -71,15 +71,12 @@ class ExactSet:
                 before, moved = moved, of_same_names(around, moved)
                 if moved is before:
                     break
-            turning = settled(around, moved)
-            # Widths that are not settled are columns yet, and not the model's.
-            model = fitted_model(around, moved) if turning.fits is around else turning.model
-            exact = exact_forces(turning.fits.design, model)
+            exact = exact_forces(around.design, fitted_model(around, moved))
         except PprsError:
             return cls(fitted, fits.design.point, parts_of(fits, fitted)[1], np.inf)
-        nonlinear = exact - linear_prediction(turning.fits, turning.fitted)
+        nonlinear = exact - linear_prediction(around, moved)
         return cls(moved, around.design.point, parts_of(around, moved)[1],
-                   turning.fitted.cost + squared(turning.fits, turning.fitted, nonlinear))
+                   moved.cost + squared(around, moved, nonlinear))
 
 
 def search_around_fitted(first: Search, report: Callable[[float], None],
@@ -110,7 +107,7 @@ def search_around_fitted(first: Search, report: Callable[[float], None],
             fits = FittedSets(first.fits.design.around(point), first.fits.decisions,
                               first.fits.regression.error_scale)
             search = Search(fits, [pattern.around(fits.regression) for pattern in first.patterns],
-                            first.refuted, _share_of(report, 0.6 + 0.4 * number / MOST_SEARCHES,
+                            _share_of(report, 0.6 + 0.4 * number / MOST_SEARCHES,
                                                      0.4 / MOST_SEARCHES))
         search.run(best.fitted.candidates)
     return (search, search.fits.evaluate(best.fitted.candidates),

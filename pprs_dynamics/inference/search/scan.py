@@ -24,7 +24,6 @@ PROPOSED = -12.0  # lowest score of a proposal
 SLOW_LEFT = 1e-3  # of the power of slow noise, where fast noise alone proposes
 
 
-Place = tuple[type[CatalogueEffect], int | None]  # an effect, and the drive that it acts on alone
 Scored = tuple[float, Component]  # its gain less its prior cost
 
 
@@ -34,14 +33,10 @@ class Scan:
     Parameters
     ----------
     fits : FittedSets
-    refuted : frozenset of Place
-        What is not proposed: effects that bend the columns and were dropped where these were
-        computed with them, which counts for more than that they seem to pay where they are not;
-        and what held-out data did not confirm.
     """
 
-    def __init__(self, fits: FittedSets, refuted: frozenset[Place] = frozenset()) -> None:
-        self.fits, self.refuted = fits, refuted
+    def __init__(self, fits: FittedSets) -> None:
+        self.fits = fits
 
     def proposals(self, base: CandidateSet, count: int | None = None, drive: int | None = None,
                   least: float = PROPOSED,
@@ -95,8 +90,7 @@ class Scan:
             place = (component.effect, component.drive)
             key = (*place, component.effect.places_of(component.names))
             net = gain - components.component_prior_cost(component).total
-            if place not in taken and place not in self.refuted and (
-                    key not in best or net > best[key][0]):
+            if place not in taken and (key not in best or net > best[key][0]):
                 best[key] = (net, component)
         found: dict[type[CatalogueEffect], list[Scored]] = {}
         for scored in best.values():

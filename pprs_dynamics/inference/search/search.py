@@ -24,7 +24,7 @@ from pprs_dynamics.inference.search.candidates import (
 )
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
 from pprs_dynamics.inference.search.neighbours import exchanged, simplified, with_instead
-from pprs_dynamics.inference.search.scan import Place, Scan, with_fast_noise
+from pprs_dynamics.inference.search.scan import Scan, with_fast_noise
 from pprs_dynamics.inference.search.unknown import DrivePatterns, Shared, best_patterns
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -47,17 +47,14 @@ class Search:
     fits : FittedSets
     patterns : sequence of DrivePatterns, optional
         Patterns of no catalogue that take part, see `patterns_of`; by default none do.
-    refuted : frozenset of Place
-        See `Scan`.
     progress : callable, optional
         Called with the share of the work that is done.
     """
 
     def __init__(self, fits: FittedSets, patterns: Sequence[DrivePatterns] = (),
-                 refuted: frozenset[Place] = frozenset(),
                  progress: Callable[[float], None] | None = None) -> None:
         self.fits, self.patterns = fits, tuple(patterns)
-        self.refuted, self.scan = refuted, Scan(fits, refuted)
+        self.scan = Scan(fits)
         self._report, self._steps, self.is_ended = progress or (lambda share: None), 0, False
 
     @property

@@ -129,7 +129,8 @@ def _of_fields(bag: Bag, drives: tuple[str, ...], fields: Fields, topic: str | N
     connections = [one for one in bag.connections if one.topic in topics]
     named = {(one.joint, one.quantity) for one in fields}
     if any((drive, 'position') not in named for drive in drives):
-        connections += [one for one in _chosen(bag, topic) if one not in connections]
+        chosen = _chosen(bag, topic)
+        connections = [*chosen, *(one for one in connections if one not in chosen)]
     return _merged(bag, connections, drives, findings, fields)
 
 

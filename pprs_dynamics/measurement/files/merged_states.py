@@ -49,6 +49,14 @@ class Field(NamedTuple):
 Fields = Sequence[Field]
 
 
+class Series(NamedTuple):
+    """Numbers on one topic: their stamps [ns], values, and whether they are commands."""
+
+    times: list[int]
+    values: list[float]
+    is_command: bool
+
+
 class Merged(NamedTuple):
     """States of all drives at the stamps of the first one's positions.
 
@@ -113,19 +121,24 @@ def read_merged(bag: Bag, connections: list[Connection], drives: tuple[str, ...]
                 fields: Fields = ()) -> Merged | None:
     """Return the states of all drives, or None where some drive has no positions.
 
+    Each quantity of a drive is read from one topic.
+
     Parameters
     ----------
     bag : Bag
     connections : list of Connection
-        Topics that are read.
+        Topics that are read; the first has precedence.
     drives : tuple of D str
     fields : sequence of Field
         Of messages of any type.
+
+    Raises
+    ------
+    UnreadableFileError
+        If several topics without precedence have the same quantity.
     """
-    times: dict[tuple[str, str], list[int]] = defaultdict(list)
-    values: dict[tuple[str, str], list[float]] = defaultdict(list)
+    series: dict[tuple[str, str], dict[str, Series]] = defaultdict(dict)
     named = {(one.joint, one.quantity) for one in fields}
-    commanded = False
     for connection, received, message in bag.decoded(connections):
         stamp = stamp_of(message) or received
         states = [(one.joint, one.quantity, _value(message, one.way), False)
@@ -133,32 +146,50 @@ def read_merged(bag: Bag, connections: list[Connection], drives: tuple[str, ...]
         states += [one for one in states_of(message, connection.msgtype) if one[:2] not in named]
         for joint, quantity, value, is_command in states:
             if joint in drives and np.isfinite(value):
-                times[joint, quantity].append(stamp)
-                values[joint, quantity].append(float(value))
-                commanded |= is_command
-    if any(not times[drive, 'position'] for drive in drives):
+                one = series[joint, quantity].setdefault(
+                    connection.topic, Series([], [], is_command))
+                one.times.append(stamp)
+                one.values.append(float(value))
+    first = connections[0].topic
+    chosen = {key: _only(bag, key, topics, first) for key, topics in series.items()}
+    if any((drive, 'position') not in chosen for drive in drives):
         return None
-    in_amperes = tuple(bool(times[drive, CURRENT]) and not times[drive, 'effort']
+    in_amperes = tuple((drive, CURRENT) in chosen and (drive, 'effort') not in chosen
                        for drive in drives)
-    stamps = np.unique(np.array(times[drives[0], 'position'], dtype=np.int64))
+    stamps = np.unique(np.array(chosen[drives[0], 'position'].times, dtype=np.int64))
 
     def array(quantity: str) -> Array:
         keys = [(drive, CURRENT if current and quantity == 'effort' else quantity)
                 for drive, current in zip(drives, in_amperes, strict=True)]
-        return np.stack([at_stamps(stamps, times[key], values[key]) for key in keys], axis=1)
+        none = Series([], [], False)
+        return np.stack([at_stamps(stamps, *chosen.get(key, none)[:2]) for key in keys], axis=1)
 
     arrays = [array(quantity) for quantity in QUANTITIES]
     kept = np.isfinite(arrays[0]).all(axis=1)
     topics = sorted({connection.topic for connection in connections})
     findings = [Defect('merged', int(kept.sum()), f'merged by stamp from {", ".join(topics)}')]
-    if commanded:
+    if any(one.is_command for one in chosen.values()):
         findings.append(Defect(
             'commanded_efforts', int(kept.sum()), 'the efforts are what the controller commands: '
             'none were measured'))
     channels = {name: array(name)[kept] for name in CHANNELS
-                if any((drive, name) in values for drive in drives)}
+                if any((drive, name) in chosen for drive in drives)}
     return Merged(stamps[kept], [one[kept] for one in arrays], channels,
                   in_amperes if any(in_amperes) else (), findings)
+
+
+def _only(bag: Bag, key: tuple[str, str], topics: dict[str, Series], first: str) -> Series:
+    """Return the series of a quantity on the first topic, else on the only other one."""
+    if first in topics:
+        return topics[first]
+    if len(topics) > 1:
+        joint, quantity = key
+        listed = sorted(topics)
+        raise UnreadableFileError(
+            bag.path, f'{", ".join(listed)} each have the {quantity} of {joint}: write columns: '
+            f'{{{joint}: {{{quantity}: "{listed[0]}.{quantity}[K]"}}}} in the model file, K the '
+            'place of the joint in the message from 0')
+    return next(iter(topics.values()))
 
 
 def stamp_of(message: Any) -> int:

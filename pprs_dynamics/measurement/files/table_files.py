@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -72,17 +71,8 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
         For Parquet without pyarrow.
     """
     columns = drives.columns or RecordedColumns()
-    samples = (_of_several(path, drives, columns, progress) if columns.files else
-               _of_one(path, drives, columns, topic, progress))
-    of_drives = [columns.drives.get(drive, DriveColumns({})) for drive in drives.names]
-    velocity, of_positions = samples.velocity, [one.position_scale for one in of_drives]
-    return replace(
-        samples, position=samples.position * of_positions,
-        channels={name: values * of_positions if CHANNELS[name] == 'm' else values
-                  for name, values in samples.channels.items()},
-        velocity=None if velocity is None else velocity * [
-            one.velocity_scale for one in of_drives],
-        effort=samples.effort * [one.effort_scale for one in of_drives])
+    return (_of_several(path, drives, columns, progress) if columns.files else
+            _of_one(path, drives, columns, topic, progress))
 
 
 def open_table(path: Path, decimal: str = '.', likely: Sequence[str] = ()) -> Table:
@@ -152,7 +142,7 @@ def _chosen(table: Table, drives: RecordedDrives, columns: RecordedColumns, topi
     """Return the column of each joint and quantity, and the prefix of those of our own format."""
     joints = drives.joints or drives.names
     named = {(joint, quantity): column for joint, drive in zip(joints, drives.names, strict=True)
-             for quantity, column in columns.drives.get(drive, DriveColumns({})).names.items()}
+             for quantity, column in columns.drives.get(drive, DriveColumns()).names.items()}
     shared = _shared(table, joints, columns)
     _require(table, [*named.values(), *shared.values()])
     ours = tuple(joint for joint in joints if (joint, 'position') not in named)
