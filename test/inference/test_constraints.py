@@ -191,7 +191,8 @@ def test_an_impossible_inertia_moves_no_further_than_it_must(robot: Mechanism) -
     found, rise = nearest_body(robot, component, c, np.diag(SPREAD[:7] ** 2))
     np.testing.assert_allclose(found[4:], [0.01 / 3, 0.04 / 3, 0.05 / 3], atol=2e-5)
     np.testing.assert_allclose(found[:4], c[:4], atol=1e-6)
-    assert rise == pytest.approx(3 * (0.01 / 3 / 0.02) ** 2, rel=1e-2)  # planes are 1e-4 of its size inside
+    # Planes are 1e-4 of its size inside the set.
+    assert rise == pytest.approx(3 * (0.01 / 3 / 0.02) ** 2, rel=1e-2)
 
 
 def test_a_moment_has_a_mass_within_reach(robot: Mechanism) -> None:
