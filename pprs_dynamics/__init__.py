@@ -57,14 +57,15 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
     from pprs_dynamics.physics.mechanism.motion import PlatformMotion
     from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
-    from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel, ModelState
+    from pprs_dynamics.physics.model.drive_model import DriveModel
+    from pprs_dynamics.physics.model.force_model import Forces, ModelState
     from pprs_dynamics.physics.model.mechanism_model import MechanismModel
     from pprs_dynamics.physics.model.model_file import build_model, load_model
 
 __all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'Array', 'Card', 'CatalogueEffect',
            'ComparisonResult', 'ConvergenceError', 'DiagnosisResult', 'DriveEffect',
-           'DriveForces', 'DriveModel', 'DriveRange', 'DriveSamples', 'EffectError',
-           'Excitation', 'ExperimentResult', 'FitResult', 'GainEffect', 'HelicalPath',
+           'DriveModel', 'DriveRange', 'DriveSamples', 'EffectError',
+           'Excitation', 'ExperimentResult', 'FitResult', 'Forces', 'GainEffect', 'HelicalPath',
            'JointMotion', 'LimitError', 'MeasurementEffect', 'MechanismModel',
            'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError', 'MotionLimits',
            'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session', 'SimulationResult',
@@ -98,7 +99,8 @@ _HOMES = {
     'physics.mechanism.motion': ('PlatformMotion',),
     'physics.mechanism.paths': ('Excitation', 'HelicalPath'),
     'physics.model.mechanism_model': ('MechanismModel',),
-    'physics.model.drive_model': ('DriveForces', 'DriveModel', 'ModelState'),
+    'physics.model.drive_model': ('DriveModel',),
+    'physics.model.force_model': ('Forces', 'ModelState'),
     'physics.model.model_file': ('build_model', 'load_model'),
 }
 _MODULES = {name: f'{__name__}.{module}' for module, names in _HOMES.items() for name in names}

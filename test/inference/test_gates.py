@@ -226,8 +226,8 @@ def test_a_rival_that_explains_as_much_is_not_objected_to() -> None:
     # Nor is one that the diagnosis does not name, if it comes as near: alone the best has 120.
     assert others('drive_spring', found, evidence=119.0) == []
     refused, = others('drive_spring', found, evidence=2.0)
-    assert refused == ('coulomb_friction on lift_2 explains these recordings better: evidence 120.4 '
-                       'against 2')
+    assert refused == ('coulomb_friction on lift_2 explains these recordings better: evidence '
+                       '120.4 against 2')
     structure = made_up_diagnosis(effects=(found_effect('payload_mass', None),))
     refused, = others('drive_spring', structure)
     assert refused.startswith('payload_mass explains these recordings better')

@@ -30,7 +30,8 @@ from pprs_dynamics.inference.experiments.question import Question
 from pprs_dynamics.measurement.motion.treatment import block_length
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.paths import HOME
-from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import Forces
 from pprs_dynamics.system.parallel import each
 
 HARMONICS = 4  # of each degree of freedom
@@ -238,7 +239,7 @@ class TrajectorySearch:
             return OUTSIDE
         return float(self.limits.uses(self.question.model, forces, len(time)).max())
 
-    def _forces(self, paths: list[FourierPath], time: Array) -> DriveForces:
+    def _forces(self, paths: list[FourierPath], time: Array) -> Forces:
         return forces_of(self._lenient, paths, time)
 
     def _grams(self, paths: list[FourierPath]) -> tuple[list[Array], Array]:
@@ -300,7 +301,7 @@ class TrajectorySearch:
         return np.linspace(0.0, self.duration, 4)
 
 
-def forces_of(model: DriveModel, paths: list[FourierPath], time: Array) -> DriveForces:
+def forces_of(model: DriveModel, paths: list[FourierPath], time: Array) -> Forces:
     """Return the forces that drives must apply along paths, one after the other."""
     return model.drive_forces(joined_motion(paths, time))
 

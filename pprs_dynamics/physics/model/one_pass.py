@@ -19,7 +19,12 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_sample import motion_sample
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.vectors import Vector
-from pprs_dynamics.physics.model.force_model import total_force
+from pprs_dynamics.physics.model.force_model import (
+    ACTIVE_FRICTION,
+    PASSIVE_FRICTION,
+    RIGID_BODY,
+    total_force,
+)
 from pprs_dynamics.physics.model.limits import Limits
 from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction, drive_friction
 from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
@@ -116,10 +121,13 @@ class OnePass:
         the caller must check every sample then.
         """
         rows = motion.rows
-        samples = len(rows)
-        table = np.empty((7 if samples <= SHORT else FORCES, samples, 6))
-        doubtful = evaluate(forces_kernel, self.parameters, rows, table)
-        return table if doubtful < 0 else None
+        table = np.empty((FORCES + 3 if len(rows) <= SHORT else FORCES, len(rows), 6))
+        return table if evaluate(forces_kernel, self.parameters, rows, table) < 0 else None
+
+    @staticmethod
+    def parts(table: Array) -> dict[str, Array]:
+        """Return the parts in a table of `forces` by name."""
+        return {RIGID_BODY: table[1], ACTIVE_FRICTION: table[2], PASSIVE_FRICTION: table[3]}
 
     def mechanism(self, motion: PlatformMotion, table: Array) -> ThreePprsState:
         """Return the state of the mechanism, not yet solved, for a motion and its forces."""

@@ -27,7 +27,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel, Forces
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.simulation.arm_run import draw_motion
 from pprs_dynamics.simulation.engine_model import load_engine
-from pprs_dynamics.simulation.engine_state import EngineState, couplings
+from pprs_dynamics.simulation.engine_state import EngineState
 from pprs_dynamics.simulation.export.exported_robot import ExportedRobot
 from pprs_dynamics.simulation.export.expressed import AT_ONCE, MJCF, Expressed
 from pprs_dynamics.simulation.export.writers import closures
@@ -202,7 +202,7 @@ def _close(mujoco: Any, spec: Any, robot: ExportedRobot) -> None:
         equality.type = mujoco.mjtEq.mjEQ_WELD if weld else mujoco.mjtEq.mjEQ_CONNECT
         equality.objtype = mujoco.mjtObj.mjOBJ_SITE
     known = {equality.name1 for equality in spec.equalities}
-    for name, leader, ratio, offset in couplings(structure):
+    for name, leader, ratio, offset in structure.couplings:
         if name not in known:
             equality = spec.add_equality(name1=name, name2=leader)
             equality.type, equality.objtype = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT
