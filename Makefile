@@ -11,7 +11,7 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: help demo demo-feedforward test test-nodes test-others fuzz reproduce feedforward localisation score adoption benchmark \
-	naming reference reliability reliability-full experiments decisions mutants fleet workbench docs lint clean
+	naming reference reliability reliability-full experiments decisions mutants workbench docs lint clean
 
 help:
 	@echo 'make demo       install into $(VENV); a hidden effect is found, added, and the error falls'
@@ -33,7 +33,6 @@ help:
 	@echo 'make experiments   how often a designed experiment settles what was ambiguous (long; it can be stopped)'
 	@echo 'make decisions  the score with each chosen number of the diagnosis halved and doubled (an hour)'
 	@echo 'make mutants    mistakes put into the modules that decide: which of them the tests see (two hours)'
-	@echo 'make fleet      a fleet of the physics engine, surveyed: what is found of what changed (long)'
 	@echo 'make workbench   how fast the workbench answers, in a real browser (5 minutes)'
 	@echo 'make clean      remove $(VENV) and everything that was built'
 
@@ -80,7 +79,7 @@ localisation: $(VENV)/.test
 	$(BIN)/python -m benchmarks.scores.localisation 100
 
 score: $(VENV)/.test
-	$(BIN)/python -m benchmarks.scores.diagnosis --table docs/diagnosis_table.md
+	$(BIN)/python -m benchmarks.scores.diagnosis --table benchmarks/results/diagnosis.md
 
 adoption: $(VENV)/.test
 	$(BIN)/python -m benchmarks.scores.adoption 24
@@ -101,11 +100,11 @@ reliability: $(VENV)/.test
 reliability-full: $(VENV)/.test
 	$(BIN)/python -m benchmarks.node.reliability --full
 
-# Public problems; tables and picture of docs/benchmark.md. What is there is not run again.
+# Public problems; tables and picture of benchmarks/results/naming.md. What is there is not run again.
 NAMING ?= full
 NAMING_PROBLEMS := $(if $(filter small,$(NAMING)),12,72)
 NAMING_FOLDER := output/naming$(if $(filter small,$(NAMING)),-small)
-NAMING_PAGE := $(if $(filter small,$(NAMING)),$(NAMING_FOLDER)/benchmark.md,docs/benchmark.md)
+NAMING_PAGE := $(if $(filter small,$(NAMING)),$(NAMING_FOLDER)/benchmark.md,benchmarks/results/naming.md)
 naming: $(VENV)/.naming
 	$(BIN)/python -m benchmarks.naming.run make $(NAMING_FOLDER) --seed 2 --problems $(NAMING_PROBLEMS)
 	$(BIN)/python -m benchmarks.naming.run enter $(NAMING_FOLDER) $(if $(filter small,$(NAMING)),--whole)
@@ -121,9 +120,6 @@ decisions: $(VENV)/.test
 
 mutants: $(VENV)/.test
 	$(BIN)/python benchmarks/mutants.py --json output/mutants.json
-
-fleet: $(VENV)/.test
-	$(BIN)/python -m benchmarks.fleets.fleet
 
 workbench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.speed.workbench 30 docs/images/workbench.png
