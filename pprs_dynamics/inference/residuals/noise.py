@@ -41,7 +41,7 @@ MOST_ACTIVE = 1000  # changes of the active set in a step
 OCTAVES_BELOW = 1  # that corners go on below the lowest frequency of the record: 1/f noise does
 # Noise of a constant: along the slope of the lowest SLOPE_OCTAVES, CONTINUED_OCTAVES further down.
 # Share of constants beyond three standard deviations where nothing is, of 400 draws each: six
-# drives of 1/f noise 5 % (13 % with each drive's slope alone), one of six 15 %, AR(1) noise below 1 %.
+# drives of 1/f noise 5 % (13 % with each drive's slope alone), one of six 15 %, AR(1) < 1 %.
 SLOPE_OCTAVES, CONTINUED_OCTAVES = 3, 2
 SLOW_SHARE = 0.1  # of the highest corner, below which noise counts as slow
 LEAST_SHARE = 1e-7  # of the mean square, that every amplitude keeps: no spectrum is 0
