@@ -3,7 +3,7 @@
 
 """YAML as ROS 2 parameter files have it, within bounds that keep reading it below a second.
 
-A few lines of YAML can stand for 10^9 values, or nest so deep that parsers give up: such files
+A few lines of YAML can expand to 10^9 values, or nest so deep that parsers give up: such files
 are refused with a sentence before anything is made of them.
 """
 

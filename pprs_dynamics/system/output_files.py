@@ -73,7 +73,7 @@ def new_folder(path: str | PathLike[str]) -> Iterator[Path]:
 
 @contextmanager
 def scratch_folder(path: Path) -> Iterator[Path]:
-    """Give a folder beside `path` that is taken away with all that is left in it at the end.
+    """Give a temporary folder next to `path`, which is removed with its content at the end.
 
     Raises
     ------

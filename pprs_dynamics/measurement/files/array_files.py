@@ -149,7 +149,7 @@ def require_size(path: Path, size: int) -> None:
 
 
 def _plain(values: Any) -> Any:
-    """Return a column of lists as an array, (N, K), and any other as it is."""
+    """Return a column of lists as an array, (N, K), and any other column unchanged."""
     if values.dtype == object and len(values) and isinstance(values[0], np.ndarray):
         try:
             return np.stack(list(values))

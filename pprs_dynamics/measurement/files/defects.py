@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Judging samples: every defect is found, told, and treated by the policy in `samples.POLICY`."""
+"""Check samples: every defect is reported and treated by the policy in `samples.POLICY`."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Judgement:
     Attributes
     ----------
     samples : Samples
-        What is left.
+        The remaining samples.
     segments : tuple of slice
         Stretches without reset, jump, gap or change of rate, of at least 20 samples.
     findings : list of Defect
@@ -72,7 +72,7 @@ class Judgement:
 
     def _tell(self, kind: str, count: int, what: str, places: Iterable[tuple[int, int]] = (),
               drives: Iterable[str] = ()) -> None:
-        """Add a finding with places as (first, last) samples, if there is anything to tell."""
+        """Add a finding with places as (first, last) samples, if there are any."""
         if not count:
             return
         time = self.samples.time

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What tells one recording from every other: the SHA-256 of its file or of its samples."""
+"""Identity of a recording: the SHA-256 of its file or of its samples."""
 
 from __future__ import annotations
 
