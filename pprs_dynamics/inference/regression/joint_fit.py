@@ -361,12 +361,6 @@ class Regression:
         """Return the information on a block's coefficients that a fit leaves, (k, k)."""
         return self._beside(fit, block)[0]
 
-    def own_share(self, fit: JointFit, block: Block, coefficients: Array) -> float:
-        """Return the share of the whitened square of a block's force that a fit cannot take."""
-        S, _, plain = self._beside(fit, block)
-        beyond, whole = (float(coefficients @ one @ coefficients) for one in (S, plain))
-        return beyond / max(whole, 1e-300)
-
     def _beside(self, fit: JointFit, block: Block) -> tuple[Array, Array, Array]:
         """Return own sums of products, those with what is left, and full products of a block."""
         taken, b = Columns(self, block.rows).projected(fit)
