@@ -66,7 +66,6 @@ TESTS = {
     'ros/setpoints.py': ('ros/test_setpoints.py',),
     'app/workbench/server/change_log.py': ('app/test_change_log.py',),
     'app/workbench/server/access.py': ('app/test_workbench_safety.py',),
-    'app/fleet/change_points.py': ('app/test_change_points.py',),
 }
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import JointMotion, MechanismModel, load_model
+from pprs_dynamics.app.api.first_model import first_model
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.effects.catalogue import find_effect
 
@@ -108,7 +109,8 @@ def test_a_rotor_without_mass_on_a_gear_has_its_inertia(tmp_path: Path) -> None:
 @pytest.mark.parametrize(('more', 'kind', 'own', 'at'), [
     ('<mimic joint="leader" multiplier="-1" offset="1.2"/>', 'revolute', '', 1.0),
     ('<mimic joint="leader" multiplier="-1" offset="0.2"/>', 'prismatic', '', 0.0),
-    ('', 'prismatic', ', locked: 0.5', 0.5), ('', 'revolute', ', locked: -0.5', -0.5)])
+    ('', 'prismatic', ', locked: 0.5', 0.5), ('', 'revolute', ', locked: -0.5', -0.5),
+    ('', 'revolute', '', 0.0)])
 def test_a_locked_joint_is_where_the_file_says_and_its_followers_with_it(
     tmp_path: Path, more: str, kind: str, own: str, at: float,
 ) -> None:
@@ -122,13 +124,26 @@ def test_a_locked_joint_is_where_the_file_says_and_its_followers_with_it(
     assert model.robot.structure.locked == pytest.approx({'leader': 0.2, 'locked': at})
 
 
+@pytest.mark.parametrize(('lower', 'upper', 'at'), [
+    (0.5, 0.9, 0.5), (-0.9, -0.5, -0.5), (-3.0, 3.0, 0.0)])
+def test_without_loops_a_joint_without_a_drive_is_locked_within_its_limits(
+    tmp_path: Path, lower: float, upper: float, at: float,
+) -> None:
+    limit = f'<limit lower="{lower}" upper="{upper}" effort="1" velocity="1"/>'
+    model = load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1') + link('l1')
+                 + joint('slide', 'l1', 'l2', '1 0 1', 'prismatic', '', limit) + link('l2'),
+                 'robot: {base: base, tool: l2, drives: [j1]}')
+    q, v, a = random_motion(1)
+    expected = rnea(tmp_path, [q[0], at], [v[0], 0], [a[0], 0])
+    assert efforts(model, q, v, a)[0, 0] == pytest.approx(expected[0], rel=1e-9)
+    assert model.robot.structure.locked == {'slide': at}
+
+
 @pytest.mark.parametrize(('locked', 'words'), [
-    ('{}', r'leader can move while all drives stand: drive them as well, or lock them under '
-     r'robot\.locked'),
     ('{leader: 9.0}', r'robot\.locked\.leader is 9\.0, must be within its limits, -3 to 3'),
     ('{leeder: 0.0}', r'unknown joint leeder'),
     ('{j1: 0.0}', r'robot\.drives has j1 as well')])
-def test_a_joint_that_is_neither_driven_nor_locked_is_refused_with_the_remedy(
+def test_a_lock_that_cannot_be_is_refused(
     tmp_path: Path, locked: str, words: str,
 ) -> None:
     with pytest.raises(PprsError, match=words):
@@ -178,6 +193,13 @@ def test_masses_that_no_robot_has_are_refused(tmp_path: Path, mass: str) -> None
         load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1')
              + link('l1').replace('mass value="1.0"', f'mass value="{mass}"'),
              'robot: {base: base, tool: l1, drives: [j1]}')
+
+
+def test_a_recording_in_place_of_a_robot_is_no_xacro(tmp_path: Path) -> None:
+    path = tmp_path / 'run.mcap'
+    path.write_bytes(b'\x89MCAP0\r\n <xacro:include a="${b}"/>')
+    with pytest.raises(PprsError, match='no URDF or MJCF, it is not XML'):
+        first_model(path, [], output=tmp_path / 'model.yaml')
 
 
 THREE = (f'<worldbody><body name="t0"><joint name="a" axis="0 1 0"/>{BODY}'

@@ -302,7 +302,7 @@ def _names(contents: Contents, joints: Sequence[str]) -> Names:
 
 
 def _by_numbers(contents: Contents, drives: Sequence[str]) -> Names:
-    """Match joints by the numbers in their names, or refuse."""
+    """Match as many joints by the numbers in their names, or refuse."""
     known = sorted({name for of in contents.joints.values() for name in of})
 
     def numbered(names: Sequence[str]) -> dict[int, str]:
@@ -313,7 +313,7 @@ def _by_numbers(contents: Contents, drives: Sequence[str]) -> Names:
     start = min(theirs, default=0) - min(ours, default=0)
     found = {joint: theirs[number + start] for number, joint in ours.items()
              if number + start in theirs}
-    if len(found) < len(drives):
+    if len(found) < len(drives) or len(known) != len(drives):
         close = meant(drives[0], known)
         raise FirstModelError(
             f'joints of the recording ({", ".join(known[:12])}) are none of the description '
@@ -445,11 +445,6 @@ def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, ba
     place = os.path.relpath(robot.resolve(), output.resolve().parent)
     slides = all(description.joints[name].kind == PRISMATIC for name in drives)
     gain = ', '.join(['1.0'] * len(drives))
-    # Without loops nothing else determines joints that are not driven.
-    locked = {} if description.loops else {
-        name: joint.start if joint.start is not None else min(max(0.0, joint.lower), joint.upper)
-        for name, joint in description.joints.items()
-        if joint.kind in (*TURNING, PRISMATIC) and joint.mimic is None and name not in drives}
     lines = [
         f'# Model of {robot.name}'
         + (f', read beside {", ".join(recordings[:3])}' if recordings else '')
@@ -462,8 +457,6 @@ def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, ba
         f'      tool: {scalar(branch.tool)}  # the link that carries the load',
         f'      drives: [{", ".join(scalar(name) for name in drives)}]  # driven, in the order '
         'of all results',
-        *([f'      locked: {{{", ".join(f"{scalar(name)}: {at:g}" for name, at in locked.items())}'
-           '}  # joints that do not move, and where they are'] if locked else ()),
         f'      effort_unit: {"N" if slides else "N m"}  # not known from the files; A where '
         'recorded efforts are currents',
         f'      {"" if currents else "# "}gain: [{gain}]  # not known: effort per ampere '

@@ -11,35 +11,33 @@
   const menus = [...document.querySelectorAll('select[data-menu]')];
   const drawn = new Set();
   let span = null;
-  const libraries = {};
+  let library = null;
 
-  // A library unpacks itself when it is first asked for.
-  window.library = (name) => {
-    libraries[name] ??= (async () => {
-      const letters = document.getElementById(name).textContent;
-      const packed = await fetch(`data:application/octet-stream;base64,${letters}`);
-      const unpacked = packed.body.pipeThrough(new DecompressionStream('gzip'));
-      const script = document.createElement('script');
-      script.textContent = await new Response(unpacked).text();
-      document.head.append(script);
-    })();
-    return libraries[name];
-  };
+  // The library is unpacked when a figure is first drawn.
+  async function unpack() {
+    const letters = document.getElementById('plotly').textContent;
+    const packed = await fetch(`data:application/octet-stream;base64,${letters}`);
+    const unpacked = packed.body.pipeThrough(new DecompressionStream('gzip'));
+    const script = document.createElement('script');
+    script.textContent = await new Response(unpacked).text();
+    document.head.append(script);
+  }
 
   async function plotly() {
-    await window.library('plotly');
+    library ??= unpack();
+    await library;
     return window.Plotly;
   }
 
   function contentOf(plot) {
-    const content = window.themed(document.getElementById(`${plot.id}-data`).textContent);
+    const content = themed(document.getElementById(`${plot.id}-data`).textContent);
     if (span && plot.dataset.time !== undefined) content.layout.xaxis.range = span;
     show(content.data);
     return content;
   }
 
   // What Plotly draws of a figure in JSON, in the colours of the page.
-  window.themed = (text) => {
+  function themed(text) {
     if (dark.matches) {
       for (const [from, to] of Object.entries(ON_BLACK)) text = text.replaceAll(from, to);
     }
@@ -67,7 +65,7 @@
       }
     }
     return {data, layout, frames};
-  };
+  }
 
   // Traces of a drive are shown where the menus stand on it.
   function show(data) {

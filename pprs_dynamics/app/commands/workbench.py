@@ -38,9 +38,8 @@ EXAMPLE = 'pprs workbench run.mcap --validate other.mcap'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('recordings', metavar='RECORDING', nargs='*',
-                        help='rosbag2 folder, .mcap, .db3 or .csv; or a folder of them, or a '
-                        'store of pprs survey, to choose from in the browser; or a saved '
-                        'session.json, alone')
+                        help='rosbag2 folder, .mcap, .db3 or .csv; or a folder of them to '
+                        'choose from in the browser; or a saved session.json, alone')
     add_validation(parser, 'adoptions are judged on it')
     add_reference(parser)
     add_topic(parser)

@@ -57,7 +57,7 @@ class BodyEffect(StructureEffect):
         return robot
 
     def load(self, state: Any) -> StructureLoad | None:
-        """Return a load beside bodies and gravity; None, the default, for none."""
+        """Return a load in addition to bodies and gravity, or None (default)."""
         return None
 
     def apply(self, state: Any) -> Any:

@@ -119,7 +119,7 @@ class Mechanism:
 
     @property
     def numbers(self) -> Array:
-        """All that efforts follow from beside the structure, in one row."""
+        """All numbers besides the structure that determine efforts, in one row."""
         return np.concatenate((self.inertial.ravel(), self.armature, self.gravity))
 
     @cached_property

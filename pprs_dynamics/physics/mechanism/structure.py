@@ -363,6 +363,8 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
         Of links on floating joints, in the base.
     locked : mapping of str to float, optional
         Joints that do not move, and their positions; joints that mimic them do not move either.
+        Without loops every joint that is not driven is locked: at home, else at the position of
+        the description, else at that within its limits which is nearest to 0.
 
     Raises
     ------
@@ -375,6 +377,8 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
         if name not in description.links:
             raise ModelError(f'robot.{key}', name, 'be a link of the URDF: '
                              f'{", ".join(list(description.links)[:40])}')
+    if not loops:
+        locked = {**_undriven(description, drives, home), **locked}
     build = _Builder(description, locked)
     _require_joints(description, drives, home, locked)
     build.hang(base, home, poses)
@@ -417,6 +421,17 @@ def _home(closing: Closing, start: Array, free: Array) -> Array:
         if closing.are_redundant(q, free):
             return q
         raise
+
+
+def _undriven(description: Description, drives: tuple[str, ...], home: Mapping[str, float],
+              ) -> dict[str, float]:
+    """Return the positions at which joints are locked that are neither driven nor mimic one."""
+    found = {}
+    for name, joint in description.joints.items():
+        if joint.kind in (*TURNING, PRISMATIC) and joint.mimic is None and name not in drives:
+            at = home.get(name, joint.start)
+            found[name] = min(max(0.0, joint.lower), joint.upper) if at is None else at
+    return found
 
 
 def _require_joints(description: Description, drives: tuple[str, ...],

@@ -81,7 +81,7 @@ def _in_joints(joints: tuple[tuple[str, float], ...], alike: tuple[tuple[str, ..
                ) -> type[JointFrictionEffect]:
     """Return the effect in joints with the radii at which the load rubs [m].
 
-    Of joints that are alike the first stands for all, whatever the load; a drive for friction
+    Of joints that are alike the first represents all, whatever the load; a drive for friction
     of its own.
     """
     linear, variants, bounds = [], [], {}
