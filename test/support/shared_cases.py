@@ -21,8 +21,11 @@ def shared_case(folder: str, model: str, recording: str) -> tuple[ForceModel, Re
     if not CASES.is_dir():
         pytest.skip('no recordings in ../shared/cases')
     path = CASES / folder / model
-    # They are as old as the block `arm`, whose keys are those of `robot`, but for its joints.
-    values = {key.replace('arm.joints', 'robot.drives').replace('arm.', 'robot.'): value
-              for key, value in read_parameters(path).items()}
+    # They are older than some names.
+    values = {}
+    for key, value in read_parameters(path).items():
+        if key.startswith('columns.') and key.endswith('.scale'):
+            key = key.replace('.scale', '.effort_scale')
+        values[key.replace('arm.joints', 'robot.drives').replace('arm.', 'robot.')] = value
     read = build_model(values, str(path))
     return read, read_recording(CASES / folder / recording, read.recorded)
