@@ -79,7 +79,7 @@ localisation: $(VENV)/.test
 	$(BIN)/python -m benchmarks.scores.localisation 100
 
 score: $(VENV)/.test
-	$(BIN)/python -m benchmarks.scores.diagnosis --table docs/diagnosis_table.md
+	$(BIN)/python -m benchmarks.scores.diagnosis --table benchmarks/results/diagnosis.md
 
 adoption: $(VENV)/.test
 	$(BIN)/python -m benchmarks.scores.adoption 24
@@ -100,11 +100,11 @@ reliability: $(VENV)/.test
 reliability-full: $(VENV)/.test
 	$(BIN)/python -m benchmarks.node.reliability --full
 
-# Public problems; tables and picture of docs/benchmark.md. What is there is not run again.
+# Public problems; tables and picture of benchmarks/results/naming.md. What is there is not run again.
 NAMING ?= full
 NAMING_PROBLEMS := $(if $(filter small,$(NAMING)),12,72)
 NAMING_FOLDER := output/naming$(if $(filter small,$(NAMING)),-small)
-NAMING_PAGE := $(if $(filter small,$(NAMING)),$(NAMING_FOLDER)/benchmark.md,docs/benchmark.md)
+NAMING_PAGE := $(if $(filter small,$(NAMING)),$(NAMING_FOLDER)/benchmark.md,benchmarks/results/naming.md)
 naming: $(VENV)/.naming
 	$(BIN)/python -m benchmarks.naming.run make $(NAMING_FOLDER) --seed 2 --problems $(NAMING_PROBLEMS)
 	$(BIN)/python -m benchmarks.naming.run enter $(NAMING_FOLDER) $(if $(filter small,$(NAMING)),--whole)

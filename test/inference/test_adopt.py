@@ -230,7 +230,7 @@ def test_where_nothing_is_missing_nothing_is_added() -> None:
     model, recording = synthetic({})
     answer = adopt(model, EffectRequest.of('platform_inertia'), [recording])
     assert not answer.adopted
-    assert 'do not call for it' in answer.reason
+    assert 'do not call for platform_inertia' in answer.reason
 
 
 MISTAKES = {

@@ -36,7 +36,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_model_output(parser, 'model file to write')
     parser.add_argument('--force', action='store_true',
                         help='adopt it in spite of objections, which the ledger then holds')
-    arguments.add_details(parser)
     arguments.add_report(parser)
 
 

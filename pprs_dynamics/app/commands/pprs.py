@@ -24,7 +24,13 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from pprs_dynamics import __version__
-from pprs_dynamics.app.commands.arguments import DEFAULT_MODEL, JSON, check_files, output_file
+from pprs_dynamics.app.commands.arguments import (
+    DEFAULT_MODEL,
+    JSON,
+    UsageError,
+    check_files,
+    output_file,
+)
 from pprs_dynamics.app.commands.streams import lasting_output
 from pprs_dynamics.errors import MisreadError, PprsError, suggestion
 from pprs_dynamics.system.plain_text import displayed
@@ -33,8 +39,10 @@ from pprs_dynamics.system.threads import use_one_thread
 # Each a module of this folder with a docstring, EXAMPLE, add_arguments and run.
 COMMANDS = ('adopt', 'compare', 'diagnose', 'export', 'fit', 'history', 'info',
             'init', 'next-experiment', 'reproduce', 'simulate', 'survey', 'trend', 'workbench')
-# What all others take: models there are in the file or the store, and a session has no result.
-WITHOUT_MODEL, WITHOUT_JSON = ('history', 'init', 'trend'), ('workbench',)
+# Commands without --model (they name a model file or a store) and without --json.
+WITHOUT_MODEL, WITHOUT_JSON = ('export', 'history', 'init', 'trend'), ('workbench',)
+NO_MODEL = ('no --model is given, the paper\'s robot is assumed as with --demo; pprs init '
+            'ROBOT.urdf RECORDING writes the model of yours')
 # Characters of an error: ten lines of a terminal, more than any sentence with usual names has.
 LONGEST_SENTENCE = 800
 
@@ -84,8 +92,9 @@ def _ended(given: Sequence[str]) -> int:
         if not given:
             parser.print_help()
             return 0
-        options = parser.parse_args(given)
+        options = parser.parse_args(_with_demo_first(given))
         options.words = given  # for the record of a page
+        _choose_model(options)
         check_files(options)
         from pprs_dynamics.physics.mechanism.evaluation import postpone_compiling
 
@@ -107,6 +116,30 @@ def _ended(given: Sequence[str]) -> int:
         _say(f'{name}{error.strerror or str(error) or type(error).__name__}', given)
         return 2
     return status
+
+
+def _with_demo_first(given: Sequence[str]) -> list[str]:
+    """Return arguments with --demo, which may be anywhere, before the command."""
+    rest = [word for word in given if word != '--demo']
+    return [*['--demo'][:len(given) - len(rest)], *rest]
+
+
+def _choose_model(options: argparse.Namespace) -> None:
+    """Take the paper's robot if no --model is given, and say so to someone who measured a robot.
+
+    Raises
+    ------
+    UsageError
+        For --demo with --model.
+    """
+    if options.command in WITHOUT_MODEL or options.model is not None:
+        if options.demo:
+            raise UsageError('--demo is given with --model or to a command without a model, must '
+                             'be left out')
+        return
+    options.model = DEFAULT_MODEL
+    if not options.demo and getattr(options, 'recordings', ()):
+        print(f'pprs: {NO_MODEL}', file=sys.stderr)
 
 
 def _say(sentence: str, given: Sequence[str]) -> None:
@@ -174,14 +207,16 @@ def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
         prog='pprs', description='Dynamics with friction of a 3-PPRS, an arm, a robot with '
         'loops or a single axis: what the model says, what was measured, and which physical '
         'effect is missing.')
+    parser.add_argument('--demo', action='store_true', help='the model is that of the paper\'s '
+                        f'robot, {DEFAULT_MODEL}')
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     commands = parser.add_subparsers(dest='command', required=True, metavar='COMMAND')
     for name in COMMANDS:
         summary = _summary(name)
         command = commands.add_parser(name, help=summary, description=summary)
         if name not in WITHOUT_MODEL:
-            command.add_argument('--model', metavar='FILE', default=DEFAULT_MODEL, help='model '
-                                 f'file (default: the paper\'s robot, {DEFAULT_MODEL})')
+            command.add_argument('--model', metavar='FILE', help='model file of your robot; pprs '
+                                 'init writes one')
         if name not in WITHOUT_JSON:
             command.add_argument('--json', metavar='FILE.json', type=output_file(*JSON),
                                  help='write the result as JSON too')

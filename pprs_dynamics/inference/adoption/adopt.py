@@ -115,9 +115,11 @@ def adopt(
         return case.without_model(f'{request.name} cannot act on what the recordings show')
     before, after = case.residuals(fitted.model)
     found = [*objections.of_other_effects(request, fitted, diagnosis),
-             *objections.of_identifiability(fitted), *objections.of_physics(fitted, after)]
+             *objections.of_constraints(fitted, after, diagnosis.decisions)]
     rivals = tuple(name for names in diagnosis.indistinguishable if request.name in names
                    for name in names if name != request.name)
+    if named is None and not rivals and objections.is_rival(request, fitted, diagnosis):
+        rivals = (diagnosis.effects[0].name,)
     remarks = [f'{", ".join(rivals)} would explain these recordings as well'] if rivals else []
     remarks += [f'{", ".join(fitted.at_bound)} stands at the edge of what was tried'
                 ] if fitted.at_bound else []

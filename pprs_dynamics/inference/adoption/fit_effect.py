@@ -65,8 +65,6 @@ class EffectFit:
     calibrated : list of Calibration
     evidence : float
         By which the cost falls with the effect.
-    own_share : float
-        The least share of its force's square on a place that nothing else in the model explains.
     fits : FittedSets
         Around the model with the effect.
     fitted : CandidateSet
@@ -87,7 +85,6 @@ class EffectFit:
     at_bound: tuple[str, ...]
     calibrated: list[Calibration]
     evidence: float
-    own_share: float
     fits: FittedSets
     fitted: CandidateSet
     held_out: tuple[HeldOut, HeldOut]
@@ -123,8 +120,6 @@ def fit_effect(
     report(0.6)
     if found is None:
         return None
-    share = min((fits.regression.own_share(without.fit, block, found.fit.of(block))
-                 for block in found.blocks.values() if block.mean is None), default=1.0)
     # At the noise of the fit with the effect, so that losses of both are comparable.
     plain_set = replace(without, fit=fits.regression.at((), found.fit.amplitudes))
     before = hold_out(fits, plain_set)
@@ -147,7 +142,7 @@ def fit_effect(
     report(1.0)
     return EffectFit(
         request, design.named(candidate.drives), final, fitted_model(fits, plain_set), parameters,
-        said.at_bound, moved, evidence, share, last, found, (before, after), nothing, said.moments)
+        said.at_bound, moved, evidence, last, found, (before, after), nothing, said.moments)
 
 
 def _numbers(design: Design, request: EffectRequest) -> tuple[int, ...] | None:

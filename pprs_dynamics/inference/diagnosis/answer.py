@@ -39,6 +39,7 @@ from pprs_dynamics.inference.search.candidates import (
     CandidateSet,
     EffectCandidate,
 )
+from pprs_dynamics.inference.search.constraints import empty_totals
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.courses import changing_drives, with_courses
 from pprs_dynamics.inference.search.decisions import Decisions
@@ -60,7 +61,6 @@ from pprs_dynamics.inference.search.fitted_model import (
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import hold_out, predictive_gain
 from pprs_dynamics.inference.search.noise_floors import noise_floors
-from pprs_dynamics.inference.search.possible_totals import left_at_nothing
 from pprs_dynamics.inference.search.possible_values import why_impossible
 from pprs_dynamics.inference.search.ranking import Ranking
 from pprs_dynamics.inference.search.relinearisation import settled
@@ -212,7 +212,7 @@ class Answer:
         return next((f'{self.drives[component.drive]} would have less than no {of} with what the '
                      'model has' for component in candidate.components
                      if component.drive is not None
-                     for of in left_at_nothing(self.design, self.reported, component)), '')
+                     for of in empty_totals(self.design, self.reported, component)), '')
 
     def _dated_effects(self) -> list[FoundEffect]:
         """Return the effects where some begin, end or grow within the recordings."""

@@ -95,18 +95,20 @@ class LocalPolynomial:
         return _coefficients(self.window, self.step)
 
     def fitted(self, offsets: Array, values: Array) -> tuple[Array, float]:
-        """Return value, first and second derivative in the middle, (3, D), and the squares left.
+        """Return value and two derivatives in the middle, (3, D), and the sum of squared residuals.
 
         Parameters
         ----------
-        offsets : (window,) array
-            Times of the samples less that of the middle [s], at equal steps or not.
-        values : (window, D) array
+        offsets : (n,) array
+            Times of the samples less that of the middle [s], at equal steps or not. With fewer
+            samples than the polynomial has coefficients its order is lower.
+        values : (n, D) array
         """
-        basis = np.polynomial.legendre.legvander(offsets / (self.half * self.step), ORDER)
-        found = np.linalg.solve(basis.T @ basis, basis.T @ values)
-        derivatives: Array = _middle(self.window, self.step) @ found
-        return derivatives, float(np.sum((values - basis @ found) ** 2))
+        order = min(ORDER, len(offsets) - 1)
+        basis = np.polynomial.legendre.legvander(offsets / (self.half * self.step), order)
+        coefficients = np.linalg.lstsq(basis, values, rcond=None)[0]
+        derivatives: Array = _middle(self.window, self.step)[:, :order + 1] @ coefficients
+        return derivatives, float(np.sum((values - basis @ coefficients) ** 2))
 
     @property
     def cut_off(self) -> float:

@@ -1,28 +1,26 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Measures what docs/changed_since.md reports: python docs/changed_since.py FOLDER [--as-far].
+"""Results since reference runs: python -m benchmarks.real.references FOLDER [--as-far].
 
-Each recording is diagnosed without a reference, as docs/closed_chain.py and docs/arms.py do, and
-since its reference. What is in FOLDER already is not done again; with --as-far nothing is run.
-Recordings are those of these two pages.
+Each recording of the da Vinci arm and of the UR10e is diagnosed without a reference and since one.
+What is in FOLDER already is not done again; with --as-far nothing is run.
 """
 
 from __future__ import annotations
 
-import json
 import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import arms
-import closed_chain
 import numpy as np
-from arms import Bench, file, table
-from recorded_data import need_data
 
+from benchmarks.real import davinci, ur10e
+from benchmarks.real.recorded_data import need_data
+from benchmarks.real.ur10e import Bench, file, table
+from benchmarks.results import write_results
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import load_model
@@ -69,22 +67,22 @@ def since(bench: Bench, name: str, recording: str, model: str, old: str, *refere
 
 def surgical_arm(bench: Bench) -> list[list[str]]:
     """Return rows of the da Vinci arm with its weight."""
-    (bench.folder / 'psm.yaml').write_text(closed_chain.model_text())
+    (bench.folder / 'psm.yaml').write_text(davinci.model_text())
     bench.run('psm_fit', 'fit', file(FREE), '--model', 'psm.yaml', '--output', 'psm_base.yaml')
     bench.run('psm_full', 'diagnose', file(FREE), '--model', 'psm_base.yaml', '--adopt-all',
               '--output', 'psm_full.yaml')
     return [since(bench, name.removeprefix('load_'), file(name), 'psm_base.yaml', 'psm_full.yaml')
-            for name in closed_chain.LOADED]
+            for name in davinci.LOADED]
 
 
 def loaded_arm(bench: Bench) -> list[list[str]]:
     """Return rows of the UR10e with its load, since a run of the same day and since others."""
-    (bench.folder / 'arm.yaml').write_text(arms.MODEL)
+    (bench.folder / 'arm.yaml').write_text(ur10e.MODEL)
     bench.run('ur_fit', 'fit', file(SAME_DAY), '--model', 'arm.yaml', '--output', 'ur_same.yaml')
-    bench.run('ur_fit_other', 'fit', *map(file, arms.FITTED), '--model', 'arm.yaml', '--output',
+    bench.run('ur_fit_other', 'fit', *map(file, ur10e.FITTED), '--model', 'arm.yaml', '--output',
               'ur_other.yaml')
-    return [since(bench, 'UR10e_same_day', file(arms.LOADED), 'ur_same.yaml', 'ur_same.yaml'),
-            since(bench, 'UR10e_other_path', file(arms.LOADED), 'ur_other.yaml', 'ur_other.yaml')]
+    return [since(bench, 'UR10e_same_day', file(ur10e.LOADED), 'ur_same.yaml', 'ur_same.yaml'),
+            since(bench, 'UR10e_other_path', file(ur10e.LOADED), 'ur_other.yaml', 'ur_other.yaml')]
 
 
 def add_noise(model: ForceModel, clean: Path, noisy: Path, seed: int) -> None:
@@ -123,7 +121,7 @@ def simulated_arm(bench: Bench) -> list[list[str]]:
 
 
 def run(folder: Path, as_far: bool) -> None:
-    """Run all that is missing, and print the tables."""
+    """Run all that is missing and write the results."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, known in (('dvrk', file(FREE)), ('ur10e', file(SAME_DAY))):
         for source in need_data(name, known).iterdir():
@@ -131,8 +129,9 @@ def run(folder: Path, as_far: bool) -> None:
                 shutil.copyfile(source, folder / source.name)
     bench = Bench(folder, as_far)
     rows = [*surgical_arm(bench), *loaded_arm(bench), *simulated_arm(bench)]
-    print(table(('run', 'without a reference', 'since it'), rows))
-    (folder / 'rows.json').write_text(json.dumps(rows, indent=1))
+    write_results('references', 'What has changed since a reference run',
+                  'python -m benchmarks.real.references FOLDER',
+                  table(('run', 'without a reference', 'since it'), rows))
 
 
 if __name__ == '__main__':

@@ -16,7 +16,7 @@ def find_data(name: str, file: str) -> Path | None:
     Looked for are `name` below the folder that PPRS_DATA names, that folder itself, and
     ../shared/data/`name` beside the project.
     """
-    places = [Path(__file__).resolve().parents[2] / 'shared/data' / name]
+    places = [Path(__file__).resolve().parents[3] / 'shared/data' / name]
     if 'PPRS_DATA' in os.environ:
         given = Path(os.environ['PPRS_DATA'])
         places = [given / name, given, *places]

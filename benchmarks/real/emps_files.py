@@ -1,7 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Reads the MAT files of EMPS as recordings: python docs/emps.py [FOLDER] [OUTPUT FOLDER].
+"""Read the MAT files of EMPS as recordings.
+
+    python -m benchmarks.real.emps_files [FOLDER] [OUTPUT FOLDER]
 
 The data is not part of the package: it is in ../shared/data/emps, or in emps below the folder that
 PPRS_DATA names. Cite A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of EMPS,
@@ -13,9 +15,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from recorded_data import need_data
 from scipy.io import loadmat
 
+from benchmarks.real.recorded_data import need_data
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.robot_block import AXIS
 
@@ -25,7 +27,7 @@ IDENTIFICATION, PULSES = 'DATA_EMPS.mat', 'DATA_EMPS_PULSES.mat'
 def read_emps(path: Path) -> Recording:
     """Return a MAT file as a recording: measured position, and voltage times its force constant.
 
-    `pulses_N` is no part of the force: the voltage holds the pulses already.
+    `pulses_N` is no part of the force: the voltage contains the pulses already.
     """
     content = loadmat(path)
     force = content['gtau'].item() * content['vir']

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Runs what docs/closed_chain.md reports and draws its picture: python docs/closed_chain.py FOLDER.
+"""Results on a da Vinci arm: python -m benchmarks.real.davinci FOLDER.
 
 The data, psm.urdf and the recordings as `free_one_b.csv.gz` and `load_….csv.gz`, is looked for in
 ../shared/data/dvrk and in the folder `dvrk` below PPRS_DATA; see the page. Everything is done by
@@ -18,9 +18,10 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-from recorded_data import need_data
 from scipy.signal import butter, filtfilt
 
+from benchmarks.real.recorded_data import need_data
+from benchmarks.results import ROOT, write_results
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -31,7 +32,7 @@ from pprs_dynamics.physics.model.model_file import load_model
 matplotlib.use('Agg')
 from matplotlib import pyplot
 
-PAGE = Path(__file__).parent / 'closed_chain.md'
+PAGE = ROOT / 'docs' / 'closed_chain.md'
 FREE = 'free_one_b.csv.gz'
 LOADED = ('load_insertion_105_fast', 'load_insertion_105_slow', 'load_parallel_105_fast',
           'load_parallel_105_slow')
@@ -64,7 +65,7 @@ def share(pairs: list[tuple[Array, Array]]) -> list[float]:
 
 
 def run(folder: Path) -> None:
-    """Run the commands in a folder, and print the figures of the page."""
+    """Run the commands in a folder, and write the results."""
     data = need_data('dvrk', FREE)
     folder.mkdir(parents=True, exist_ok=True)
     os.chdir(folder)
@@ -81,13 +82,23 @@ def run(folder: Path) -> None:
         if not Path(f'{name}.json').exists():
             main(['diagnose', f'{name}.csv.gz', '--model', 'full.yaml', '--json', f'{name}.json'])
     free = read_recording(FREE, load_model('psm.yaml').recorded)
+    lines = [f'| model | {" | ".join(free.drives)} |', '|---|---|---|---|']
     for name in ('psm', 'base', 'full'):
-        print(name, 'below 6 Hz:', share(relative_below(load_model(f'{name}.yaml'), [free])))
+        errors = share(relative_below(load_model(f'{name}.yaml'), [free]))
+        lines.append(f'| {name} | ' + ' | '.join(f'{100 * error:.1f} %' for error in errors) + ' |')
+    lines += ['', '| recording | verdict | effect | alike | parameters |', '|---|---|---|---|---|']
     for name in LOADED:
-        for one in json.loads(Path(f'{name}.json').read_text())['effects']:
-            print(name, one['name'], one['alike'], {
-                key: value['value'] for key, value in one['parameters'].items()})
+        answer = json.loads(Path(f'{name}.json').read_text())
+        for effect in answer['effects']:
+            values = ', '.join(f'{key} {value["value"]:.3g}'
+                               for key, value in effect['parameters'].items())
+            lines.append(f'| {name} | {answer["verdict"]} | {effect["name"]} | '
+                         f'{", ".join(effect["alike"] or ())} | {values} |')
     draw()
+    write_results('davinci', 'A surgical arm with two parallelograms',
+                  'python -m benchmarks.real.davinci FOLDER',
+                  'Relative errors of effort below 6 Hz on the free run, then the diagnoses of '
+                  'runs with a weight of 105 g.\n\n' + '\n'.join(lines))
 
 
 def draw() -> None:
@@ -103,7 +114,7 @@ def draw() -> None:
     recording = read_recording(f'{name}.csv.gz', model.recorded)
     figure, axes = pyplot.subplots(figsize=(7.5, 2.8), layout='constrained')
     for one, label, colour in ((model, 'without the weight', '#999999'),
-                               (loaded, 'with the body found', '#0072B2')):
+                               (loaded, 'with the reported body', '#0072B2')):
         residuals = measure_residuals(one, [recording])[0]
         axes.plot(residuals.time, residuals.error[:, 1], label=label, color=colour, lw=0.8)
     axes.set_xlim(5, 20)

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Makes docs/real_drive.md and its pictures: python docs/real_drive.py (minutes; needs the data).
+"""Results on EMPS, a real prismatic drive: python -m benchmarks.real.emps (minutes).
 
-EMPS is a real prismatic drive; its authors published the data, a model, and what the model lacks.
-Here their procedure is repeated, and then `pprs` is let loose on the same files.
+Its authors published the data, a model, and what the model lacks. Their procedure is repeated, and
+`pprs` diagnoses the same files. The data is not part of the package.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
-from emps import IDENTIFICATION, PULSES, read_emps
-from recorded_data import need_data
 from scipy.signal import butter, decimate, filtfilt
 
+from benchmarks.real.emps_files import IDENTIFICATION, PULSES, read_emps
+from benchmarks.real.recorded_data import need_data
+from benchmarks.results import ROOT, write_results
 from pprs_dynamics import JointMotion, MechanismModel, PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.adoption import Adoption
@@ -33,7 +34,7 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 matplotlib.use('Agg')
 from matplotlib import pyplot
 
-DOCS = Path(__file__).parent
+DOCS = ROOT / 'docs'
 # The authors' recipe: Butterworth of order 4 at 100 Hz to and fro, central differences, every tenth
 # sample after a filter. The edges, where filters see only one side, are cut by us.
 CUT_OFF, ORDER, DECIMATION, EDGE = 100.0, 4, 10, 100
@@ -134,11 +135,11 @@ def tell(run: Recording, pulses: Recording, report: Callable[[str], None]) -> St
 
 
 def document(story: Story) -> str:
-    """Return docs/real_drive.md."""
+    """Return the tables of results in Markdown."""
     run, pulses = story.run, story.pulses
     found, wide = fit_published(run), fit_published(run, asymmetric=True)
-    lines = [(DOCS / 'real_drive_text.md').read_text().rstrip(), '', '## The published procedure',
-             '', '| | published | here | difference |', '|---|---|---|---|']
+    lines = ['## The published procedure', '',
+             '| | published | here | difference |', '|---|---|---|---|']
     for (name, value), ours in zip(PUBLISHED.items(), found, strict=True):
         lines.append(f'| {name} [{UNITS[name]}] | {value} | {ours:.5g} | '
                      f'{100 * (ours / value - 1):+.2f} % |')
@@ -161,7 +162,7 @@ def document(story: Story) -> str:
     lines += ['', f'Verdict on the published model: {story.diagnosis.verdict}; '
               f'{", ".join(one.name for one in story.diagnosis.effects) or "no effect"}.', '',
               '## Error along the loop', '',
-              "By the authors' recipe, and as `pprs compare` tells it.", '',
+              "By the authors' recipe, and as `pprs compare` reports it.", '',
               '| model | identification | pulses | `compare`, identification | `compare`, pulses |',
               '|---|---|---|---|---|']
     rows: list[tuple[str, ForceModel]] = [
@@ -177,7 +178,7 @@ def document(story: Story) -> str:
     if story.ripple is not None:
         lines.append(f'- A force_ripple asked for in the last model: '
                      f'{"taken" if story.ripple.adopted else "refused"}: {story.ripple.reason}.')
-    return '\n'.join(lines) + '\n\n![Error over velocity and over time](images/real_drive.png)\n'
+    return '\n'.join(lines)
 
 
 def _ending(outcome: AdoptionRun) -> str:
@@ -208,11 +209,11 @@ def draw(story: Story, path: Path) -> None:
 
 
 def main() -> None:
-    """Write the document and its picture."""
+    """Write the results and their picture."""
     folder = need_data('emps', IDENTIFICATION)
     story = tell(read_emps(folder / IDENTIFICATION), read_emps(folder / PULSES), print)
     draw(story, DOCS / 'images' / 'real_drive.png')
-    (DOCS / 'real_drive.md').write_text(document(story))
+    write_results('emps', 'A real drive: EMPS', 'python -m benchmarks.real.emps', document(story))
 
 
 if __name__ == '__main__':

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Makes docs/arms.md and its pictures: python docs/arms.py [FOLDER] [--as-far].
+"""Results on a UR10e: python -m benchmarks.real.ur10e [FOLDER] [--as-far].
 
 A UR10e was measured by S. Mamedov (dynamic_calibration, github.com/shamilmamedov), free and with a
 load of 2.805 kg; its recordings are not part of the package. Everything is done by the commands;
 what is in FOLDER already is not done again, so that this can be stopped and continued. With
---as-far nothing is run, and the page says what was not measured.
+--as-far nothing is run, and the results say what was not measured.
 """
 
 from __future__ import annotations
@@ -24,8 +24,11 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from recorded_data import need_data
 
+from benchmarks.real.recorded_data import need_data
+from benchmarks.results import ROOT, write_results
+from benchmarks.scores import arms as arm_score
+from benchmarks.scores import cases as cases_on_dask
 from pprs_dynamics import MechanismModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -38,7 +41,7 @@ from pprs_dynamics.physics.model.model_writer import write_model
 matplotlib.use('Agg')
 from matplotlib import pyplot
 
-DOCS = Path(__file__).parent
+DOCS = ROOT / 'docs'
 FITTED = ('free_30s_12harm', 'free_40s_12harm', 'free_50s_12harm')
 HELD_OUT, LOADED, FURTHER = 'free_50s_14harm', 'load_50s_14harm', 'free_50s_12harm'
 GATE = 'free_40s_12harm'
@@ -58,6 +61,17 @@ MODEL = '''/**:
       gain: [11.976, 11.976, 9.839, 10.763, 10.763, 10.763]       # [N m/A]
       gear_ratio: [101.0, 101.0, 101.0, 101.0, 101.0, 101.0]
 '''
+
+
+# Sections of the results, in order.
+SECTIONS = {
+    'PROOF': 'Goals', 'ERRORS': 'Errors of the base model, rms of means over 20 to 40 ms [N m]',
+    'LOADS': 'Load by the base model of one free run, on the whole loaded run and on its halves',
+    'RIPPLE': 'Pitch of the ripple on the free run',
+    'ZEROS': 'One number of friction set to 0 in the base model, free run diagnosed',
+    'VERDICT': 'Verdict on the free run of another day', 'FREE': 'Effects reported there',
+    'SCORE': 'Simulated arm with hidden effects',
+}
 
 
 class Bench:
@@ -248,7 +262,7 @@ def pictures(bench: Bench) -> None:
 
 
 def tell(bench: Bench) -> dict[str, str]:
-    """Run everything and return what stands in the gaps of the text."""
+    """Run everything and return the sections of the results."""
     fit = bench.run('fit', 'fit', *map(file, FITTED), '--model', 'arm.yaml', '--output',
                     'base.yaml', '--validate', file(HELD_OUT))
     load = bench.run('load', 'diagnose', file(LOADED), '--model', 'base.yaml')
@@ -305,19 +319,14 @@ def tell(bench: Bench) -> dict[str, str]:
         ['pitch of the ripple within 0.5 % of π/101 rad', '≥ 3 joints', f'{near} joints'],
         ['50 s, six joints, processor time', '≤ 10 s', f'{seconds[0]:.0f} to {seconds[-1]:.0f} s'],
     ]
-    sys.path.insert(0, str(DOCS.parent))
-    from benchmarks.scores import arms as arm_score
-    from benchmarks.scores import cases as cases_on_dask
-
     if not bench.as_far:
         arm_score.run(bench.folder / 'base.yaml', range(SEEDS), range(NOTHING), range(0), DURATION,
                       bench.folder / 'score.jsonl', cases_on_dask.here)
     outcomes = cases_on_dask.read_outcomes(bench.folder / 'score.jsonl')
     return {
         'SCORE': arm_score.table(outcomes).rstrip() if outcomes else 'Not measured; see below.',
-        'MODEL': MODEL.rstrip(), 'PROOF': table(('figure', 'goal', 'found'), proof),
+        'PROOF': table(('figure', 'goal', 'found'), proof),
         'ERRORS': table(('joint', 'URDF', 'fitted to', 'not fitted to', 'goal'), errors),
-        'LOAD': bench.said('load').split('\n\n')[0].rstrip(),
         'ZEROS': table(('joint', 'set to 0', 'was', 'named first', 'and where it is'), zeros),
         'LOADS': table(('base from', 'whole run', 'first half', 'second half'), loads),
         'RIPPLE': table(('joint', 'pitch [mrad]', 'of the gear', 'off'), ripples),
@@ -327,17 +336,16 @@ def tell(bench: Bench) -> dict[str, str]:
 
 
 def make(folder: Path, as_far: bool = False) -> None:
-    """Write docs/arms.md."""
+    """Write the results."""
     data = need_data('ur10e', file(LOADED))
     folder.mkdir(parents=True, exist_ok=True)
     for name in (*map(file, {*FITTED, HELD_OUT, LOADED}), 'ur10e.urdf'):
         if not (folder / name).exists():
             shutil.copy(data / name, folder / name)
     (folder / 'arm.yaml').write_text(MODEL)
-    text = (DOCS / 'arms_text.md').read_text(encoding='utf-8')
-    for gap, content in tell(Bench(folder, as_far)).items():
-        text = text.replace(f'@{gap}@', content)
-    (DOCS / 'arms.md').write_text(text, encoding='utf-8')
+    found = tell(Bench(folder, as_far))
+    write_results('ur10e', 'A UR10e with a load of 2.805 kg', 'python -m benchmarks.real.ur10e',
+                  '\n\n'.join(f'## {title}\n\n{found[key]}' for key, title in SECTIONS.items()))
 
 
 if __name__ == '__main__':
