@@ -22,7 +22,7 @@ def test_what_the_engine_does_not_solve_is_no_recording(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, scale: float,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(PprsError, match='^the simulated robot: at '):
+    with pytest.raises(PprsError, match=r'^the simulated robot: at '):
         simulate(DriveModel.load(), name, scale=scale, duration=3.0)
     assert list(tmp_path.iterdir()) == []  # no log of the engine
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs compare: model against measurement, and where it fails."""
+"""`pprs compare`: show where model and measurement differ."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs diagnose: which physical effect is missing in the model, and how sure that is."""
+"""`pprs diagnose`: find the physical effect that the model lacks."""
 
 from __future__ import annotations
 

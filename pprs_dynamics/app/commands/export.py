@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs export: the model as a simulator's file, and what that cannot hold.
+"""`pprs export`: write the model as URDF or MJCF.
 
 The file is replayed in MuJoCo by inverse dynamics, against the model's own forces.
 """

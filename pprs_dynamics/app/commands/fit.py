@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs fit: the base model that recordings of free motion call for."""
+"""`pprs fit`: fit the base model to recordings of free motion."""
 
 from __future__ import annotations
 

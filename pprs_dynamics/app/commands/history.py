@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs history: the ledger of a model file, and how the error fell with each effect."""
+"""`pprs history`: show what was added to a model, or undo the last step."""
 
 from __future__ import annotations
 

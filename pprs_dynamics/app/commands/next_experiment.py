@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs next-experiment: the motion that best separates the effects that recordings leave open."""
+"""`pprs next-experiment`: design the motion that separates the candidates."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs simulate: a recording of the simulated robot, with hidden effects if wanted.
+"""`pprs simulate`: record the simulated robot with hidden effects.
 
 Runs the physics-engine robot without ROS, faster than real time, and writes what its sensors say.
 """

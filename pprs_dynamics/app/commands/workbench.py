@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs workbench: effects to tick on recordings, in the browser.
+"""`pprs workbench`: try effects on recordings in the browser.
 
 Serves one page on this machine; its first line on stdout is the address with a token.
 """
