@@ -10,7 +10,7 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 # Side by side, processes with several threads each for linear algebra only wait for each other.
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo demo-feedforward test test-nodes test-others fuzz reproduce feedforward localisation score adoption benchmark \
+.PHONY: help demo demo-feedforward test test-nodes test-others test-slow fuzz reproduce feedforward localisation score adoption benchmark \
 	naming reference reliability reliability-full experiments decisions mutants workbench docs lint clean
 
 help:
@@ -18,6 +18,7 @@ help:
 	@echo 'make demo-feedforward   the nodes over topics: forces and a picture'
 	@echo 'make test       install into $(VENV), run every test, ruff and mypy'
 	@echo 'make test-nodes, test-others   the two halves of it, which run side by side'
+	@echo 'make test-slow  the slow tests, which run before a release'
 	@echo 'make fuzz       the tests of properties with new examples (10 minutes)'
 	@echo 'make docs       the documentation as a site, into build/docs/html'
 	@echo 'make reproduce  the figures and claims of the paper, into output/'
@@ -49,11 +50,16 @@ test: $(VENV)/.test lint
 	$(MAKE) --jobs 2 --output-sync=target test-nodes test-others
 
 test-nodes: $(VENV)/.test
-	$(BIN)/python -m pytest test -n 2 --dist loadfile -m nodes $(PYTEST)
+	$(BIN)/python -m pytest test -n 2 --dist loadfile -m 'nodes and not slow' $(PYTEST)
 
 test-others: $(VENV)/.test
 	nice -n 10 $(BIN)/python -m pytest test -n 2 --dist loadfile --no-loadscope-reorder \
-	    -m 'not nodes' $(PYTEST)
+	    -m 'not nodes and not slow' --file-budget 20 $(PYTEST)
+
+# What runs before a release: the site, colcon, demonstrations, clusters, long diagnoses, pictures.
+test-slow: $(VENV)/.test $(VENV)/.docs
+	$(BIN)/python -m pytest test -n 2 --dist loadfile -m slow $(PYTEST)
+	$(MAKE) naming NAMING=small
 
 # Property tests with examples that no run has seen.
 fuzz: $(VENV)/.test

@@ -3,7 +3,7 @@
 
 """Forces of parallel robots with friction in every joint, and which effect a model lacks.
 
-What stands here is stable; what is behind it may move.
+These names are stable; what is behind them may move.
 """
 
 from __future__ import annotations

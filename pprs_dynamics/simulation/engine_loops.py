@@ -3,11 +3,11 @@
 
 """Loops closed by the engine's own kinematics, and what they transmit.
 
-With J the engine's derivatives of the drives' positions, of the closures, of coupled joints and of
-joints that stand, by its velocities, J v = (v_a, 0): positions by Newton's method, the rates of
-all joints T as the columns of J^+ that belong to the drives, accelerations with J_dot v by
-differences along the motion. Of the closures' forces those of the rows that determine the passive
-joints are taken; where others are implied, it is not determined which of both carry.
+J is the engine's Jacobian of the drives, the closures, coupled joints and locked joints, so that
+J v = (v_a, 0). Positions come from Newton's method. The rates of all joints T are the columns of
+J^+ that belong to the drives. Accelerations use J_dot v by differences along the motion. Of the
+closures' forces only those of rows that determine passive joints are computed; which of several
+redundant rows carries a load is not determined.
 """
 
 from __future__ import annotations
@@ -273,7 +273,7 @@ class EngineLoops:
         return found
 
     def apply(self, forces: Array) -> None:
-        """Have the closures' forces (L, 6) act on the engine's bodies, beside what acts there."""
+        """Add the closures' forces (L, 6) to those on the engine's bodies."""
         data, at = self.state.data, self.frames()[1][1]
         for bodies, sign in zip(self._bodies, (-1.0, 1.0), strict=True):
             moments = forces[:, 3:] + cross(at - data.xipos[bodies], forces[:, :3])

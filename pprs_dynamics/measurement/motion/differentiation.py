@@ -191,7 +191,7 @@ def representative(stretches: Sequence[Stretch]) -> list[Stretch]:
 def choose_smoothing(
     stretches: Sequence[Stretch], duration: float | None = None, unit: str = 'm',
 ) -> Smoothing:
-    """Return the window that leaves the least error in accelerations.
+    """Return the window with the least error in accelerations.
 
     For each window w the noise that it lets through is known, from that of the positions and its
     weights. Its distortion shows in the difference from a window of three quarters, which has
@@ -203,7 +203,7 @@ def choose_smoothing(
     stretches : sequence of Stretch
         Long enough for the shortest window.
     duration : float, optional
-        Take this window [s], and only say what it leaves.
+        Take this window [s], and only report its error.
     unit : str
         Of the positions.
 
@@ -240,7 +240,7 @@ def choose_smoothing(
 
 
 def position_noise(stretches: Sequence[Stretch]) -> Array:
-    """Return the noise of positions, (D,) [m rms], from what the shortest window leaves."""
+    """Return the noise of positions, (D,) [m rms], from the residual of the shortest window."""
     squares, count = 0.0, 0
     for q, step, _ in stretches:
         filter_ = LocalPolynomial(SHORTEST_WINDOW, step)

@@ -52,7 +52,7 @@ class DrivePath(NamedTuple):
             np.where(beyond > 0, 0.0, (2 * c2 + 6 * x * c3) / h**2))
 
     def stop(self, start: float, duration: float) -> JointMotion:
-        """Return a motion that leaves the path's velocity smoothly and ends at rest on the path.
+        """Return a motion that brakes smoothly along the path and ends at rest on it.
 
         The speed along the path falls as (1 - t / duration)^2.
 

@@ -119,7 +119,7 @@ class Mechanism:
 
     @property
     def numbers(self) -> Array:
-        """All that efforts follow from beside the structure, in one row."""
+        """All numbers besides the structure that determine efforts, in one row."""
         return np.concatenate((self.inertial.ravel(), self.armature, self.gravity))
 
     @cached_property
@@ -504,6 +504,10 @@ class MechanismState(JointMotion):
             return efforts
         return self.robot.structure.evaluation.friction(self.links.rows, self._load_rows,
                                                         friction)
+
+    def with_friction(self, friction: JointFriction) -> MechanismState:
+        """Return the state as it is: what friction in its joints adds to loads is not computed."""
+        return self
 
     def turning_over(self, reversal: Reversal) -> MechanismState:
         """Return the state with a sgn of other widths; all else is computed once for both."""

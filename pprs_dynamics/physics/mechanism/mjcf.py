@@ -136,7 +136,7 @@ class _Reader:
                            (float(x), float(y), float(z)), tuple(self._remarks()))
 
     def _require_known_forces(self) -> None:
-        """Raise ModelError for forces that no part of a mechanism here stands for."""
+        """Raise ModelError for forces that a mechanism here cannot represent."""
         model = self.model
         for name, what in FOREIGN_PARTS.items():
             if getattr(model, name, 0):

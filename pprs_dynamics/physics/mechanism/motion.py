@@ -57,7 +57,7 @@ class PlatformMotion:
     rows : (N, 19) array
         All of it but the times, in the order of the parameters: what kernels take.
     channels : mapping of str to (N, 6) array
-        What was measured of the drives beside it, as `temperature` [degC].
+        Further measurements of the drives, such as `temperature` [degC].
 
     Raises
     ------
@@ -95,7 +95,7 @@ class PlatformMotion:
         return motion
 
     def __setattr__(self, name: str, value: Any) -> None:
-        raise AttributeError(f'a PlatformMotion stays as it is: {name} was to be set')
+        raise AttributeError(f'a PlatformMotion cannot be changed: {name} was to be set')
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -155,7 +155,7 @@ class PlatformMotion:
         return PlatformMotion._of(self.rows, time, self.channels)
 
     def with_channels(self, channels: Mapping[str, Array]) -> PlatformMotion:
-        """Return the motion with what was measured of the drives beside it, (N, 6) each."""
+        """Return the motion with measured channels of the drives, (N, 6) each."""
         return PlatformMotion._of(self.rows, self.time, channels)
 
     def resampled(self, rate: float) -> PlatformMotion:

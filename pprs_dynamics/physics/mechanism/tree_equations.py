@@ -213,12 +213,12 @@ class Motion(NamedTuple):
     drive_to_joint : (C, D) array
         T: rates of all coordinates per rate of each drive.
     inverse : (passive, passive + D) array
-        J_p^-1, and J_p^-1 J_a beside it.
+        J_p^-1, and J_p^-1 J_a.
     solution : (4,) array
         Largest row before the last step (OPEN); determinant and condition number of J_p; steps of
         Newton in the last stride.
     J, by_drives, residuals : arrays
-        Scratch: J_p as it is eliminated, J_a, and rows.
+        Scratch: J_p during its elimination, J_a, and rows.
     """
 
     q: Any
@@ -721,7 +721,7 @@ class Loads(NamedTuple):
 def inverse_dynamics(t: Tables, m: Motion, inertial: Any, gravity: Any, o: Loads) -> None:
     """Add the forces that move the bodies, `inertial` (J + 1, 10), and the efforts that follow.
 
-    `o.links` holds what links apply to the world beside them.
+    `o.links` holds what links apply to the world in addition to them.
     """
     g, links = Vector(gravity[0], gravity[1], gravity[2]), m.links
     for j in range(1, len(t.joints)):

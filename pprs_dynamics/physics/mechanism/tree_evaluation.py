@@ -3,7 +3,7 @@
 
 """Evaluation of a mechanism's equations at samples: compiled, on floats, or on arrays.
 
-One function goes through the samples, from each to the next; it is compiled, or runs as it is on
+One function goes through the samples, from each to the next; it is compiled, or runs uncompiled on
 Python's floats. Of many samples without a compiler NumPy takes all at once, each walked to from
 home, or from where it is known to be. All end on the branch that home is on.
 """
