@@ -94,3 +94,10 @@ def test_no_pipe_and_no_device_has_a_fingerprint(tmp_path: Path) -> None:
     for path in (tmp_path / 'pipe', Path('/dev/zero')):
         with pytest.raises(UnreadableFileError, match='must be a file'):
             fingerprint(path)
+
+
+def test_complex_numbers_are_no_measurements(tmp_path: Path) -> None:
+    path = tmp_path / 'run.mat'
+    savemat(path, {**ARRAYS, 'q': ARRAYS['q'] + 1j})
+    with pytest.raises(UnreadableFileError, match='q'):
+        read_recording(path, NAMED)

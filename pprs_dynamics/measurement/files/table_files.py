@@ -234,6 +234,8 @@ def _series(path: Path, name: str, values: Any, element: int | None, length: int
     array = np.asarray(values)
     if not np.issubdtype(array.dtype, np.datetime64):
         try:
+            if array.dtype.kind == 'c':
+                raise TypeError('complex numbers')
             array = array if array.dtype.kind in 'iu' else array.astype(float)
         except (TypeError, ValueError):
             raise UnreadableFileError(path, f'column {name!r} holds something else than numbers'
