@@ -10,21 +10,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from browser import LEAST_CONTRAST, LEAST_TEXT, READABLE, Seen, chromium, needs_browser
 from made_up_diagnosis import NOISE, made_up_diagnosis, made_up_residuals
 from made_up_pages import made_up_pages
 
-from pprs_dynamics import DriveModel
 from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
-from pprs_dynamics.app.report.robot_figure import robot_page
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.comparison import compare
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
-from pprs_dynamics.physics.mechanism.paths import Excitation
 
-PAGES = ('diagnosis', 'comparison', 'adoption', 'history', 'experiment', 'fleet', 'robot')
+PAGES = ('diagnosis', 'comparison', 'adoption', 'history', 'experiment', 'fleet')
 MOST_BYTES = 4_000_000
 FIRST_PAINT = 500.0  # [ms]
 
@@ -32,11 +28,8 @@ FIRST_PAINT = 500.0  # [ms]
 @pytest.fixture(scope='module')
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp('pages')
-    path = Excitation(duration=4.0, seed=1)
-    robot = robot_page(DriveModel.load(), path.motion(np.arange(0.0, 4.0, 0.02)), 'The robot')
-    return {'robot': robot.write(folder / 'robot.html'),
-            **{name: page.write(folder / f'{name}.html')
-               for name, page in made_up_pages(folder).items()}}
+    return {name: page.write(folder / f'{name}.html')
+            for name, page in made_up_pages(folder).items()}
 
 
 @pytest.fixture(scope='module')
@@ -171,16 +164,6 @@ def test_the_next_command_is_copied_with_the_real_names(see: Any) -> None:
     assert seen.tab.evaluate('navigator.clipboard.readText()') == (
         "pprs adopt coulomb_friction 'my run.mcap' --validate other.mcap --output "
         'with_coulomb_friction.yaml')
-
-
-@needs_browser
-def test_nothing_plays_by_itself(see: Any) -> None:
-    seen = see('robot')
-    seen.drawn(1)
-    pose = 'JSON.stringify(document.querySelector(".plot").data.at(-1).x)'
-    before = seen.tab.evaluate(pose)
-    seen.tab.wait_for_timeout(700)
-    assert seen.tab.evaluate(pose) == before
 
 
 def test_on_an_adequate_page_nothing_is_marked_as_bad() -> None:
