@@ -134,7 +134,7 @@ def test_what_sensors_begin_to_do_has_a_date_its_own_name_and_its_own_shape(
 
     A Butterworth filter is as late as two equal lags of together sqrt(2) over its cut-off [rad/s].
     """
-    arm = made_up_arm.real_arm(tmp_path, **{'arm.gear_ratio': (50.0, 50.0, 1.0)})
+    arm = made_up_arm.real_arm(tmp_path, **{'robot.gear_ratio': (50.0, 50.0, 1.0)})
     moved = made_up_arm.motion(30.0)
     forces = arm.drive_forces(moved).total
     effort = np.where(ARM_TIME[:, None] < 15.0, forces, change(forces))
