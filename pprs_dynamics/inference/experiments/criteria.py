@@ -67,7 +67,7 @@ class Information:
         return np.diag(known)
 
     def of_motion(self, columns: Columns, duration: float) -> Array:
-        """Return the information of a motion of some duration [s], independent of its sampling rate."""
+        """Return the information of a motion of some duration [s], at any sampling rate."""
         return self._gram({d: (index, whitened(rows, self.noise[d], duration))
                            for d, (index, rows) in columns.items() if d in self.noise})
 

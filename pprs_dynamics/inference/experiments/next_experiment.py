@@ -180,8 +180,8 @@ class Experiment:
                 found.append(f'This motion separates {_listed(self.separates)}: evidence of '
                              f'{self.expected_evidence:.0f} is expected.')
             if self.fails:
-                found.append(f'It will hardly separate {_listed(self.fails)}: no motion within these '
-                             'limits that was tried does so for sure.')
+                found.append(f'It will hardly separate {_listed(self.fails)}: no motion that was '
+                             'tried within these limits does so for sure.')
             if self.load:
                 found.append(f'For {_listed(self.told_by_load)} record the same motion once more '
                              f'with {self.load:g} kg more at the tool, and diagnose that recording '
@@ -225,7 +225,7 @@ def next_experiment(
     noise: float = 0.05, progress: Callable[[float], None] | None = None,
     decisions: Decisions = DECISIONS,
 ) -> Experiment:
-    """Return the most informative motion about what is undecided; see `pprs_dynamics.next_experiment`.
+    """Return the motion that decides most; see `pprs_dynamics.next_experiment`.
 
     Of an arm for 'separate' only; `arm_excitation` designs its first motion.
 

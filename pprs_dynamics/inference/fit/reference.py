@@ -281,7 +281,7 @@ class Reference:
                 (shared[0] ** 2).sum(axis=1) > self.decisions.reference_known)))
 
     def _repeating(self, q: Array, v: Array, period: float) -> Array:
-        """Return what repeats in a motion in addition to the base, (M, D) [N]; see `Waves.known`."""
+        """Return what repeats in addition to the base, (M, D) [N]; see `Waves.known`."""
         if len(q) > CHUNK:
             return np.concatenate([self._repeating(q[at:at + CHUNK], v[at:at + CHUNK], period)
                                    for at in range(0, len(q), CHUNK)])
