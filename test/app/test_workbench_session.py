@@ -402,6 +402,7 @@ def test_the_session_imports_neither_ros_nor_a_server() -> None:
     assert not set(loaded) & {'rclpy', 'starlette', 'uvicorn', 'plotly', 'rich', 'matplotlib'}
 
 
+@pytest.mark.slow
 def test_the_notebook_runs_as_it_stands(capsys: pytest.CaptureFixture[str]) -> None:
     file = Path(__file__).parents[2] / 'docs' / 'workbench_session.ipynb'
     notebook = json.loads(file.read_text())
@@ -518,6 +519,7 @@ def test_a_scatter_of_a_long_recording_keeps_every_peak() -> None:
     assert drawn_samples(x[:500], y[:500]).tolist() == list(range(500))
 
 
+@pytest.mark.slow
 def test_a_reference_stays_when_a_recording_goes(tmp_path: Path) -> None:
     healthy, run, other = (write_hidden(tmp_path / f'{seed}.csv', seed, hidden={
         'effects.active': ['coulomb_friction'], 'effects.coulomb_friction.lift_2.force': 0.2})

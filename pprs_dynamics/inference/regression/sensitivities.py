@@ -32,7 +32,7 @@ from pprs_dynamics.physics.model.force_model import (
     PASSIVE_FRICTION,
     ForceModel,
 )
-from pprs_dynamics.physics.model.keys import is_gain
+from pprs_dynamics.physics.model.keys import GAIN
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.system.parallel import each
 
@@ -261,7 +261,7 @@ class Sensitivities:
             return None
         if number.key in PER_CHAIN:
             return [number.element, number.element + len(self.model.drives) // 2]
-        return [number.element] if number.key in PER_DRIVE or is_gain(number.key) else None
+        return [number.element] if number.key in PER_DRIVE or number.key == GAIN else None
 
     @cached_property
     def _moved(self) -> dict[Number, ForceModel]:
@@ -302,7 +302,7 @@ class Sensitivities:
     def _change(self, number: Number, forces: Any, reference: Array) -> Array:
         """Return what a number moved by `RELATIVE_STEP` of itself changes, (N, D)."""
         moved, state = self._moved[number], forces.mechanism
-        if is_gain(number.key):
+        if number.key == GAIN:
             # The more torque an ampere gives, the fewer amperes the model's torque takes.
             given = np.asarray(self.given.values[number.key])
             return np.asarray(-forces.total * RELATIVE_STEP * given / self.model.gain)

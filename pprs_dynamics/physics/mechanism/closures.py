@@ -203,7 +203,8 @@ class Closing:
                 raise ModelError(
                     'robot.drives', [self.names[c] for c in drives], 'determine the motion: '
                     f'{freedoms} degrees of freedom, {len(drives)} drives: '
-                    f'{", ".join(names[:6])} can move while all drives stand')
+                    f'{", ".join(names[:6])} can move while all drives '
+                    'stand: drive them as well, or lock them under robot.locked')
         rows = passive[:0]
         determined = passive[:0]
         condition = 1.0
