@@ -95,8 +95,8 @@ def test_efforts_of_one_pass_are_those_of_the_links_that_are_kept(tmp_path: Path
     motion = states(model, SIZES[name])
     quick, kept = model.mechanism(motion), model.mechanism(motion)
     kept = kept.with_smoothing(kept.reversal)
-    assert quick.found is not None
-    assert kept.found is None
+    assert quick.inverse_dynamics is not None
+    assert kept.inverse_dynamics is None
     assert quick.rigid_force == pytest.approx(kept.rigid_force, abs=1e-10)
     assert quick.closed == pytest.approx(kept.closed, abs=1e-10)
     friction = quick.friction
