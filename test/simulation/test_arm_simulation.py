@@ -74,7 +74,7 @@ def test_a_wrench_at_the_tool_is_that_of_the_engine(model: MechanismModel, of: s
     before = engine.torques(motion)
     engine.wrench = np.array([30.0, -20.0, 500.0, 1.0, 2.0, -3.0])
     state = robot.mechanism(motion)
-    loaded = state.loaded(robot.robot, StructureLoad(np.tile(engine.wrench, (len(motion), 1))))
+    loaded = state.with_load(robot.robot, StructureLoad(np.tile(engine.wrench, (len(motion), 1))))
     assert engine.torques(motion) - before == pytest.approx(
         loaded.rigid_force - state.rigid_force, abs=1e-8)
 
