@@ -50,8 +50,8 @@ from pprs_dynamics.inference.residuals.noise import NoiseShapes
 from pprs_dynamics.inference.search import fitted_sets, ranking, relinearisation, search
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.simulation.arm_forms import NAMES
-from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
+from pprs_dynamics.simulation.injected_effects import IN_CATALOGUE
+from pprs_dynamics.simulation.joint_forms import NAMES
 
 pytestmark = pytest.mark.slow
 
