@@ -51,7 +51,7 @@ from pprs_dynamics.inference.search import fitted_sets, ranking, relinearisation
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.simulation.injected_effects import IN_CATALOGUE
-from pprs_dynamics.simulation.joint_forms import NAMES
+from pprs_dynamics.simulation.mechanism_run import NAMES
 
 pytestmark = pytest.mark.slow
 
