@@ -95,7 +95,7 @@ def fitted(diagnosis: Diagnosis, tried: list[Tried]) -> tuple[JointFit, float]:
     fits = selection.last
     blocks = [block for candidate, one in tried for component in candidate.components
               for block in (fits.components.block(component), *one.nuisance.get(component, ()))]
-    fit = fits.regression.at(blocks, selection.map_set.fit.amplitudes)
+    fit = fits.regression.at(blocks, selection.reported.fit.amplitudes)
     components = [component for one, _ in tried for component in one.components]
     prior_cost = sum(fits.components.prior_cost(one).total for one, _ in tried) + sum(
         fits.prior_costs.of_wrong_signs(one, one.values(fit.of(fits.components.block(one))))

@@ -294,7 +294,8 @@ def _as_in_model(diagnosis: Diagnosis, told: Container[tuple[str | None, str]],
     for effect in diagnosis.model.effects:
         if not isinstance(effect, (DriveEffect, StructureEffect)):
             continue
-        for key, one in estimate_present(selection.last, selection.reported, effect).items():
+        for key, one in estimate_present(
+                selection.best.fits, selection.best.fitted, effect).items():
             drive, parameter = effect.place_and_parameter(key)
             if (drive or None, effect.name) not in told:
                 yield {'drive': drive or None, 'effect': effect.name, 'parameter': parameter,

@@ -17,7 +17,6 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     RankedEffect,
     RankedSet,
     RivalEffect,
-    WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles, next_step
 from pprs_dynamics.inference.diagnosis.quantities import (
@@ -120,7 +119,7 @@ class Sentences:
         In the order of those given to `word_diagnosis`.
     unexplained : tuple of Finding
         In the order of `unexplained_groups`.
-    suspects, within_model_error, barred, calibrated, warnings : tuple of str
+    suspects, barred, calibrated, warnings : tuple of str
     following, command : str
         What to do next, in words and for a shell.
     reference : tuple of str
@@ -132,7 +131,6 @@ class Sentences:
     rivals: tuple[Finding, ...]
     unexplained: tuple[Finding, ...]
     suspects: tuple[str, ...]
-    within_model_error: tuple[str, ...]
     barred: tuple[str, ...]
     calibrated: tuple[str, ...]
     warnings: tuple[str, ...]
@@ -161,10 +159,8 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(Finding(*describe_unexplained(group, bool(diagnosis.effects)))
               for group in unexplained_groups(diagnosis)),
         tuple(_suspect(diagnosis, suspect) for suspect in diagnosis.suspects),
-        tuple(_within_model_error(diagnosis, absorbed)
-              for absorbed in diagnosis.within_model_error),
-        tuple(f'{_set(diagnosis, ranked)} may not be, whatever it costs: {ranked.barred}. It '
-              f'{_cost(ranked)}' for ranked in diagnosis.barred),
+        tuple(f'{_set(diagnosis, ranked)} is not admissible, whatever it costs: {ranked.barred}. '
+              f'It {_cost(ranked)}' for ranked in diagnosis.barred),
         tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated),
         diagnosis.warnings, following, command,
         word_reference(diagnosis.since))
@@ -228,13 +224,9 @@ def _cost(ranked: RankedSet) -> str:
 def runner_up(diagnosis: Diagnosis) -> str:
     """Return how the second best set differs from the best, and its costs; '' for none.
 
-    By what is told: what is within the model error of others was never named as missing.
+    Sets with other effects in place of the reported ones come before sets with more effects.
     """
-    within = {absorbed.name for absorbed in diagnosis.within_model_error} - {
-        effect.name for effect in diagnosis.effects}
-    untold = within & {name for fitted in diagnosis.sets[:1] for name, _ in fitted.names}
-    sets = [(fitted, {pair for pair in fitted.names if pair[0] not in untold})
-            for fitted in diagnosis.sets]
+    sets = [(fitted, set(fitted.names)) for fitted in diagnosis.sets]
     # What could stand instead says more than what could join.
     differing = [(one, names) for one, names in sets[1:] if names != sets[0][1]]
     following = next((pair for pair in differing if sets[0][1] - pair[1]),
@@ -290,9 +282,10 @@ def _headline(diagnosis: Diagnosis) -> str:
         return (f'Stick-slip: {listed(sticking)} stand, are loaded until they break away, and '
                 'slip. What else may be missing cannot be seen in such a motion: no effect is '
                 'claimed.')
+    left = root_mean_square(diagnosis.remaining)
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
-        f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')
+        f'{change(root_mean_square(diagnosis.residuals.error), left, unit)}')
     noise = in_unit(diagnosis.noise_floor, unit)
     if diagnosis.little:
         little = word_little(diagnosis.little, ' with what was found' if held else '')
@@ -300,7 +293,6 @@ def _headline(diagnosis: Diagnosis) -> str:
         return (f'{little[:1].upper()}{little[1:]}, and no effect of the catalogue the rest.'
                 f'{beside}{doubt}')
     if not held and not diagnosis.depends_on and diagnosis.unconfirmed:
-        left = root_mean_square(diagnosis.remaining)
         lacks = 'Something is missing. ' if diagnosis.verdict == 'unknown' else ''
         above = (f', and the error of {in_unit(left, unit)} is more than the noise, {noise}'
                  if left > AT_NOISE * diagnosis.noise_floor else '')
@@ -328,11 +320,10 @@ def _headline(diagnosis: Diagnosis) -> str:
             return f'Nothing stands out. {unseen}'
         return (f'Nothing is missing beyond noise, which is {noise} rms. Effects much weaker than '
                 'that could still hide in it.')
-    left = held[-1].error_after
     level = (f'. {unseen}' if unseen
              else ', which is the noise.' if left <= AT_NOISE * diagnosis.noise_floor
-             else f'. The noise is {noise}; the rest is within the model error of what was found.'
-             if diagnosis.within_model_error
+             else f'. The noise is {noise}; the rest may be the form error of the reported effects.'
+             if any(effect.effect.idealised for effect in held)
              # Only the widths of reversals are fitted and yet not part of the model.
              else f'. The noise is {noise}; the rest lies near reversals, where friction turns '
              'over in another width than the model\'s.')
@@ -376,16 +367,7 @@ def _doubt(diagnosis: Diagnosis) -> str:
     told = []
     for effect in diagnosis.unconfirmed:
         title = _title(diagnosis, effect)
-        if effect.objection:
-            told.append(f' {title} was fitted as well and is no finding: {effect.objection}.')
-            continue
-        unit = diagnosis.residuals.unit
-        worse = (f'with it the error on held-out data '
-                 f'{change(effect.held_out_before, effect.held_out_after, unit)}'
-                 if effect.held_out_after >= effect.held_out_before else
-                 f'held-out data are predicted worse with it, by {-effect.certainty:.2g} standard '
-                 'errors in units of the noise')
-        told.append(f' {title} was fitted as well and is no finding: {worse}.')
+        told.append(f' {title} was fitted as well and is no finding: {effect.objection}.')
     return ''.join(told)
 
 
@@ -492,8 +474,9 @@ def _why(diagnosis: Diagnosis, effect: FoundEffect, is_first: bool) -> str:
     if not fresh:
         held_out += ('; that is the weaker evidence, a recording of another motion with '
                      '--validate is the stronger' if is_first else ' (the weaker evidence)')
-    return (f'It takes away {percent(effect.share)} of the error, each drive in units of its '
-            f'noise. With it the error {change(effect.error_before, effect.error_after, unit)}. '
+    return (f'Its force alone lowers the error by {percent(effect.share)}, each drive in units '
+            f'of its noise. With it the error '
+            f'{change(effect.error_before, effect.error_after, unit)}. '
             f'{held_out}. Evidence {effect.evidence:.0f}, where 0 is the threshold'
             + ('.' if effect.without is None else
                f': the best set without it, {_set(diagnosis, effect.without)}, '
@@ -549,13 +532,6 @@ def _suspect(diagnosis: Diagnosis, ranked: RankedEffect) -> str:
     return (f'{with_drives(ranked.name, ranked.drives, diagnosis.residuals.drives)}: may be there, '
             f'but slow noise would explain the same (evidence {ranked.evidence:.0f}, where 0 is '
             'the threshold); repeat the recording')
-
-
-def _within_model_error(diagnosis: Diagnosis, absorbed: WithinModelError) -> str:
-    return (f'{with_drives(absorbed.name, absorbed.drives, diagnosis.residuals.drives)}, '
-            f'{in_unit(absorbed.rms, diagnosis.residuals.unit)} rms, is within the model error of '
-            f'{listed(absorbed.of)}: a real machine is only nearly of the form that the catalogue '
-            'gives it. Not adopted')
 
 
 def _rounded(after: float, before: float) -> float:

@@ -26,8 +26,8 @@ from pprs_dynamics.inference.regression.normal_equations import (
     NormalEquations,
 )
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
-from pprs_dynamics.inference.search.ranking import Ranking
 from pprs_dynamics.inference.search.scan import Scan
+from pprs_dynamics.inference.search.table import ModelTable
 from pprs_dynamics.physics.effects.catalogue import catalogue
 
 
@@ -161,7 +161,7 @@ def what_if(diagnosis: Diagnosis) -> WhatIf | None:
 class _System:
     """Columns of all placements that were tried, in the last search."""
 
-    def __init__(self, diagnosis: Diagnosis, selection: Ranking) -> None:
+    def __init__(self, diagnosis: Diagnosis, selection: ModelTable) -> None:
         self.diagnosis, self.kept, self.fits = diagnosis, selection.reported, selection.last
         self.first_choice: dict[str, set[int | None]] = {}
         self.placements: dict[tuple[str, int | None], Component] = {}
@@ -193,16 +193,17 @@ class _System:
         for d, drive, index in zip(self.fits.regression.drives, self.equations.drives,
                                    self.equations.indices, strict=True):
             products, with_error = drive.weighted(
-                self.fits.regression.weights(selection.map_set.fit, d))
+                self.fits.regression.weights(selection.reported.fit, d))
             self.gram[np.ix_(index, index)] += products
             self.side[index] += with_error
 
-    def _tried(self, selection: Ranking,
+    def _tried(self, selection: ModelTable,
                ) -> Iterable[tuple[tuple[EffectCandidate, ...], CandidateSet]]:
         """Yield the effects of sets, and the sets, those that matter most first."""
-        alone = [fitted for fitted in selection.of_first if len(fitted.candidates) == 1]
-        yield selection.order, self.kept
-        for sets in (alone, selection.of_last):
+        order = [effect.name for effect in self.diagnosis.effects]
+        yield tuple(sorted(self.kept.effects, key=lambda candidate: (
+            order.index(candidate.name) if candidate.name in order else len(order)))), self.kept
+        for sets in (selection.alone.values(), selection.last.sets):
             for fitted in sorted(sets, key=lambda fitted: fitted.total):
                 yield fitted.effects, fitted
         # Where no set has an effect, a scan beside what was found says in which shape and where.

@@ -9,7 +9,6 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
 from itertools import chain
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
@@ -31,7 +30,7 @@ from pprs_dynamics.inference.search.candidates import (
 from pprs_dynamics.inference.search.components import Components
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
-from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
+from pprs_dynamics.inference.search.form_error import FormErrors
 from pprs_dynamics.inference.search.possible_bodies import with_possible_bodies
 from pprs_dynamics.inference.search.possible_totals import with_possible_totals
 from pprs_dynamics.physics.effects.added_body import AddedBody
@@ -60,8 +59,6 @@ class FittedSets:
     ----------
     stepped : callable
         Called for each set that is fitted and each drive that is scanned: work is done.
-    settled : dict
-        By key of a set, what `relinearisation.settled` has found for it.
     """
 
     def __init__(self, design: Design, decisions: Decisions,
@@ -73,7 +70,7 @@ class FittedSets:
             open_forces={} if design.carried is None else design.carried.open_forces)
         self.prior_costs = PriorCosts.of(self.regression, decisions, design.given)
         self.components = Components(design, self.regression, self.prior_costs)
-        self.settled: dict[Hashable, Any] = {}
+        self.form_errors = FormErrors(design, self.regression, decisions)
         self._evaluated: dict[Hashable, CandidateSet] = {}
         self._nuisance: dict[Hashable, tuple[Block, ...]] = {}
 
@@ -165,20 +162,18 @@ class FittedSets:
         return CostTerms(fit=left, coefficients=fit.deviance - left)
 
     def _barred(self, fitted: CandidateSet) -> str:
-        """Return why a set may not be: a value beyond its bounds, or a pattern that is none.
+        """Return why a set is inadmissible; '' where it is admissible.
 
-        A pattern has to be more than the lack of fit of the effects beside it.
+        A value is beyond its bounds, or a candidate is no more than the form error of others.
         """
         beyond = sorted({component.effect.name for component in fitted.blocks
                          if not component.is_within(fitted.coefficients(component),
                                                     units_of(self.design.given, component.drive))})
         if beyond:
             return f'a value of {", ".join(beyond)} is beyond its bounds'
-        for candidate in fitted.unknowns:
-            ratio, names = discrepancy_ratio(self.design, self.regression, self.decisions, fitted,
-                                             candidate)
-            if ratio < 1:
-                return f'the pattern is within the model error of {", ".join(names)}'
+        for candidate in fitted.candidates:
+            if names := self.form_errors.hide(fitted, candidate):
+                return f'{candidate.name} may be the form error of {", ".join(names)}'
         return ''
 
     def _nuisance_blocks(self, candidates: Candidates, fit: JointFit) -> Nuisance:

@@ -1,0 +1,93 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The error that idealised forms leave, and whether a candidate is no more than that.
+
+Friction, springs and cords of the catalogue have nearly the form of real ones. They leave up to
+`Decisions.form_share` of their force. Masses, gravity and sensors are exact. A candidate of a set
+is inadmissible where its force beyond all other candidates is smaller than the form error of
+these: the data cannot separate it from that error. Beside others the input model's own friction
+counts with `Decisions.own_form_share`, too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.joint_fit import Regression
+from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
+from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+
+
+class FormErrors:
+    """Form errors of the sets of one design.
+
+    Parameters
+    ----------
+    design : Design
+    regression : Regression
+    decisions : Decisions
+    """
+
+    def __init__(self, design: Design, regression: Regression, decisions: Decisions) -> None:
+        self.design, self.regression, self.decisions = design, regression, decisions
+        # Reference runs contain what the forces of the input model lack of real ones.
+        given = () if design.carried is not None else design.given.effects
+        self.given = [effect.name for effect in given
+                      if isinstance(effect, CatalogueEffect) and effect.idealised
+                      and effect.name in regression.residuals.parts]
+        self.own = [effect.name for effect in given
+                    if not isinstance(effect, CatalogueEffect) and effect.name.endswith('friction')
+                    and effect.name in regression.residuals.parts]
+        self._forces = {
+            (name, d): regression.series[d].transform(regression.residuals.parts[name][:, d])
+            for name in (*self.given, *self.own) for d in regression.drives}
+
+    def hide(self, fitted: CandidateSet, candidate: Candidate) -> tuple[str, ...]:
+        """Return the effects whose form error may be all of a candidate; none where it is more."""
+        drives = {d for block in fitted.blocks_of(candidate) for d in block.rows}
+        allowed, names = self.beside(fitted, candidate, drives)
+        return names if self._beyond_others(fitted, candidate) < allowed else ()
+
+    def beside(self, fitted: CandidateSet, candidate: Candidate, drives: set[int],
+               ) -> tuple[float, tuple[str, ...]]:
+        """Return the whitened square of the form errors beside a candidate, and whose they are."""
+        exact = isinstance(candidate, EffectCandidate) and not (
+            candidate.effect.idealised or candidate.effect.shows_at_reversals)
+        share = self.decisions.exact_share if exact else self.decisions.form_share
+        squares: dict[str, float] = {}
+        for other in fitted.effects:
+            if other is not candidate and other.effect.idealised:
+                squares[other.name] = share ** 2 * sum(
+                    self._square(fitted, block, drives) for block in fitted.blocks_of(other))
+        squares |= {name: share ** 2 * self._given(fitted, name, drives) for name in self.given}
+        if len(fitted.candidates) > 1 and not exact:
+            squares |= {name: self.decisions.own_form_share ** 2 * self._given(
+                fitted, name, drives) for name in self.own}
+        return sum(squares.values()), tuple(name for name, square in squares.items() if square > 0)
+
+    def _given(self, fitted: CandidateSet, name: str, drives: set[int]) -> float:
+        """Return the whitened square of a part of the input model's force on some drives."""
+        return sum(float(np.sum(self._forces[name, d] ** 2 * self.regression.series[d].spread(
+            self.regression.weights(fitted.fit, d)))) for d in drives)
+
+    def _beyond_others(self, fitted: CandidateSet, candidate: Candidate) -> float:
+        """Return the whitened square of a candidate's force that no refit of others replaces."""
+        blocks = fitted.blocks_of(candidate)
+        if any(block.mean is not None for block in blocks):
+            return sum(self._square(fitted, block, set(block.rows)) for block in blocks)
+        index = fitted.fit.index_of(blocks)
+        c = fitted.fit.coefficients[index]
+        return float(c @ np.linalg.solve(fitted.fit.covariance[np.ix_(index, index)], c))
+
+    def _square(self, fitted: CandidateSet, block: Block, drives: set[int]) -> float:
+        """Return the whitened square of a block's force on some drives."""
+        total, c = 0.0, fitted.fit.of(block)
+        for d in drives & set(block.rows):
+            gram = np.tensordot(self.regression.weights(fitted.fit, d),
+                                self.regression.products(block, [block], d)[0], 1)
+            total += float(c @ gram @ c)
+        return total
