@@ -75,7 +75,7 @@ def detectable_sizes(fits: FittedSets, fitted: CandidateSet) -> tuple[Detectable
         candidate = EffectCandidate.of([component])
         asked = (fits.components.prior_cost(candidate).total
                  + fits.decisions.rival_margin + np.log1p(information / prior))
-        beside, _ = fits.form_errors.beside(fitted, candidate, set(block.rows))
+        beside, _ = fits.form_errors.beside(fitted, candidate, set(block.rows), False)
         c = np.array([max(np.sqrt(asked * (information + prior)) / information,
                           np.sqrt(beside / information))])
         units = units_of(fits.design.given, component.drive)

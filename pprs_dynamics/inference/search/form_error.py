@@ -49,12 +49,15 @@ class FormErrors:
     def hide(self, fitted: CandidateSet, candidate: Candidate) -> tuple[str, ...]:
         """Return the effects whose form error may be all of a candidate; none where it is more."""
         drives = {d for block in fitted.blocks_of(candidate) for d in block.rows}
-        allowed, names = self.beside(fitted, candidate, drives)
+        allowed, names = self.beside(fitted, candidate, drives, len(fitted.candidates) > 1)
         return names if self._beyond_others(fitted, candidate) < allowed else ()
 
     def beside(self, fitted: CandidateSet, candidate: Candidate, drives: set[int],
-               ) -> tuple[float, tuple[str, ...]]:
-        """Return the whitened square of the form errors beside a candidate, and whose they are."""
+               with_own: bool = True) -> tuple[float, tuple[str, ...]]:
+        """Return the whitened square of the form errors beside a candidate, and whose they are.
+
+        `with_own`: with that of the input model's own friction.
+        """
         exact = isinstance(candidate, EffectCandidate) and not (
             candidate.effect.idealised or candidate.effect.shows_at_reversals)
         share = self.decisions.exact_share if exact else self.decisions.form_share
@@ -64,7 +67,7 @@ class FormErrors:
                 squares[other.name] = share ** 2 * sum(
                     self._square(fitted, block, drives) for block in fitted.blocks_of(other))
         squares |= {name: share ** 2 * self._given(fitted, name, drives) for name in self.given}
-        if len(fitted.candidates) > 1 and not exact:
+        if with_own and not exact:
             squares |= {name: self.decisions.own_form_share ** 2 * self._given(
                 fitted, name, drives) for name in self.own}
         return sum(squares.values()), tuple(name for name, square in squares.items() if square > 0)
