@@ -67,12 +67,25 @@ Column = str | int
 
 
 class DriveColumns(NamedTuple):
-    """Columns of one drive, by quantity, and what their numbers are multiplied by."""
+    """Columns of one drive, by quantity, and how their numbers become SI units.
 
-    names: Mapping[str, Column]
+    Parameters
+    ----------
+    names : mapping of str to str or int
+    effort_scale, position_scale, velocity_scale : float
+        Factors.
+    position_offset : float
+        Added to positions after the factor [m, rad].
+    effort_sign_bit : int, optional
+        Bit that is set in negative efforts, of efforts that are recorded as magnitudes.
+    """
+
+    names: Mapping[str, Column] = MappingProxyType({})
     effort_scale: float = 1.0
     position_scale: float = 1.0
     velocity_scale: float = 1.0
+    position_offset: float = 0.0
+    effort_sign_bit: int | None = None
 
 
 class RecordedColumns(NamedTuple):
@@ -89,7 +102,7 @@ class RecordedColumns(NamedTuple):
     decimal : {'.', ','}
         What is between the whole and the rest of a number.
     files : mapping of str to str
-        By quantity, or `time`: files that make one recording, from its folder; * stands for what
+        By quantity, or `time`: files that make one recording, from its folder; * is what
         recordings differ in.
     channels : mapping of str to str or int
         By quantity: a column of the whole machine, for drives that have none of their own.
@@ -123,6 +136,8 @@ class RecordedDrives:
         For what is found wrong; of drives that push by default.
     effort_limits : tuple of D floats, optional
         Largest absolute efforts that the drives can apply: what is there is left out.
+    effort_factor : float
+        Recorded efforts are multiplied by it [N m, N per unit of the file].
     """
 
     names: tuple[str, ...]
@@ -132,3 +147,4 @@ class RecordedDrives:
     in_amperes: bool = False
     units: tuple[DriveUnits, ...] = ()
     effort_limits: tuple[float, ...] = ()
+    effort_factor: float = 1.0

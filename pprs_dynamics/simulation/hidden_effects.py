@@ -50,7 +50,7 @@ def draw_effects(
 ) -> list[HiddenEffect]:
     """Return a hidden effect per name.
 
-    The name `random` stands for one drawn at random; drives may follow, as in
+    The name `random` is one drawn at random; drives may follow, as in
     `coulomb_friction:lift_1,lift_2`.
 
     Raises

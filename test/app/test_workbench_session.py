@@ -585,7 +585,7 @@ class TestASavedSession:
         (lambda run, file: run.write_text(run.read_text() + '\n'), 'run.csv has changed since'),
         (lambda run, file: run.unlink(), 'run.csv: No such file'),
         (lambda run, file: file.write_text('{'), 'session.json: '),
-        (lambda run, file: file.write_text(100_000 * '['), 'session.json: .*deep'),
+        (lambda run, file: file.write_text(100_000 * '['), 'session.json: .*depth'),
         (lambda run, file: file.write_text('[]'), 'is no session'),
         (lambda run, file: file.write_text(file.read_text().replace('"ticks": [', '"tick": [')),
          'is no session')])

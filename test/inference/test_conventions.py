@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -240,9 +239,8 @@ def test_a_single_axis_tells_the_same(mistake: str) -> None:
 
 
 def test_a_real_drive_is_called_right() -> None:
-    sys.path.insert(0, str(DOCS))
-    import emps
-    from recorded_data import find_data, missing
+    from benchmarks.real import emps_files as emps
+    from benchmarks.real.recorded_data import find_data, missing
 
     data = find_data('emps', emps.IDENTIFICATION)
     if data is None:
@@ -305,8 +303,8 @@ def read_as_told(model: MechanismModel, folder: Path, run: Recording,
 ARM_MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     'degrees': ({'motion': [180 / np.pi, 180 / np.pi, 1.0]}, 'turn: {position_scale: 0.01745329}'),
     'millimetres': ({'motion': [1.0, 1.0, 1e3]}, 'reach: {position_scale: 0.001}'),
-    'sign': ({'effort': -1.0}, 'swing: {scale: -1}'),
-    'a sign': ({'effort': [1.0, -1.0, 1.0]}, 'swing: {scale: -1}')}
+    'sign': ({'effort': -1.0}, 'swing: {effort_scale: -1}'),
+    'a sign': ({'effort': [1.0, -1.0, 1.0]}, 'swing: {effort_scale: -1}')}
 
 
 @pytest.mark.parametrize('mistake', ARM_MISTAKES)
@@ -329,7 +327,8 @@ def test_efforts_in_percent_of_the_largest_are_told(tmp_path: Path) -> None:
     (finding,) = find_mistakes(model, run)
     assert "percent of the drives' largest" in finding.what
     assert columns_line([finding]) == (
-        'columns: {turn: {scale: 4}, swing: {scale: 0.8}, reach: {scale: 0.3}}')
+        'columns: {turn: {effort_scale: 4}, swing: {effort_scale: 0.8}, '
+        'reach: {effort_scale: 0.3}}')
 
 
 def test_beside_columns_the_line_that_is_told_is_added_to_theirs(

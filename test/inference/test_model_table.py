@@ -15,7 +15,7 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.paired_errors import rms
+from pprs_dynamics.inference.residuals.residuals import rms
 from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets

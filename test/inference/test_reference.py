@@ -25,7 +25,7 @@ from pprs_dynamics.inference.fit.reference_runs import read_reference
 from pprs_dynamics.inference.regression.carried_over import CarriedOver
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
+from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
 from pprs_dynamics.physics.model.ledger import read_steps

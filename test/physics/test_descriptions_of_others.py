@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import JointMotion, MechanismModel, load_model
+from pprs_dynamics.app.api.first_model import first_model
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.effects.catalogue import find_effect
 
@@ -164,6 +165,13 @@ def test_masses_that_no_robot_has_are_refused(tmp_path: Path, mass: str) -> None
         load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1')
              + link('l1').replace('mass value="1.0"', f'mass value="{mass}"'),
              'arm: {base: base, tool: l1, joints: [j1]}')
+
+
+def test_a_recording_in_place_of_a_robot_is_no_xacro(tmp_path: Path) -> None:
+    path = tmp_path / 'run.mcap'
+    path.write_bytes(b'\x89MCAP0\r\n <xacro:include a="${b}"/>')
+    with pytest.raises(PprsError, match='no URDF or MJCF, it is not XML'):
+        first_model(path, [], output=tmp_path / 'model.yaml')
 
 
 THREE = (f'<worldbody><body name="t0"><joint name="a" axis="0 1 0"/>{BODY}'

@@ -170,7 +170,7 @@ def test_the_command_writes_recording_and_truth(tmp_path: Path,
     assert main(['simulate', '--model', path, '--output', output, '--effect', 'payload_mass',
                  '--duration', '5', '--json', str(truth)]) == 0
     assert json.loads(truth.read_text())['effects'][0]['parameters']['mass'] > 0
-    assert main(['simulate', '--model', path, '--output', output, '--overwrite', '--effect',
+    assert main(['simulate', '--model', path, '--output', output + '2.csv', '--effect',
                  'rod_mass']) == 2
     assert 'no hidden effect of such a robot' in capsys.readouterr().err
 

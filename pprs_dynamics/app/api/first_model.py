@@ -54,8 +54,8 @@ from pprs_dynamics.system.plain_yaml import scalar
 Ask = Callable[[str, Sequence[str]], int]
 FILE_TIME = 'time'
 SETTLED = ('position', 'velocity', 'effort', 'current')
-SCALE_KEYS = {POSITION: 'position_scale', VELOCITY: 'velocity_scale', EFFORT: 'scale',
-              CURRENT: 'scale'}
+SCALE_KEYS = {POSITION: 'position_scale', VELOCITY: 'velocity_scale', EFFORT: 'effort_scale',
+              CURRENT: 'effort_scale'}
 
 
 class FirstModelError(PprsError, ValueError):
@@ -302,7 +302,7 @@ def _names(contents: Contents, joints: Sequence[str]) -> Names:
 
 
 def _by_numbers(contents: Contents, drives: Sequence[str]) -> Names:
-    """Match joints by the numbers in their names, or refuse."""
+    """Match as many joints by the numbers in their names, or refuse."""
     known = sorted({name for of in contents.joints.values() for name in of})
 
     def numbered(names: Sequence[str]) -> dict[int, str]:
@@ -313,7 +313,7 @@ def _by_numbers(contents: Contents, drives: Sequence[str]) -> Names:
     start = min(theirs, default=0) - min(ours, default=0)
     found = {joint: theirs[number + start] for number, joint in ours.items()
              if number + start in theirs}
-    if len(found) < len(drives):
+    if len(found) < len(drives) or len(known) != len(drives):
         close = meant(drives[0], known)
         raise FirstModelError(
             f'joints of the recording ({", ".join(known[:12])}) are none of the description '

@@ -27,7 +27,7 @@ from pprs_dynamics.inference.diagnosis.statements import Statement, word_stateme
 from pprs_dynamics.inference.regression.terms import OperatingPoint
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.paired_errors import paired_gain, rms
+from pprs_dynamics.inference.residuals.residuals import rms
 from pprs_dynamics.inference.search.candidates import (
     DURING,
     SINCE,
@@ -35,6 +35,7 @@ from pprs_dynamics.inference.search.candidates import (
     EffectCandidate,
     UnknownCandidate,
 )
+from pprs_dynamics.inference.search.constraints import empty_totals
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.estimates import (
     Estimate,
@@ -52,9 +53,13 @@ from pprs_dynamics.inference.search.fitted_model import (
     parts_of,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.held_out import HeldOut, hold_out
+from pprs_dynamics.inference.search.held_out import (
+    HeldOut,
+    PredictiveGain,
+    hold_out,
+    predictive_gain,
+)
 from pprs_dynamics.inference.search.noise_floors import noise_floors
-from pprs_dynamics.inference.search.possible_totals import left_at_nothing
 from pprs_dynamics.inference.search.possible_values import why_impossible
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.table import ModelTable, Row
@@ -188,21 +193,22 @@ class Answer:
         parameters = estimates.parameters
         without = self.table.without(candidate)
         with_force, less = self.over_noise(self.remaining), self.over_noise(self.remaining + force)
-        before, after, certainty = self._held_out(candidate)
+        before, after, gain = self._held_out(candidate)
         begun = self.table.first.design.reconstructions[0].start
         course = candidate.course
         return FoundEffect(
             candidate.effect, self.design.named(candidate.drives), parameters, force,
             without.cost - self.table.best.cost, root_mean_square(self.remaining + force),
             root_mean_square(self.remaining), before, after, estimates.at_bound,
-            (less - with_force) / max(self.over_noise(self.given.error), 1e-300), certainty,
-            self._objection(candidate, parameters, less / max(with_force, 1e-300), certainty),
+            (less - with_force) / max(self.over_noise(self.given.error), 1e-300),
+            float('nan') if gain is None else gain.certainty,
+            self._objection(candidate, parameters, less / max(with_force, 1e-300), gain),
             self._ranked_set(without), self._in_model(candidate, parameters),
             None if course is None else replace(
                 course, begin=course.begin - begun, end=course.end - begun), estimates.moments)
 
     def _objection(self, candidate: EffectCandidate, parameters: Mapping[str, Estimate],
-                   ratio: float, certainty: float) -> str:
+                   ratio: float, gain: PredictiveGain | None) -> str:
         """Return why an effect of the row is no finding, as a clause; '' where it is one."""
         impossible = why_impossible(candidate.effect, parameters, self.decisions)
         if impossible:
@@ -210,15 +216,18 @@ class Answer:
         if self.fitted.terms.feasibility > self.decisions.rival_margin:
             for component in candidate.components:
                 if component.drive is not None:
-                    for of in left_at_nothing(self.design, self.fitted, component):
+                    for of in empty_totals(self.design, self.fitted, component):
                         return (f'{self.drives[component.drive]} would have less than no {of} '
                                 'with what the model has')
         if ratio < 1 - self.decisions.error_rise:
             return f'without its force the error is {1 - ratio:.0%} smaller'
-        if not certainty >= -self.decisions.sure:
-            return ('held-out data cannot confirm it' if np.isnan(certainty) else
-                    'held-out data are predicted worse with it, by '
-                    f'{-certainty:.2g} standard errors in units of the noise')
+        if gain is None or not np.isfinite(gain.certainty):
+            return 'held-out data cannot confirm it'
+        if gain.certainty < -self.decisions.sure:
+            return ('held-out data are predicted worse with it, by '
+                    f'{-gain.certainty:.2g} standard errors in units of the noise')
+        if gain.losing and gain.certainty < self.decisions.sure:
+            return f'held-out data of {listed(gain.losing)} are predicted worse with it'
         return ''
 
     @property
@@ -227,19 +236,19 @@ class Answer:
         return bool(self.row.effects) and self.over_noise(self.remaining) > (
             1 + self.decisions.error_rise) * self.over_noise(self.given.error)
 
-    def _held_out(self, candidate: EffectCandidate) -> tuple[float, float, float]:
-        """Return held-out errors without and with an effect, and the certainty of its gain."""
+    def _held_out(self, candidate: EffectCandidate) -> tuple[float, float, PredictiveGain | None]:
+        """Return held-out errors without and with an effect, and its gain where it is known."""
         fits, fitted = self.fits, self.fitted
         less = fitted.without(candidate)
         if not self.validate:
             without = hold_out(fits, fits.at_noise_of(fitted, less))
-            return (without.error, self._blocks.error, without.gain(self._blocks).certainty)
+            return without.error, self._blocks.error, without.gain(self._blocks)
         try:
             before, after = (measure_residuals(model, self.validate)[0] for model in (
                 model_of(fits, fits.evaluate(less)), self.adopted))
         except PprsError:
-            return float('nan'), float('nan'), float('nan')
-        return rms(before), rms(after), paired_gain(before, after, self.noise).certainty
+            return float('nan'), float('nan'), None
+        return rms(before), rms(after), predictive_gain(before, after)
 
     @cached_property
     def _blocks(self) -> HeldOut:

@@ -105,7 +105,7 @@ class FoundEffect(FittedEffect):
         mean square over drives, each in units of its noise.
     certainty : float
         Standard errors by which the reported effects predict held-out data better than without
-        it, in units of the noise: see `PairedGain`. NaN where that is unknown.
+        it, in units of the noise: see `PredictiveGain`. NaN where that is unknown.
     objection : str
         Why it is no finding whatever the error does, as a clause; '' where nothing speaks against.
     without : RankedSet, optional

@@ -25,6 +25,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.regression.base_columns import BaseColumn
+from pprs_dynamics.inference.regression.constrained import Inequalities, conditioned
 from pprs_dynamics.inference.regression.normal_equations import (
     Block,
     DriveEquations,
@@ -267,20 +268,33 @@ class Regression:
             found.spectra))
 
     def held(self, fit: JointFit, index: Integers, values: Array) -> JointFit:
-        """Return a fit with some coefficients (k,) as given, the others fitted beside them.
+        """Return a fit conditioned on the values (k,) of some coefficients, at its noise."""
+        return self.conditioned(fit, index, Inequalities(np.eye(len(index)), values))
 
-        The rest of a Gaussian posterior moves along with what is held; its density there is what
-        the departure costs. The noise stays.
+    def conditioned(self, fit: JointFit, index: Integers, equalities: Inequalities) -> JointFit:
+        """Return a fit given A c = b, at its noise.
+
+        The deviance rises by the squared distance in units of the covariance. The covariance
+        becomes that of the posterior given the equalities.
+
+        Parameters
+        ----------
+        fit : JointFit
+        index : (k,) int array
+            Of the coefficients c.
+        equalities : Inequalities
+            Taken as equalities.
         """
-        away = values - fit.coefficients[index]
-        pull = np.linalg.solve(fit.covariance[np.ix_(index, index)], away)
-        coefficients = fit.coefficients + fit.covariance[:, index] @ pull
+        A = np.zeros((len(equalities.b), len(fit.coefficients)))
+        A[:, index] = equalities.A
+        found = conditioned(fit.coefficients, fit.covariance, A, equalities.b)
+        coefficients = found.coefficients
         squares = np.empty_like(fit.squares)
         for k, d in enumerate(self.drives):
-            place, felt = self.local(fit, d)
-            squares[k] = self.equations(d, tuple(felt)).left(coefficients[place])
-        return replace(fit, coefficients=coefficients, squares=squares,
-                       deviance=fit.deviance + float(away @ pull))
+            place, acting = self.local(fit, d)
+            squares[k] = self.equations(d, tuple(acting)).left(coefficients[place])
+        return replace(fit, coefficients=coefficients, covariance=found.covariance,
+                       squares=squares, deviance=fit.deviance + found.rise)
 
     def noise(self, fit: JointFit) -> dict[int, NoiseSpectrum]:
         """Return the noise of every drive."""
@@ -346,12 +360,6 @@ class Regression:
     def own_information(self, fit: JointFit, block: Block) -> Array:
         """Return the information on a block's coefficients that a fit leaves, (k, k)."""
         return self._beside(fit, block)[0]
-
-    def own_share(self, fit: JointFit, block: Block, coefficients: Array) -> float:
-        """Return the share of the whitened square of a block's force that a fit cannot take."""
-        S, _, plain = self._beside(fit, block)
-        beyond, whole = (float(coefficients @ one @ coefficients) for one in (S, plain))
-        return beyond / max(whole, 1e-300)
 
     def _beside(self, fit: JointFit, block: Block) -> tuple[Array, Array, Array]:
         """Return own sums of products, those with what is left, and full products of a block."""

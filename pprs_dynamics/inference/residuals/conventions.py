@@ -358,7 +358,7 @@ def _position_scales(model: ForceModel, reading: Reading) -> Scales:
 def _effort_scales(model: ForceModel, group: tuple[int, ...], factors: Array) -> Scales:
     """Return what efforts are multiplied by, in columns of a model file, to be read so."""
     before = model.recorded.columns
-    return tuple((drive, 'scale', float(factors[k]) * (
+    return tuple((drive, 'effort_scale', float(factors[k]) * (
         1.0 if before is None else before.drives[drive].effort_scale))
         for k, drive in enumerate(model.drives) if k in group)
 

@@ -76,6 +76,10 @@ class Decisions:
     scatter_ratio: float = _number(
         1.5, '1', 'ratio of variances in a range and elsewhere that is told as scatter',
         'less does not show in a plot')
+    one_load: float = _number(
+        0.05, '1', 'share by which friction by load may differ from friction that does not follow '
+        'it, up to which a warning asks for another load',
+        'dry friction varies by as much along a guide')
     stick_slip: float = _number(
         0.2, '1', 'share of the time in stick-slip, from which no other effect is claimed',
         'a fifth of the samples decides about any friction')

@@ -21,6 +21,12 @@ from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, E
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
+# Independent shapes over which a form error is spread, of which a candidate is one.
+DIRECTIONS = 12
+# Ends of the names of coefficients that are of one direction, and of the other.
+SIDES = {'forward': 'backward', 'backward': 'forward', 'driving': 'driven_back',
+         'driven_back': 'driving'}
+
 
 class FormErrors:
     """Form errors of the sets of one design.
@@ -48,6 +54,8 @@ class FormErrors:
 
     def hide(self, fitted: CandidateSet, candidate: Candidate) -> tuple[str, ...]:
         """Return the effects whose form error may be all of a candidate; none where it is more."""
+        if isinstance(candidate, EffectCandidate) and self._is_symmetric(fitted, candidate):
+            return ('friction that is the same in both directions',)
         drives = {d for block in fitted.blocks_of(candidate) for d in block.rows}
         allowed, names = self.beside(fitted, candidate, drives, len(fitted.candidates) > 1)
         return names if self._beyond_others(fitted, candidate) < allowed else ()
@@ -60,7 +68,8 @@ class FormErrors:
         """
         exact = isinstance(candidate, EffectCandidate) and not (
             candidate.effect.idealised or candidate.effect.shows_at_reversals)
-        share = self.decisions.exact_share if exact else self.decisions.form_share
+        share = (self.decisions.exact_share if exact else
+                 self.decisions.form_share / DIRECTIONS ** 0.5)
         squares: dict[str, float] = {}
         for other in fitted.effects:
             if other is not candidate and other.effect.idealised:
@@ -71,6 +80,28 @@ class FormErrors:
             squares |= {name: self.decisions.own_form_share ** 2 * self._given(
                 fitted, name, drives) for name in self.own}
         return sum(squares.values()), tuple(name for name, square in squares.items() if square > 0)
+
+    def _is_symmetric(self, fitted: CandidateSet, candidate: EffectCandidate) -> bool:
+        """Return whether friction that differs by direction does so by less than its form error."""
+        if not candidate.effect.is_friction:
+            return False
+        half, whole = 0.0, 0.0
+        for component in candidate.components:
+            block, known = fitted.blocks[component], list(component.names)
+            others = [SIDES.get(word, word).join(name.rsplit(word, 1)) if (
+                word := next((side for side in SIDES if name.endswith(side)), '')) else ''
+                for name in known]
+            if not known or not set(others) <= set(known):
+                return False
+            c = fitted.fit.of(block)
+            mirrored = c.copy()
+            mirrored[:len(known)] = c[[known.index(other) for other in others]]
+            for d in block.rows:
+                gram = np.tensordot(self.regression.weights(fitted.fit, d),
+                                    self.regression.products(block, [block], d)[0], 1)
+                half += float((c - mirrored) @ gram @ (c - mirrored)) / 4
+                whole += float((c + mirrored) @ gram @ (c + mirrored)) / 4
+        return half < self.decisions.form_share ** 2 * whole
 
     def _given(self, fitted: CandidateSet, name: str, drives: set[int]) -> float:
         """Return the whitened square of a part of the input model's force on some drives."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array, as_numbers
-from pprs_dynamics.drives import DRIVES, RecordedDrives
+from pprs_dynamics.drives import CHANNELS, DRIVES, DriveColumns, RecordedDrives
 from pprs_dynamics.errors import MotionError, UnreadableFileError
 from pprs_dynamics.measurement.files.array_files import is_lerobot
 from pprs_dynamics.measurement.files.bag_files import read_bag, write_bag
@@ -221,7 +221,7 @@ def read_recording(
         if isinstance(error, UnreadableFileError):
             raise
         raise UnreadableFileError(path, error.strerror or str(error)) from None
-    samples, applied = _as_efforts(path, samples, drives)
+    samples, applied = _as_efforts(path, _scaled(samples, drives), drives)
     recording = replace(_judged(displayed(path.name), replace(
         samples, units=drives.units, effort_limits=drives.effort_limits)),
         gain=applied, drives=drives.names)
@@ -230,6 +230,31 @@ def read_recording(
             path, f'none of its {counted(len(samples.time), "sample")} has a finite time and '
             'finite positions of all drives')
     return recording
+
+
+def _scaled(samples: Samples, drives: RecordedDrives) -> Samples:
+    """Return samples in SI units, as the columns of a model file say."""
+    given = {} if drives.columns is None else drives.columns.drives
+    of_drives = [given.get(drive, DriveColumns()) for drive in drives.names]
+    velocity, effort = samples.velocity, samples.effort.copy()
+    scale, offset, speed, force = np.array([
+        (one.position_scale, one.position_offset, one.velocity_scale, one.effort_scale)
+        for one in of_drives]).T
+    for d, one in enumerate(of_drives):
+        if one.effort_sign_bit is not None:
+            effort[:, d] = signed(effort[:, d], one.effort_sign_bit)
+    return replace(
+        samples, position=samples.position * scale + offset,
+        velocity=None if velocity is None else velocity * speed,
+        effort=effort * force * drives.effort_factor,
+        channels={name: values * scale + offset if CHANNELS[name] == 'm' else values
+                  for name, values in samples.channels.items()})
+
+
+def signed(magnitude: Array, bit: int) -> Array:
+    """Return numbers, (N,), whose sign is a bit above their magnitude."""
+    size = 2.0 ** bit
+    return np.where(magnitude >= size, size - magnitude, magnitude)
 
 
 def _as_efforts(path: Path, samples: Samples, drives: RecordedDrives,

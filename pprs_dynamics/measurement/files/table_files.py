@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -72,17 +71,8 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
         For Parquet without pyarrow.
     """
     columns = drives.columns or RecordedColumns()
-    samples = (_of_several(path, drives, columns, progress) if columns.files else
-               _of_one(path, drives, columns, topic, progress))
-    of_drives = [columns.drives.get(drive, DriveColumns({})) for drive in drives.names]
-    velocity, of_positions = samples.velocity, [one.position_scale for one in of_drives]
-    return replace(
-        samples, position=samples.position * of_positions,
-        channels={name: values * of_positions if CHANNELS[name] == 'm' else values
-                  for name, values in samples.channels.items()},
-        velocity=None if velocity is None else velocity * [
-            one.velocity_scale for one in of_drives],
-        effort=samples.effort * [one.effort_scale for one in of_drives])
+    return (_of_several(path, drives, columns, progress) if columns.files else
+            _of_one(path, drives, columns, topic, progress))
 
 
 def open_table(path: Path, decimal: str = '.', likely: Sequence[str] = ()) -> Table:
@@ -152,7 +142,7 @@ def _chosen(table: Table, drives: RecordedDrives, columns: RecordedColumns, topi
     """Return the column of each joint and quantity, and the prefix of those of our own format."""
     joints = drives.joints or drives.names
     named = {(joint, quantity): column for joint, drive in zip(joints, drives.names, strict=True)
-             for quantity, column in columns.drives.get(drive, DriveColumns({})).names.items()}
+             for quantity, column in columns.drives.get(drive, DriveColumns()).names.items()}
     shared = _shared(table, joints, columns)
     _require(table, [*named.values(), *shared.values()])
     ours = tuple(joint for joint in joints if (joint, 'position') not in named)
@@ -187,8 +177,14 @@ def _shared(table: Table, joints: tuple[str, ...], columns: RecordedColumns,
 
 
 def _require(table: Table, wanted: Sequence[Column]) -> None:
-    """Raise UnreadableFileError where a table lacks a column."""
+    """Raise UnreadableFileError where a table lacks a column, or has two of that name."""
     for column in wanted:
+        if not isinstance(column, int) and table.names.count(column) > 1:
+            places = [str(k) for k, name in enumerate(table.names, 1) if name == column]
+            raise UnreadableFileError(
+                table.path, f'{len(places)} columns have the name {column!r}: '
+                + (f'write the number of the right one, {" or ".join(places)}'
+                   if isinstance(table, CsvTable) else 'rename one of them'))
         if not isinstance(column, int) and not _holder(table, column):
             if not table.names:
                 raise UnreadableFileError(
@@ -238,6 +234,8 @@ def _series(path: Path, name: str, values: Any, element: int | None, length: int
     array = np.asarray(values)
     if not np.issubdtype(array.dtype, np.datetime64):
         try:
+            if array.dtype.kind == 'c':
+                raise TypeError('complex numbers')
             array = array if array.dtype.kind in 'iu' else array.astype(float)
         except (TypeError, ValueError):
             raise UnreadableFileError(path, f'column {name!r} holds something else than numbers'

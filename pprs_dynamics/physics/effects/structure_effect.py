@@ -57,7 +57,7 @@ class BodyEffect(StructureEffect):
         return robot
 
     def load(self, state: Any) -> StructureLoad | None:
-        """Return a load beside bodies and gravity; None, the default, for none."""
+        """Return a load in addition to bodies and gravity, or None (default)."""
         return None
 
     def apply(self, state: Any) -> Any:
@@ -80,6 +80,10 @@ def with_bodies(robot: Any, effects: Iterable[object]) -> Any:
 
 class PassiveJointEffect(StructureEffect):
     """Friction in the passive joints: a force on top of the rigid body's."""
+
+    def rubbing(self, state: Any) -> Any:
+        """Return the state whose joints carry this friction as well; by default as it is."""
+        return state
 
     @abstractmethod
     def force(self, state: Any, memory: Any = None) -> Array:

@@ -175,5 +175,5 @@ def compiled_solve(A: Any, B: Any, order: Any) -> Any:
 
 
 def compiled_elements(named: Any) -> Any:
-    """Return a named tuple of arrays as it is: compiled code reads them fast enough."""
+    """Return a named tuple of arrays unchanged: compiled code reads them fast enough."""
     return named

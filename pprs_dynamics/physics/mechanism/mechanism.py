@@ -29,17 +29,23 @@ from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.tree_equations import (
     CONDITION,
     DETERMINANT,
+    JOINT_EFFORT,
     KIND,
     LOOP,
     OPEN_IN_MOTION,
     TRANSLATION,
+    TRANSMITTED,
     WORST_CONDITION,
     JointFriction,
     Loads,
     Motion,
     residual,
 )
-from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, Found, samples_last
+from pprs_dynamics.physics.mechanism.tree_evaluation import (
+    NO_FRICTION,
+    InverseDynamicsResult,
+    samples_last,
+)
 from pprs_dynamics.system.parallel import lazy
 
 
@@ -113,7 +119,7 @@ class Mechanism:
 
     @property
     def numbers(self) -> Array:
-        """All that efforts follow from beside the structure, in one row."""
+        """All numbers besides the structure that determine efforts, in one row."""
         return np.concatenate((self.inertial.ravel(), self.armature, self.gravity))
 
     @cached_property
@@ -396,14 +402,14 @@ class MechanismState(JointMotion):
         return self.robot.structure.drives
 
     @lazy
-    def found(self) -> Found | None:
+    def found(self) -> InverseDynamicsResult | None:
         """Closed coordinates, efforts and own friction in one pass; None where links are needed."""
         if self.known is not None or self.load is not None:
             return None
         robot = self.robot
-        return robot.structure.evaluation.found(
+        return robot.structure.evaluation.inverse_dynamics(
             (self.position, self.velocity, self.acceleration), robot.by_joint, robot.gravity_row,
-            self.friction, self.start, self.nearby)
+            self.friction, None, self.start, self.nearby)
 
     @lazy
     def links(self) -> LinkMotion:
@@ -438,7 +444,8 @@ class MechanismState(JointMotion):
 
         The motor accelerates its rotor on its own side of the gear.
         """
-        efforts: Array = self.reactions.efforts if self.found is None else self.found.efforts
+        efforts: Array = (self.reactions.efforts if self.found is None
+                          else self.found.efforts[TRANSMITTED])
         return efforts
 
     @lazy
@@ -493,9 +500,14 @@ class MechanismState(JointMotion):
     def against_friction(self, friction: JointFriction) -> Array:
         """Return the drives' efforts against friction of joints, (N, D)."""
         if friction is self.friction and self.found is not None:
-            return self.found.friction
+            efforts: Array = self.found.efforts[JOINT_EFFORT]
+            return efforts
         return self.robot.structure.evaluation.friction(self.links.rows, self._load_rows,
                                                         friction)
+
+    def with_friction(self, friction: JointFriction) -> MechanismState:
+        """Return the state as it is: what friction in its joints adds to loads is not computed."""
+        return self
 
     def turning_over(self, reversal: Reversal) -> MechanismState:
         """Return the state with a sgn of other widths; all else is computed once for both."""

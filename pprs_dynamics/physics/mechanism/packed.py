@@ -46,6 +46,7 @@ class Sizes(NamedTuple):
     links: int
     forces: int
     loop_forces: int
+    solved: int
 
     @classmethod
     def of(cls, t: Tables) -> Sizes:
@@ -54,7 +55,7 @@ class Sizes(NamedTuple):
         return cls(len(t.frames), joints, len(t.places), len(t.drives), len(t.passive), loops,
                    len(t.closure_frames), len(t.rows), len(t.path), len(t.starts), len(t.swap),
                    len(t.below), len(t.right), OF_LINK * joints, OF_FORCES * joints,
-                   OF_FORCES * loops)
+                   OF_FORCES * loops, len(t.passive) + len(t.drives))
 
 
 SHAPES: dict[type, dict[str, tuple[str | int, ...]]] = {
@@ -68,7 +69,7 @@ SHAPES: dict[type, dict[str, tuple[str | int, ...]]] = {
     Motion: {
         'q': ('coordinates',), 'v': ('coordinates',), 'a': ('coordinates',), 'links': ('links', 3),
         'loops': ('closure_frames', 3), 'drive_to_joint': ('coordinates', 'drives'),
-        'inverse': ('passive', 'passive'), 'solution': (4,), 'J': ('passive', 'passive'),
+        'inverse': ('passive', 'solved'), 'solution': (4,), 'J': ('passive', 'passive'),
         'by_drives': ('passive', 'drives'), 'residuals': ('passive', 1)},
     Loads: {
         'links': ('forces', 3), 'loops': ('loop_forces', 3), 'coordinates': ('coordinates',),

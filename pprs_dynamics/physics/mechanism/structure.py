@@ -117,6 +117,15 @@ class Structure:
             names.setdefault(row, link)
         return names
 
+    @property
+    def couplings(self) -> list[tuple[str, str, float, float]]:
+        """Coupled joints: name, the free joint that each follows, ratio and offset."""
+        t, joints = self.tables, self.description.joints
+        leaders = {int(t.coordinate[row]): name for name, row in self.rows.items()
+                   if joints[name].mimic is None}
+        return [(name, leaders[int(t.coordinate[row])], float(t.ratio[row]), float(t.offset[row]))
+                for name, row in self.rows.items() if joints[name].mimic is not None]
+
     def room(self, widest: float) -> tuple[Array, Array]:
         """Return the middle of the drives' motion and the way to either side, (D,) each.
 

@@ -212,13 +212,13 @@ class Motion(NamedTuple):
         Frames of the closures.
     drive_to_joint : (C, D) array
         T: rates of all coordinates per rate of each drive.
-    inverse : (passive, passive) array
-        Of J_p.
+    inverse : (passive, passive + D) array
+        J_p^-1, and J_p^-1 J_a.
     solution : (4,) array
         Largest row before the last step (OPEN); determinant and condition number of J_p; steps of
         Newton in the last stride.
     J, by_drives, residuals : arrays
-        Scratch: J_p as it is eliminated, J_a, and rows.
+        Scratch: J_p during its elimination, J_a, and rows.
     """
 
     q: Any
@@ -533,24 +533,24 @@ def follow(t: Tables, m: Motion, v: Any, a: Any) -> None:
         jacobian(t, m, t.places, m.J, by_drives)
         there = zero
         for r in range(count):
+            x = zero
             for c in range(count):
-                x = m.J[r, c] * t.passive_unit[c] / t.row_reals[r, UNIT]
-                there = there + x * x
+                x = x + (m.J[r, c] * t.passive_unit[c]) ** 2
                 inverse[r, c] = 1.0 if r == c else 0.0
+            for d in range(drives):
+                inverse[r, count + d] = by_drives[r, d]
+            there = there + x / t.row_reals[r, UNIT] ** 2
         m.solution[DETERMINANT] = solve(m.J, inverse, t)
         # The condition number takes all of the inverse, so that it serves for the rest as well.
         back = zero
         for c in range(count):
+            x = zero
             for r in range(count):
-                x = inverse[c, r] * t.row_reals[r, UNIT] / t.passive_unit[c]
-                back = back + x * x
+                x = x + (inverse[c, r] * t.row_reals[r, UNIT]) ** 2
+            back = back + x / t.passive_unit[c] ** 2
+            for d in range(drives):
+                T[passive[c], d] = -inverse[c, count + d]
         m.solution[CONDITION] = sqrt(there * back)
-        # Drives innermost: their sums do not wait for one another.
-        for c in range(count):
-            k = passive[c]
-            for r in range(count):
-                for d in range(drives):
-                    T[k, d] -= inverse[c, r] * by_drives[r, d]
         for c in range(count):
             x = zero
             for d in range(drives):
@@ -570,21 +570,34 @@ def follow(t: Tables, m: Motion, v: Any, a: Any) -> None:
 
 
 def predict(t: Tables, m: Motion, goal: Any, start: Any) -> None:
-    """Move closed coordinates from a sample to where its rates lead with the next drives' goal.
+    """Extrapolate closed coordinates to the next drive positions, to second order.
+
+    The passive coordinates move by T dq + drift dt^2 / 2, where drift = a_p - T a is quadratic in
+    the drives' velocity v and dt = v' dq / v' v.
 
     Parameters
     ----------
     t, m : Tables, Motion
     goal : (D,) array
-        Within a stride.
+        Drive positions within a stride.
     start : (C,) array
-        Those of the sample.
+        Closed coordinates of the sample; overwritten by the extrapolation.
     """
+    T, square, along = m.drive_to_joint, 1e-300, 0.0
     for d in range(len(t.drives)):
-        moved = goal[d] - start[t.drives[d]]
+        v = m.v[t.drives[d]]
+        square += v * v
+        along += v * (goal[d] - start[t.drives[d]])
+    half = 0.5 * (along / square) ** 2
+    for p in range(len(t.passive)):
+        c = t.passive[p]
+        drift, move = m.a[c], 0.0
+        for d in range(len(t.drives)):
+            drift -= T[c, d] * m.a[t.drives[d]]
+            move += T[c, d] * (goal[d] - start[t.drives[d]])
+        start[c] += move + half * drift
+    for d in range(len(t.drives)):
         start[t.drives[d]] = goal[d]
-        for c in range(len(t.passive)):
-            start[t.passive[c]] += m.drive_to_joint[t.passive[c], d] * moved
 
 
 def velocities(t: Tables, m: Motion) -> None:
@@ -708,7 +721,7 @@ class Loads(NamedTuple):
 def inverse_dynamics(t: Tables, m: Motion, inertial: Any, gravity: Any, o: Loads) -> None:
     """Add the forces that move the bodies, `inertial` (J + 1, 10), and the efforts that follow.
 
-    `o.links` holds what links apply to the world beside them.
+    `o.links` holds what links apply to the world in addition to them.
     """
     g, links = Vector(gravity[0], gravity[1], gravity[2]), m.links
     for j in range(1, len(t.joints)):
@@ -821,6 +834,33 @@ class JointFriction(NamedTuple):
     torque: Any
     lever: Any
     width: Any
+
+
+# Rows of the parameters of drives, and of the efforts that follow from them.
+ARMATURE, VISCOUS, COULOMB, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5
+TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4, 5
+
+
+def actuator_efforts(drives: Any, v: Any, a: Any, efforts: Any) -> None:
+    """Fill in rigid-body effort, drive friction and the total of D drives.
+
+    The motor accelerates its rotor on its own side of the gear.
+
+    Parameters
+    ----------
+    drives : (OF_DRIVE, D) array
+        Armature [kg m^2, kg], viscous and Coulomb friction, offset, and width of the sign.
+    v, a : (D,) arrays
+        Velocities and accelerations of the drives.
+    efforts : (EFFORTS, D) array
+        JOINT_EFFORT and TRANSMITTED are given, the other rows are filled in.
+    """
+    for d in range(len(v)):
+        efforts[RIGID, d] = efforts[TRANSMITTED, d] + drives[ARMATURE, d] * a[d]
+        efforts[DRIVE_FRICTION, d] = (drives[VISCOUS, d] * v[d]
+                                      + drives[COULOMB, d] * tanh(v[d] / drives[WIDTH, d]))
+        efforts[TOTAL, d] = (efforts[RIGID, d] + efforts[DRIVE_FRICTION, d] + drives[OFFSET, d]
+                             + efforts[JOINT_EFFORT, d])
 
 
 def joint_friction(t: Tables, m: Motion, o: Loads, s: JointFriction, efforts: Any) -> None:

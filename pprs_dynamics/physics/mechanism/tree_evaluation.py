@@ -3,7 +3,7 @@
 
 """Evaluation of a mechanism's equations at samples: compiled, on floats, or on arrays.
 
-One function goes through the samples, from each to the next; it is compiled, or runs as it is on
+One function goes through the samples, from each to the next; it is compiled, or runs uncompiled on
 Python's floats. Of many samples without a compiler NumPy takes all at once, each walked to from
 home, or from where it is known to be. All end on the branch that home is on.
 """
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -28,14 +28,20 @@ from pprs_dynamics.physics.mechanism.packed import (
     views,
 )
 from pprs_dynamics.physics.mechanism.tree_equations import (
+    EFFORTS,
+    JOINT_EFFORT,
+    OF_DRIVE,
     OPEN,
     STEPS,
+    TRANSMITTED,
     WARM_STEPS,
+    WIDTH,
     Integers,
     JointFriction,
     Loads,
     Motion,
     Tables,
+    actuator_efforts,
     constraint_forces,
     follow,
     inverse_dynamics,
@@ -57,51 +63,57 @@ NOWHERE = np.zeros(4)
 NO_FRICTION = JointFriction(*np.zeros((2, 0), dtype=np.int64), *np.zeros((4, 0)))
 
 
-class Found(NamedTuple):
-    """What a robot needs for a motion, of N samples.
+class InverseDynamicsResult:
+    """Closed coordinates and drive efforts of N samples.
 
     Parameters
     ----------
     q : (N, C) array
         Closed coordinates.
-    efforts, friction : (N, D) arrays
-        Of the drives: without friction of joints, and against it [N m, N].
+    efforts : (EFFORTS, N, D) array
+        By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT and TRANSMITTED [N m, N].
     """
 
-    q: Array
-    efforts: Array
-    friction: Array
+    __slots__ = ('efforts', 'q')
+
+    def __init__(self, q: Array, efforts: Array) -> None:
+        self.q, self.efforts = q, efforts
 
 
 def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,
               given: Any, motions: Any, inertial: Any, gravity: Any, loads: Any, rubbing: Any,
-              resistance: Any, found: Any, stages: int, nearby: bool) -> int:
-    """Go through the samples; see `follow_drives` and `Evaluation`."""
+              resistance: Any, actuators: Any, closed: Any, efforts: Any, stages: int,
+              nearby: bool) -> int:
+    """Evaluate the stages at each sample in turn; see `Evaluation`.
+
+    Return the first sample that fails, or -1.
+    """
     t = elements(read_tables(sizes, integers, reals))
-    rubs = elements(JointFriction(rubbing[0], rubbing[1], resistance[0], resistance[1],
-                                  resistance[2], resistance[3]))
-    coordinates, drives = len(home), given.shape[2]
-    for s in range(len(found)):
+    friction = elements(JointFriction(rubbing[0], rubbing[1], resistance[0], resistance[1],
+                                      resistance[2], resistance[3]))
+    for s in range(len(closed)):
         at = s if stages & KEPT else 0
         m = elements(read_motion(sizes, motions[at], reals))
         o = elements(read_loads(sizes, loads[at], reals))
         if stages & MOTION:
-            q, v, a = given[0, s], given[1, s], given[2, s]
-            done = False
-            if nearby and s == 0:
-                if is_near(t, start, q) and reach(t, m, start, q):
-                    follow(t, m, v, a)
-                    done = m.solution[STEPS] <= WARM_STEPS and is_sound(t, m, at_home)
-                if not done:
-                    for c in range(coordinates):
-                        start[c] = home[c]
-            if not done:
-                if not reach(t, m, start, q) and not reach(t, m, home, q):
-                    return s
-                follow(t, m, v, a)
-            for c in range(coordinates):
-                found[s, c] = start[c] = m.q[c]
-            if s + 1 < len(found) and is_near(t, start, given[0, s + 1]):
+            q = given[0, s]
+            # First from coordinates of another motion, then from the last sample, then from home.
+            is_closed = False
+            for trial in range(0 if nearby and s == 0 else 1, 3):
+                if trial > 0 or is_near(t, start, q):
+                    is_closed = reach(t, m, start, q)
+                if is_closed:
+                    follow(t, m, given[1, s], given[2, s])
+                    if trial > 0 or (m.solution[STEPS] <= WARM_STEPS and is_sound(t, m, at_home)):
+                        break
+                is_closed = False
+                for c in range(len(home)):
+                    start[c] = home[c]
+            if not is_closed:
+                return s
+            for c in range(len(home)):
+                closed[s, c] = start[c] = m.q[c]
+            if s + 1 < len(closed) and is_near(t, start, given[0, s + 1]):
                 predict(t, m, given[0, s + 1], start)
             if not stages & KEPT and not is_sound(t, m, at_home):
                 return s
@@ -112,9 +124,12 @@ def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, st
                         o.links[k, c] = 0.0
             inverse_dynamics(t, m, inertial, gravity, o)
             constraint_forces(t, m, o)
-            for d in range(drives):
-                found[s, coordinates + d] = o.efforts[d]
-            joint_friction(t, m, o, rubs, found[s, coordinates + drives:])
+            if not stages & KEPT:
+                own = efforts[:, s]
+                for d in range(given.shape[2]):
+                    own[TRANSMITTED, d] = o.efforts[d]
+                joint_friction(t, m, o, friction, own[JOINT_EFFORT])
+                actuator_efforts(actuators, given[1, s], given[2, s], own)
     return -1
 
 
@@ -140,6 +155,10 @@ class Evaluation:
         self._lengths = length_of(Motion, self.sizes), length_of(Loads, self.sizes)
         self._no_bodies = np.zeros((len(t.joints), 10))
         self._friction = NO_FRICTION, np.array(NO_FRICTION[:2]), np.array(NO_FRICTION[2:])
+        drives = len(t.drives)
+        self._no_motion, self._no_efforts = np.empty((3, 0, drives)), np.empty((EFFORTS, 0, drives))
+        self._no_actuators = np.zeros((OF_DRIVE, drives))
+        self._no_actuators[WIDTH] = 1.0
 
     @cached_property
     def at_home(self) -> Array:
@@ -213,10 +232,11 @@ class Evaluation:
             joint_friction(self.tables, m, o, friction, found.T)
         return found
 
-    def found(self, motion: tuple[Array, Array, Array], inertial: Array, gravity: Array,
-              friction: JointFriction, start: Array | None = None,
-              nearby: Array | None = None) -> Found | None:
-        """Return what is needed for a motion, with nothing kept of the way there.
+    def inverse_dynamics(self, motion: tuple[Array, Array, Array], inertial: Array,
+                         gravity: Array, friction: JointFriction,
+                         actuators: Array | None = None, start: Array | None = None,
+                         nearby: Array | None = None) -> InverseDynamicsResult | None:
+        """Return the efforts for a motion of the drives, in one pass that stores nothing else.
 
         Parameters
         ----------
@@ -225,23 +245,24 @@ class Evaluation:
         inertial : (J + 1, 10) array
         gravity : (3,) array
         friction : JointFriction
+        actuators : (OF_DRIVE, D) array, optional
+            See `actuator_efforts`; without it the drives have no rotor and no friction.
         start, nearby : (N, C) and (C,) arrays, optional
             See `follow`.
 
         Returns
         -------
-        Found or None
-            None where a sample cannot be or is too near a singularity: `follow` tells which.
+        InverseDynamicsResult or None
+            None where a sample is out of reach or too near a singularity: `follow` says which.
         """
         given = np.array(motion)
         samples, drives = given.shape[1:]
-        count = len(self.home)
-        table = np.empty((samples, count + 2 * drives))
-        rows = np.empty((1, self._lengths[0]))
-        if self._run(given, start, rows, MOTION | FORCES, gravity, nearby, inertial,
-                     np.empty((1, self._lengths[1])), friction, table) >= 0:
-            return None
-        return Found(table[:, :count], table[:, count:count + drives], table[:, count + drives:])
+        closed, efforts = np.empty((samples, len(self.home))), np.empty((EFFORTS, samples, drives))
+        failed = self._run(
+            given, start, np.empty((1, self._lengths[0])), MOTION | FORCES, gravity, nearby,
+            inertial, np.empty((1, self._lengths[1])), friction,
+            self._no_actuators if actuators is None else actuators, closed, efforts)
+        return None if failed >= 0 else InverseDynamicsResult(closed, efforts)
 
     def twists(self, rows: Array) -> tuple[Array, Array]:
         """Return angular and linear velocities of links per rate of drives, (N, J + 1, 3, D)."""
@@ -258,13 +279,14 @@ class Evaluation:
     def _run(self, given: Array | None, start: Array | None, rows: Array, stages: int,
              gravity: Array, nearby: Array | None, inertial: Array | None = None,
              loads: Array | None = None, friction: JointFriction = NO_FRICTION,
-             found: Array | None = None) -> int:
+             actuators: Array | None = None, closed: Array | None = None,
+             efforts: Array | None = None) -> int:
         """Evaluate stages, and return the first sample that fails or -1; see `_evaluate`."""
-        drives = len(self.tables.drives)
-        if found is None:
-            found = np.empty((len(rows), len(self.home) + 2 * drives))
+        if closed is None or efforts is None or actuators is None:
+            closed, efforts, actuators = (
+                np.empty((len(rows), len(self.home))), self._no_efforts, self._no_actuators)
         if given is None:
-            given = np.empty((3, 0, drives))
+            given = self._no_motion
         if loads is None or inertial is None:
             loads, inertial = np.empty((len(rows), self._lengths[1])), self._no_bodies
         last = self._friction
@@ -276,40 +298,44 @@ class Evaluation:
                  self.home if start is None or not len(start) else start[0])
         arguments = (
             *self.packed, self.home, at_home, np.array(first), given, rows, inertial, gravity,
-            loads, last[1], last[2], found, stages, warm)
-        loop = compiled_or_none(_evaluate, len(found))
+            loads, last[1], last[2], actuators, closed, efforts, stages, warm)
+        loop = compiled_or_none(_evaluate, len(closed))
         if loop is not None:
             return int(loop(*arguments))
-        if len(found) <= TREE_FEW:
+        if len(closed) <= TREE_FEW:
             try:
                 return _evaluate(*arguments)
             except (ZeroDivisionError, OverflowError, ValueError):
                 pass  # arrays answer with infinities instead
         with np.errstate(all='ignore'):
             return self._run_on_arrays(given, start, rows, stages, gravity, at_home, inertial,
-                                       loads, friction, found)
+                                       loads, friction, actuators, closed, efforts)
 
     def _run_on_arrays(self, given: Array, start: Array | None, rows: Array, stages: int,
                        gravity: Array, at_home: Array, inertial: Array, loads: Array,
-                       friction: JointFriction, found: Array) -> int:
-        t, count, drives = self.tables, len(self.home), len(self.tables.drives)
+                       friction: JointFriction, actuators: Array, closed: Array,
+                       efforts: Array) -> int:
+        t = self.tables
         if not stages & KEPT:
-            rows, loads = (np.zeros((len(found), each.shape[1])) for each in (rows, loads))
+            rows, loads = (np.zeros((len(closed), each.shape[1])) for each in (rows, loads))
         m, o = samples_last(self.motion(rows)), samples_last(self.loads(loads))
+        q, v, a = np.moveaxis(given, 1, -1)
         if stages & MOTION:
-            q, v, a = np.moveaxis(given, 1, -1)
             if not reach(t, m, self.home if start is None else start.T, q):
                 size = m.solution[OPEN]
                 return int(np.argmax(~(size < np.inf) | (size == np.max(size))))
             follow(t, m, v, a)
-            found[:, :count] = m.q.T
+            closed[:] = m.q.T
             if not stages & KEPT and not is_sound(t, m, at_home):
                 return 0
         if stages & FORCES:
             inverse_dynamics(t, m, inertial, gravity, o)
             constraint_forces(t, m, o)
-            found[:, count:count + drives] = o.efforts.T
-            joint_friction(t, m, o, friction, found[:, count + drives:].T)
+            if not stages & KEPT:
+                own = np.moveaxis(efforts, 1, -1)
+                own[TRANSMITTED] = o.efforts
+                joint_friction(t, m, o, friction, own[JOINT_EFFORT])
+                actuator_efforts(actuators, v, a, own)
         return -1
 
 

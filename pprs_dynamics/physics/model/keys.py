@@ -190,7 +190,10 @@ AXIS_KEYS: dict[str, Key] = {key.name: key for key in (
 )}
 
 
-EFFORT_UNITS = ('N m', 'N', 'A')
+# Units of recorded efforts, and what they are in N m or N; amperes are multiplied by the gain.
+EFFORT_UNITS = {'N m': 1.0, 'N': 1.0, 'A': 1.0, 'mN m': 1e-3, 'mN': 1e-3, 'kN m': 1e3, 'kN': 1e3,
+                'N cm': 1e-2, 'kgf cm': 0.0980665, 'kgf m': 9.80665, 'kgf': 9.80665,
+                'lbf in': 0.1129848290276167}
 # Blocks of mechanisms: a serial arm, and a robot that may have loops. What the first names joints
 # the second names drives.
 ARM, ROBOT, AXIS = 'arm', 'robot', 'axis'
@@ -254,7 +257,7 @@ def mechanism_keys(block: str, count: int) -> dict[str, Key]:
         drives(f'{block}.gear_ratio', 'turns of the motor per turn of the joint; without it, as '
                'the URDF says, else 1', '', positive=True, **described),
         Key(f'{block}.effort_unit', f'unit of the efforts of recordings; A: times {block}.gain',
-            choices=EFFORT_UNITS, default=EFFORT_UNITS[0]),
+            choices=tuple(EFFORT_UNITS), default='N m'),
         Key(f'{block}.gravity', 'gravity in the base; without it, as an MJCF says, else -9.81 '
             'along z', 'm/s^2', size=3, **described),
         drives(f'{block}.armature', 'inertia of the rotor, seen at the joint; without it, as the '

@@ -21,7 +21,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import MISSING, ModelError
-from pprs_dynamics.physics.effects.effect import ARM, SINGLE_AXIS, CatalogueEffect
+from pprs_dynamics.physics.effects.effect import ARM, SINGLE_AXIS, CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
@@ -33,10 +33,23 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tool_pose import ToolPose
-from pprs_dynamics.physics.mechanism.tree_equations import WORST_CONDITION, JointFriction
-from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION
+from pprs_dynamics.physics.mechanism.tree_equations import (
+    ARMATURE,
+    COULOMB,
+    DRIVE_FRICTION,
+    JOINT_EFFORT,
+    OF_DRIVE,
+    OFFSET,
+    RIGID,
+    TOTAL,
+    VISCOUS,
+    WIDTH,
+    WORST_CONDITION,
+    JointFriction,
+)
+from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
 from pprs_dynamics.physics.model.effects_block import added_effects
-from pprs_dynamics.physics.model.force_model import ForceModel, Forces, ModelState
+from pprs_dynamics.physics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
 from pprs_dynamics.physics.model.keys import ARM as ARM_BLOCK
 from pprs_dynamics.physics.model.keys import AXIS as AXIS_BLOCK
 from pprs_dynamics.physics.model.keys import (
@@ -261,14 +274,64 @@ class MechanismModel(ForceModel):
         With a state the loops close from where they were at its last sample, where that is near.
         """
         self._require_motion(motion)
+        structure, added = self.robot.structure, self._added
+        if isinstance(motion, JointMotion) and added is not None:
+            found = structure.evaluation.inverse_dynamics(
+                (motion.position, motion.velocity, motion.acceleration), self.robot.by_joint,
+                self.robot.gravity_row, self._joint_friction, self._actuators,
+                nearby=None if state is None else state.closed.get(structure))
+            if found is not None:
+                if state is not None and structure.loops and len(motion):
+                    state.closed[structure] = found.q[-1].copy()
+                if added:
+                    return self._with_effects(added, self._parts(found),
+                                              self._state(motion, found), state)
+                if state is not None:
+                    state.advance(motion.time, self.initial_state)
+                return Forces(found.efforts[TOTAL], lambda: self._parts(found),
+                              lambda: self._state(motion, found))
         if state is None:
             state = self.initial_state()
         with np.errstate(over='ignore', invalid='ignore'):
             mechanism = self.mechanism(motion, state.closed)
             forces = self.forces_at(mechanism, state)
-        if len(motion) and self.robot.structure.loops:
-            state.closed[self.robot.structure] = mechanism.closed[-1].copy()
+        if len(motion) and structure.loops:
+            state.closed[structure] = mechanism.closed[-1].copy()
         return forces
+
+    @cached_property
+    def _added(self) -> tuple[Effect, ...] | None:
+        """Effects beside the model's own friction; None where one of them changes the bodies."""
+        own = AxisFriction, AxisOffset, ModelJointFriction
+        added = tuple(effect for effect in self.effects if not isinstance(effect, own))
+        return None if any(isinstance(effect, BodyEffect) for effect in added) else added
+
+    @cached_property
+    def _actuators(self) -> Array:
+        """Rotors and friction of the drives, see `actuator_efforts`."""
+        actuators = np.zeros((OF_DRIVE, len(self.drives)))
+        actuators[ARMATURE] = self.robot.armature
+        actuators[WIDTH] = self.reversal.velocity
+        for effect in self.effects:
+            if isinstance(effect, AxisFriction):
+                actuators[VISCOUS], actuators[COULOMB] = effect.viscous, effect.coulomb
+            elif isinstance(effect, AxisOffset):
+                actuators[OFFSET] = effect.value
+        return actuators
+
+    def _parts(self, found: InverseDynamicsResult) -> dict[str, Array]:
+        """Return the parts of efforts by name, in the order of the effects."""
+        offset = self._actuators[OFFSET] + np.zeros_like(found.efforts[TOTAL])
+        own = {AxisFriction.name: found.efforts[DRIVE_FRICTION], AxisOffset.name: offset,
+               ModelJointFriction.name: found.efforts[JOINT_EFFORT]}
+        return {RIGID_BODY: found.efforts[RIGID],
+                **{effect.name: own[effect.name] for effect in self.effects if effect.name in own}}
+
+    def _state(self, motion: JointMotion, found: InverseDynamicsResult) -> MechanismState:
+        """Return the state of the mechanism whose efforts are known already."""
+        state = self.mechanism(motion)
+        vars(state).update(found=found, rigid_force=found.efforts[RIGID])
+        return state
 
     def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
                          seed: JointMotion | None = None) -> JointMotion:

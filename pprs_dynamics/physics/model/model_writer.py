@@ -47,7 +47,7 @@ from pprs_dynamics.physics.model.parameter_file import (
 )
 from pprs_dynamics.physics.model.reference_keys import moved
 from pprs_dynamics.physics.model.uncertainties import UNCERTAINTIES
-from pprs_dynamics.system.bounded_yaml import check_bounds, check_size
+from pprs_dynamics.system.bounded_yaml import check_size, parse
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.package_files import located
 
@@ -95,7 +95,7 @@ def write_model(path: str | PathLike[str], values: Mapping[str, Any],
                           {**kept_parameters(base), **values}, str(path))
     # What could not be read again is not written.
     check_size(text.encode('utf-8'), path)
-    check_bounds(text, path)
+    parse(text, path)
     write_text(path, text)
 
 

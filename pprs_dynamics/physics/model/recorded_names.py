@@ -6,8 +6,9 @@
 A model file may hold `joint_prefix`, `joint_map: {DRIVE: JOINT}` and `columns: {time: COLUMN,
 time_scale: NUMBER, rate: NUMBER, decimal: ",", files: {position: FILE, …}, DRIVE: {position:
 COLUMN, velocity: COLUMN, effort: COLUMN or current: COLUMN, temperature: COLUMN, pressure: COLUMN,
-scale: NUMBER, position_scale: NUMBER, velocity_scale: NUMBER}}`, a `temperature: COLUMN` or
-`pressure: COLUMN` of the whole machine there, and `effort_kind`: what efforts are.
+effort_scale: NUMBER, position_scale: NUMBER, position_offset: NUMBER, velocity_scale: NUMBER,
+effort_sign_bit: NUMBER}}`, a `temperature: COLUMN` or `pressure: COLUMN` of the whole machine
+there, and `effort_kind`: what efforts are.
 """
 
 from __future__ import annotations
@@ -22,13 +23,15 @@ from pprs_dynamics.physics.model.keys import is_gain
 
 PREFIX, MAP, COLUMNS = 'joint_prefix', 'joint_map.', 'columns.'
 TIME, FILES = 'time', 'files.'
+LARGEST_BIT = 31
 QUANTITIES = ('position', 'velocity', 'effort', 'current', *CHANNELS)
-SCALES = ('scale', 'position_scale', 'velocity_scale')
+SCALES = ('effort_scale', 'position_scale', 'velocity_scale')
+OFFSET, SIGN_BIT = 'position_offset', 'effort_sign_bit'
 OF_TABLE = (TIME, 'time_scale', 'rate', 'decimal', *CHANNELS)
 OF_FILES = (TIME, *QUANTITIES)
 EFFORT_KIND = 'effort_kind'
-MEASURED, CURRENT, COMMANDED, WITHOUT_GRAVITY = EFFORT_KINDS = (
-    'measured', 'current', 'commanded', 'without_gravity')
+MEASURED, CURRENT, COMMANDED, WITHOUT_GRAVITY, EXTERNAL = EFFORT_KINDS = (
+    'measured', 'current', 'commanded', 'without_gravity', 'external')
 
 
 def joint_names(values: Mapping[str, Any], drives: Sequence[str]) -> tuple[str, ...]:
@@ -113,9 +116,12 @@ def recorded_columns(values: Mapping[str, Any], drives: Sequence[str]) -> Record
         effort, position, velocity = (
             _factor(f'{drive}.{scale}', given[f'{drive}.{scale}'])
             if f'{drive}.{scale}' in given else None for scale in SCALES)
+        offset, bit = (given.get(f'{drive}.{key}') for key in (OFFSET, SIGN_BIT))
         # Degrees of a position are those of its velocity, but where that says otherwise.
-        found[drive] = DriveColumns(names, effort or 1.0, position or 1.0,
-                                    velocity or position or 1.0)
+        found[drive] = DriveColumns(
+            names, effort or 1.0, position or 1.0, velocity or position or 1.0,
+            0.0 if offset is None else _factor(f'{drive}.{OFFSET}', offset, may_be_zero=True),
+            None if bit is None else _bit(f'{drive}.{SIGN_BIT}', bit))
     if given.get('decimal', '.') not in ('.', ','):
         raise ModelError(f'{COLUMNS}decimal', given['decimal'], 'be "." or ","')
     rate = _factor('rate', given['rate']) if 'rate' in given else None
@@ -139,9 +145,10 @@ def _require_known(key: str, drives: Sequence[str]) -> None:
     drive, _, quantity = key.partition('.')
     if drive not in drives:
         raise UnknownNameError('drive', drive, (*drives, *OF_TABLE, 'files'), f'{COLUMNS}{key}')
-    if quantity not in (*QUANTITIES, *SCALES):
+    known = (*QUANTITIES, *SCALES, OFFSET, SIGN_BIT)
+    if quantity not in known:
         raise UnknownNameError('key', f'{COLUMNS}{key}', [
-            f'{COLUMNS}{drive}.{one}' for one in (*QUANTITIES, *SCALES)])
+            f'{COLUMNS}{drive}.{name}' for name in known])
 
 
 def _column(key: str, value: Any) -> Column:
@@ -163,8 +170,15 @@ def _word(key: str, value: Any, may_be_empty: bool = False) -> str:
     return value
 
 
-def _factor(key: str, value: Any) -> float:
+def _factor(key: str, value: Any, may_be_zero: bool = False) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or (
-            not math.isfinite(value) or value == 0):
-        raise ModelError(f'{COLUMNS}{key}', value, 'be a finite number other than 0')
+            not math.isfinite(value) or (value == 0 and not may_be_zero)):
+        raise ModelError(f'{COLUMNS}{key}', value, 'be a finite number'
+                         + ('' if may_be_zero else ' other than 0'))
     return float(value)
+
+
+def _bit(key: str, value: Any) -> int:
+    if isinstance(value, bool) or value not in range(1, LARGEST_BIT + 1):
+        raise ModelError(f'{COLUMNS}{key}', value, f'be the number of a bit, 1 to {LARGEST_BIT}')
+    return int(value)

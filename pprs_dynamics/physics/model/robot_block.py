@@ -165,7 +165,7 @@ def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[st
     drives = [joints[name] for name in structure.drives]
     found: dict[str, Any] = {
         f'{block}.gear_ratio': tuple(joint.reduction or 1.0 for joint in drives),
-        f'{block}.gravity': _gravity(structure),
+        f'{block}.gravity': described_gravity(structure),
         f'{block}.armature': tuple(joint.armature for joint in drives),
         'friction.viscous': tuple(joint.damping for joint in drives),
         'friction.coulomb': tuple(joint.dry for joint in drives)}
@@ -191,7 +191,7 @@ def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[st
     return found
 
 
-def _gravity(structure: Structure) -> tuple[float, ...]:
+def described_gravity(structure: Structure) -> tuple[float, ...]:
     """Return gravity in the base, turned from the frame of the description's root."""
     description = structure.description
     hung = {joint.child for joint in description.joints.values()}

@@ -285,7 +285,7 @@ class TreePositions:
     names : tuple of J str
         Joints.
     base : str
-        The link that free bodies are told on.
+        The link to which free bodies are attached.
     bodies : tuple of F str
         Links of the free bodies.
 

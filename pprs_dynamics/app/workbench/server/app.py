@@ -153,7 +153,7 @@ class Api:
             session, version = hub.session, hub.log.version
             state = {'failure': hub.failure,
                      'is_beginning': hub.is_beginning, 'has_live': hub.live is not None,
-                     'has_folders': bool(hub.offered.folders or hub.offered.surveyed),
+                     'has_folders': bool(hub.offered.folders),
                      'is_empty': session is None,
                      **(session.to_dict() if session else units_to_dict(hub.inputs.model))}
             state['drawn'] = [state.get(key) for key in ('fitted_since', 'revision', 'stage')]
@@ -255,11 +255,10 @@ class Api:
 
     def files(self, query: Any) -> Response:
         """Answer what may be opened."""
-        return JSONResponse({'files': self.hub.offered.in_folders(),
-                             'surveyed': self.hub.offered.in_surveys()})
+        return JSONResponse({'files': self.hub.offered.in_folders()})
 
     def open(self, body: Fields) -> Response:
-        """Open a recording of the folders and surveys that were given."""
+        """Open a recording of the folders that were given."""
         self.hub.open(self.hub.offered.path(body.text('name')), body.get('is_held_out') is True)
         return self.screen(body)
 
