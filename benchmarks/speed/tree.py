@@ -90,7 +90,7 @@ def steps(rounds: int) -> None:
     bodies = robot.by_joint, robot.gravity_row
 
     def kept() -> None:
-        rows, _ = evaluation.follow(*given)
+        rows, _ = evaluation.forward_kinematics(*given)
         evaluation.forces(rows, *bodies)
 
     _print('hexapod, one motion', _rounds({

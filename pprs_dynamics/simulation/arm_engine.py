@@ -65,7 +65,7 @@ class ArmEngine:
         robot = self.robot = self.described = model.robot
         structure = self.structure = robot.structure
         path = Path(structure.description.path)
-        is_mjcf = bool(model.values.get(f'{model.block}.mjcf'))
+        is_mjcf = bool(model.values.get('robot.mjcf'))
         links = structure.description.links
         refused = {} if is_mjcf else {name: parameters for name, parameters in links.items()
                                       if structure.links[name][0] and not _is_body(parameters)}
@@ -154,7 +154,7 @@ class ArmEngine:
             return
         k, drive = np.unravel_index(int(np.argmax(off)), off.shape)
         raise ModelError(
-            f'{model.block}.{"mjcf" if model.values.get(f"{model.block}.mjcf") else "urdf"}',
+            "robot.mjcf" if model.values.get("robot.mjcf") else "robot.urdf",
             structure.description.path, f'give one effort of {structure.drives[drive]}, but at '
             f'{motion.position[k].round(4).tolist()} it is {ours[k, drive]:.6g} in the model and '
             f'{theirs[k, drive]:.6g} in MuJoCo: please report this file')

@@ -8,8 +8,10 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import shutil
 import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
@@ -275,3 +277,22 @@ def test_a_name_that_would_fill_the_screen_is_shortened(
         assert main([part.format('a' * 5000) for part in place]) == 2
     said = capsys.readouterr().err
     assert 0 < len(said) < 900
+
+
+def test_without_a_terminal_progress_is_a_line_on_stderr_from_time_to_time(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:
+    from pprs_dynamics.app.report import terminal
+
+    monkeypatch.setattr(terminal, 'LOGGED_EVERY', 0.02)
+    with terminal.staged_bar(terminal.console()) as progress:
+        progress('diagnosing', 0.25)
+        deadline = time.monotonic() + 10.0
+        said = ''
+        while 'diagnosing 25%' not in said and time.monotonic() < deadline:
+            said += capsys.readouterr().err
+    assert re.search(r'^diagnosing 25% after \d+ s$', said, re.M)
+    time.sleep(0.1)
+    capsys.readouterr()
+    time.sleep(0.1)
+    assert capsys.readouterr().err == ''

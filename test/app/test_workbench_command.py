@@ -44,6 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_without_a_recording_it_waits_for_one(folder: Path) -> None:
     with workbench(folder / 'data', folder=folder) as bench:
         bench.enter()

@@ -311,6 +311,7 @@ def test_the_node_starts_with_the_written_file(
         assert process.poll() is None
 
 
+@pytest.mark.slow
 def test_the_loop_walks_by_itself_until_nothing_is_left(
     score: ModuleType, tmp_path: Path,
 ) -> None:

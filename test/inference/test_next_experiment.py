@@ -399,6 +399,7 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
 
 # The command.
 
+@pytest.mark.slow
 def test_commission_writes_poses_json_and_page(tmp_path: Path) -> None:
     done = pprs('next-experiment', '--purpose', 'commission', '--output', 'first.csv',
                 '--duration', '5', '--json', 'first.json', '--report', 'first.html',

@@ -51,8 +51,8 @@ def described(folder: Path) -> Path:
                 + '<mimic joint="slide" multiplier="-1" offset="1.5"/>')
         + f'<link name="l3">{BODY.format(1.5)}</link></robot>')
     path = folder / 'robot.yaml'
-    path.write_text('/**:\n  ros__parameters:\n    arm: {urdf: robot.urdf, base: plate, tool: l3, '
-                    'joints: [j1]}\n')
+    path.write_text('/**:\n  ros__parameters:\n    robot: {urdf: robot.urdf, base: plate, '
+                    'tool: l3, drives: [j1], locked: {slide: 0.5}}\n')
     return path
 
 
@@ -74,7 +74,7 @@ def _loaded(path: Path, engine: ArmEngine) -> MechanismModel:
     return replace(MechanismModel.load(path), robot=engine.robot)
 
 
-def locked_at_zero(self: object, joint: object, home: object) -> float:
+def locked_at_zero(self: object, joint: object) -> float:
     return 0.0
 
 
@@ -95,9 +95,8 @@ def test_faults_of_the_model_are_seen(tmp_path: Path, fault: str,
     elif fault == 'a_follower_ignores_its_offset':
         whole = structure._Builder._locked_position
 
-        def without_offset(self: structure._Builder, joint: structure.Joint,
-                           home: dict[str, float]) -> float:
-            return 0.0 if joint.mimic is not None else whole(self, joint, home)
+        def without_offset(self: structure._Builder, joint: structure.Joint) -> float:
+            return 0.0 if joint.mimic is not None else whole(self, joint)
 
         monkeypatch.setattr(structure._Builder, '_locked_position', without_offset)
     else:

@@ -796,8 +796,8 @@ def test_stops_end_the_strokes() -> None:
 # What a true motion, or a load, is handed over in, and names; an arm's come from its model, and so
 # do the numbers that MuJoCo takes.
 CONTAINERS = (
-    'pprs_dynamics.drives', 'pprs_dynamics.physics.effects.former_names',
-    'pprs_dynamics.physics.mechanism.motion', 'pprs_dynamics.physics.mechanism.joint_motion',
+    'pprs_dynamics.drives', 'pprs_dynamics.physics.mechanism.motion',
+    'pprs_dynamics.physics.mechanism.joint_motion',
     'pprs_dynamics.physics.mechanism.structure_load',
     'pprs_dynamics.physics.mechanism.joint_series', 'pprs_dynamics.physics.model.mechanism_model',
     'pprs_dynamics.physics.model.limits')

@@ -5,7 +5,7 @@
 
 Each joint moves from rest to rest, from the middle of its range, within the limits of the URDF;
 whether links touch each other is not looked at. To excite inertia and friction that one of many
-series is taken which tells most of what `pprs fit` determines, by the determinant of the
+series is taken which determines most of what `pprs fit` estimates, by the determinant of the
 information (D-optimal).
 
 References
@@ -32,7 +32,7 @@ from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 HARMONICS = 8  # of the duration
 WIDEST = np.pi  # [rad, m]: a joint is not moved further from the middle, whatever its range
-LOOKED_AT = 150  # samples of a motion, for its efforts and for what it tells
+LOOKED_AT = 150  # samples of a motion, for its efforts and its information
 CHECKED = 2000  # samples at which limits are checked
 DRAWN = 40  # motions drawn at random
 SHRINKS, SHRINK = 40, 0.93  # until a motion keeps the limits
@@ -42,7 +42,7 @@ NOISE = 0.01  # of a joint's largest effort, standard deviation where the model 
 
 @dataclass(frozen=True)
 class ArmLimits:
-    """Limits of a motion beside those of the URDF.
+    """Limits of a motion in addition to those of the URDF.
 
     Parameters
     ----------
@@ -173,7 +173,8 @@ class ArmExcitation:
     model : MechanismModel
     series : JointSeries
     determined, total : int
-        Numbers of links, rotors and friction that it tells better than the description, and all.
+        Combinations of parameters of links, rotors and friction that it determines better than the
+        description, and all.
     limits : dict of str to float
         Use of each limit, its margin taken off: at most 1.
     """
@@ -204,7 +205,7 @@ class ArmExcitation:
 
 def excite_arm(model: MechanismModel, limits: ArmLimits, duration: float, seed: int,
                progress: Callable[[float], None] | None = None) -> ArmExcitation:
-    """Return a motion that tells most of an arm's numbers.
+    """Return the most informative motion about an arm's parameters.
 
     Parameters
     ----------
@@ -225,7 +226,7 @@ def excite_arm(model: MechanismModel, limits: ArmLimits, duration: float, seed: 
 
 
 class _Information:
-    """What motions tell of an arm's numbers.
+    """Information of motions about an arm's parameters.
 
     Parameters
     ----------
@@ -244,7 +245,7 @@ class _Information:
             for unit in np.eye(self.count)])
 
     def of(self, found: JointSeries) -> Array:
-        """Return by how much each combination is told better than by the description, squared."""
+        """Return the squared gain in precision of each combination over the description."""
         motion = found.motion(np.linspace(0, self.duration, LOOKED_AT))
         count = len(self.effort)
         rows = self.model.robot.regressor(motion.position, motion.velocity, motion.acceleration)

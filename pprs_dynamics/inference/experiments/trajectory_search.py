@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The search for the motion that tells most, within what the robot may do.
+"""The search for the most informative motion within the robot's limits.
 
 Random series, each blown up until it meets a limit, are compared first; the best is improved by
 steps (`climbing`), and checked at the rate at which it is played. Limits of an arm are in
@@ -63,7 +63,7 @@ class Found:
     ----------
     path : FourierPath or JointSeries
     gram : (P, P) array
-        What it would tell.
+        Its information.
     uses : mapping of str to float
         Of the limits, 1 is all.
     value : float
@@ -78,7 +78,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Drawn:
-    """A random motion, what it would tell, nearly, (P, P), and its value."""
+    """A random motion, its approximate information (P, P), and its value."""
 
     path: FourierPath
     gram: Array
@@ -218,7 +218,7 @@ class TrajectorySearch:
         return forces_of(self._lenient, paths, time)
 
     def _gram(self, path: FourierPath) -> Array:
-        """Return what a path would tell."""
+        """Return the information of a path."""
         return self.question.grams(self._forces([path], self._time), self._time, self.duration)[0]
 
     def _beside(self, path: FourierPath, step: float, random: np.random.Generator) -> FourierPath:
@@ -230,7 +230,7 @@ class TrajectorySearch:
             x + step * np.abs(x).max() * random.normal(size=len(x)))), NEARBY)
 
     def _centre(self) -> tuple[float, float, float]:
-        """Return the home pose, or the middle of the lifts' strokes where home leaves no room."""
+        """Return the home pose, or the middle of the lifts' strokes if home is at a limit."""
         limits, geometry = self.question.model.limits, self.question.model.robot.geometry
         lean = (geometry.base_radius - geometry.platform_radius * float(np.mean(np.cos(
             np.subtract(geometry.platform_angles, geometry.chain_angles))))) / geometry.rod_length

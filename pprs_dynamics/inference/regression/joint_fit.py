@@ -45,6 +45,7 @@ LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
 CONVERGED, MOST_ROUNDS = 0.01, 40
 NOISE_STEPS = 3  # of the noise in a round: fitted to its end, rounds take a quarter longer
 MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
+MOST_PRODUCTS = 4000  # products of blocks on a drive that are kept: some 10 kB each
 MOST_EQUATIONS = 100  # of drives that are kept: some 0.2 to 1 MB each
 
 
@@ -199,17 +200,23 @@ class Regression:
 
         Of those that are not known all at once: a call is dearer than a product.
         """
+        known: dict[Block | None, Array] = {}
         for b in others:
-            if b is not None and (b, a, d) in self._products:
-                self._products[a, b, d] = self._products[b, a, d].transpose(0, 2, 1)
-        new = [b for b in others if (a, b, d) not in self._products]
+            if (found := self._products.get((a, b, d))) is not None:
+                known[b] = found
+            elif b is not None and (turned := self._products.get((b, a, d))) is not None:
+                known[b] = turned.transpose(0, 2, 1)
+        new = [b for b in others if b not in known]
         if new:
             rows = [self.base[d] if b is None else b.rows[d] for b in new]
             found = self.series[d].products(a.rows[d], np.concatenate(rows))
             for b, part in zip(new, np.split(found, np.cumsum(list(map(len, rows)))[:-1], axis=2),
                                strict=True):
-                self._products[a, b, d] = part
-        return [self._products[a, b, d] for b in others]
+                self._products[a, b, d] = known[b] = part
+            if len(self._products) > MOST_PRODUCTS:
+                for key in list(self._products)[:MOST_PRODUCTS // 2]:  # computed first
+                    self._products.pop(key, None)
+        return [known[b] for b in others]
 
     def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
         """Return the equations of a drive, kept: sets that follow each other differ on few."""
@@ -221,8 +228,9 @@ class Regression:
         return found
 
     def release(self) -> None:
-        """Let go of equations; they are made again, of products that are kept."""
+        """Forget equations and products, which are computed again where a fit needs them."""
         self._equations.clear()
+        self._products.clear()
 
     def fit(self, blocks: Sequence[Block], start: Array | None = None) -> JointFit:
         """Return the fit of blocks beside the base columns, the noise fitted with it.

@@ -21,7 +21,6 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.effects_block import added_effects
 from pprs_dynamics.physics.model.force_model import ForceModel, Forces, ModelState
-from pprs_dynamics.physics.model.former_names import with_general_names
 from pprs_dynamics.physics.model.keys import KEYS, is_axis, is_mechanism, title_of
 from pprs_dynamics.physics.model.limits import Limits
 from pprs_dynamics.physics.model.one_pass import OnePass
@@ -95,7 +94,6 @@ class DriveModel(ForceModel):
                 raise ModelError(other, parameters[other], 'not be given: this needs a 3-PPRS, and '
                                  f'{title_of(parameters)} is for pprs compare, diagnose, adopt, '
                                  'fit and history')
-            parameters = with_general_names(parameters)
             values = checked_values(parameters)
             for stroke in ('limits.slide_stroke', 'limits.lift_stroke'):
                 if not values[stroke][0] < values[stroke][1]:
