@@ -229,7 +229,7 @@ def test_a_wrench_on_guides_that_feel_it_hides_no_effect_and_makes_none() -> Non
 
 def test_coulomb_and_viscous_friction_are_two_and_not_one_that_is_asymmetric() -> None:
     hidden = {'coulomb_friction': {'lift_1': {'force': 0.5}},
-              'viscous_friction': {'lift_1': {'coefficient': 6.0}}}
+              'viscous_friction': {'lift_1': {'coefficient': 12.0}}}
     found = tabulate(MODEL, [recording_of(hidden)], DECISIONS)
     assert names(found.best.fitted) == ['coulomb_friction', 'viscous_friction']
     assert found.rivals(DECISIONS.rival_margin) == []

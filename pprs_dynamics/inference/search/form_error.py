@@ -22,7 +22,7 @@ from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 # Independent shapes over which a form error is spread, of which a candidate is one.
-DIRECTIONS = 12
+DIRECTIONS = 4
 # Ends of the names of coefficients that are of one direction, and of the other.
 SIDES = {'forward': 'backward', 'backward': 'forward', 'driving': 'driven_back',
          'driven_back': 'driving'}
@@ -115,7 +115,9 @@ class FormErrors:
             return sum(self._square(fitted, block, set(block.rows)) for block in blocks)
         index = fitted.fit.index_of(blocks)
         c = fitted.fit.coefficients[index]
-        return float(c @ np.linalg.solve(fitted.fit.covariance[np.ix_(index, index)], c))
+        # Constraints hold some coefficients, of which the variance is 0.
+        inverse = np.linalg.pinv(fitted.fit.covariance[np.ix_(index, index)], hermitian=True)
+        return float(c @ inverse @ c)
 
     def _square(self, fitted: CandidateSet, block: Block, drives: set[int]) -> float:
         """Return the whitened square of a block's force on some drives."""
