@@ -52,11 +52,11 @@ PITCH = np.pi / 101  # [rad]: a harmonic drive ripples twice a turn of its motor
 SEEDS, NOTHING, DURATION = 3, 10, 30.0  # of the score on simulated arms
 MODEL = '''/**:
   ros__parameters:
-    arm:
+    robot:
       urdf: ur10e.urdf
       base: base_link
       tool: tool0
-      joints: [shoulder_pan_joint, shoulder_lift_joint, elbow_joint,
+      drives: [shoulder_pan_joint, shoulder_lift_joint, elbow_joint,
                wrist_1_joint, wrist_2_joint, wrist_3_joint]
       gain: [11.976, 11.976, 9.839, 10.763, 10.763, 10.763]       # [N m/A]
       gear_ratio: [101.0, 101.0, 101.0, 101.0, 101.0, 101.0]

@@ -83,7 +83,8 @@ def test_layouts_ask_for_what_the_bag_holds(
 ) -> None:
     """PlotJuggler names TOPIC/JOINT/effort, Foxglove an index: each must be there, none left."""
     monkeypatch.chdir(folder)
-    assert main(['compare', 'run.csv', '--mcap', 'out.mcap', '--overwrite']) == 0
+    (folder / 'out.mcap').unlink(missing_ok=True)
+    assert main(['compare', 'run.csv', '--mcap', 'out.mcap']) == 0
     with AnyReader([folder / 'out.mcap']) as reader:
         names = {connection.topic: tuple(reader.deserialize(data, connection.msgtype).name)
                  for connection, _, data in reader.messages() if connection.topic in EFFORTS}

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import os
 import subprocess
 import sys
@@ -24,7 +25,6 @@ from pprs_dynamics import MechanismModel, read_recording
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench import Session
-from pprs_dynamics.app.workbench import session as session_module
 from pprs_dynamics.app.workbench.background import Cancelled, EndedError, Job, run_in_process
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.long_work import DesignedMotion
@@ -32,14 +32,13 @@ from pprs_dynamics.app.workbench.masks import MOST_POINTS, drawn_samples
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.offered import Offered
 from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
-from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.ledger import read_steps
-from pprs_dynamics.physics.model.model_file import build_model, load_model
+from pprs_dynamics.physics.model.model_file import load_model
 
 FORCE = HIDDEN['effects.coulomb_friction.lift_2.force']
 MASS = HIDDEN['effects.payload_mass.mass']
@@ -89,8 +88,8 @@ def test_ticks_lower_the_error_at_once_and_find_what_was_hidden(session: Session
     told = next(one for one in session.to_dict()['effects'] if one['name'] == 'payload_mass')
     assert told['evidence'] == pytest.approx(shown.without['payload_mass'].total)
     assert told['evidence_terms'].startswith('fit + ')
-    noise = session.noise['lift_2']
-    assert session.errors()['lift_2'].now == pytest.approx(noise, rel=0.1)
+    # Noise is shown once the diagnosis has estimated it.
+    assert math.isnan(session.errors()['lift_2'].noise)
 
 
 def test_without_ticks_the_error_is_that_of_the_model(session: Session) -> None:
@@ -259,47 +258,6 @@ def names_of(session: Session) -> list[str]:
     return [one['name'] for one in session.to_dict()['recordings']]
 
 
-def test_a_model_that_changes_while_a_recording_is_added_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    session, other = short_session(tmp_path)
-    changed = build_model({**session.model.values, 'masses.payload': 0.1})
-    began: list[None] = []
-
-    def overtaken(model: Any, recordings: Any, *given: Any) -> TickFits:
-        if not began:
-            began.append(None)
-            session._use(TickFits(changed, session.fits.recordings))  # as an adoption ends
-        return TickFits(model, recordings, *given)
-
-    monkeypatch.setattr(session_module, 'TickFits', overtaken)
-    session.add(other)
-    assert session.model is changed
-    assert names_of(session) == ['one.csv', 'two.csv']
-
-
-def test_a_recording_that_is_added_while_others_are_looked_at_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    session, other = short_session(tmp_path)
-    more, looks, added = session.inputs.with_more(other), threading.Event(), threading.Event()
-
-    def slow(inputs: Inputs) -> Inputs:
-        looks.set()
-        added.wait(4.0)
-        return inputs
-
-    monkeypatch.setattr(Inputs, 'checked', slow)
-    monkeypatch.setattr(Inputs, 'with_more', lambda *given: more)
-    looking = threading.Thread(target=session.find_mistakes)
-    looking.start()
-    assert looks.wait(60)
-    session.add(other)
-    added.set()
-    looking.join()
-    assert names_of(session) == ['one.csv', 'two.csv']
-
-
 def test_a_recording_that_is_opened_while_the_first_are_read_comes_on_top(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -401,6 +359,7 @@ def test_the_session_imports_neither_ros_nor_a_server() -> None:
     assert not set(loaded) & {'rclpy', 'starlette', 'uvicorn', 'plotly', 'rich', 'matplotlib'}
 
 
+@pytest.mark.slow
 def test_the_notebook_runs_as_it_stands(capsys: pytest.CaptureFixture[str]) -> None:
     file = Path(__file__).parents[2] / 'docs' / 'workbench_session.ipynb'
     notebook = json.loads(file.read_text())
@@ -517,6 +476,7 @@ def test_a_scatter_of_a_long_recording_keeps_every_peak() -> None:
     assert drawn_samples(x[:500], y[:500]).tolist() == list(range(500))
 
 
+@pytest.mark.slow
 def test_a_reference_stays_when_a_recording_goes(tmp_path: Path) -> None:
     healthy, run, other = (write_hidden(tmp_path / f'{seed}.csv', seed, hidden={
         'effects.active': ['coulomb_friction'], 'effects.coulomb_friction.lift_2.force': 0.2})
@@ -584,6 +544,8 @@ class TestASavedSession:
     @pytest.mark.parametrize(('change', 'said'), [
         (lambda run, file: run.write_text(run.read_text() + '\n'), 'run.csv has changed since'),
         (lambda run, file: run.unlink(), 'run.csv: No such file'),
+        (lambda run, file: file.write_text(file.read_text().replace(str(run), '/dev/zero')),
+         '/dev/zero'),
         (lambda run, file: file.write_text('{'), 'session.json: '),
         (lambda run, file: file.write_text(100_000 * '['), 'session.json: .*depth'),
         (lambda run, file: file.write_text('[]'), 'is no session'),

@@ -155,6 +155,7 @@ def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects
     assert squared(last, found, exact - linear_prediction(last, found)) < 50
 
 
+@pytest.mark.slow
 def test_without_an_effect_that_bent_the_columns_the_search_begins_again() -> None:
     """What else was found may only have made good what that one did."""
     delayed = {drive: {'delay': 0.01} for drive in DRIVES}
@@ -279,6 +280,7 @@ def test_a_wrench_on_guides_that_feel_it_hides_no_effect_and_makes_none() -> Non
     assert wrench_on_guides(True, 3) == ['external_wrench']
 
 
+@pytest.mark.slow
 def test_a_wrench_on_preloaded_guides_is_mostly_told_alone() -> None:
     """Friction as if the wrench did not load the guides: a preload is all they feel.
 

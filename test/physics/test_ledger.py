@@ -148,35 +148,10 @@ def test_the_command_shows_draws_and_takes_back(
         ('coulomb_friction', 0.2, 0.1), ('base_tilt', 0.2, 0.1)]
     assert steps[1]['drives'] is None
     assert 'coulomb_friction' in (tmp_path / 'page.html').read_text()
-    done = pprs('history', str(old), '--picture', str(tmp_path / 'fall.png'))
-    assert (tmp_path / 'fall.png').read_bytes().startswith(b'\x89PNG')
     done = pprs('history', str(old), '--undo', '--output', str(new))
     assert done.returncode == 0, done.stderr
     assert model_values(read_parameters(new)) == stages[1]
     assert old.read_bytes() == content
-
-
-MISTAKES = {
-    ('--undo',): 'be given with --undo, and only then',
-    ('--output', 'x.yaml'): 'be given with --undo, and only then',
-    ('--undo', '--output', '{file}'): '--output and the model at once, must be another file',
-    ('--undo', '--output', '{folder}/none/x.yaml'): 'its folder does not exist',
-    ('--undo', '--output', '{folder}'): 'it is a folder',
-    ('--report', 'x.pdf'): 'end in .html',
-}
-
-
-@pytest.mark.parametrize('options', MISTAKES, ids=' '.join)
-def test_a_mistake_is_one_line_and_status_2(
-    stages: list[dict[str, Any]], tmp_path: Path, options: tuple[str, ...],
-) -> None:
-    file = tmp_path / 'model.yaml'
-    write_model(file, stages[1])
-    done = pprs('history', str(file), *(
-        word.format(file=file, folder=tmp_path) for word in options))
-    assert done.returncode == 2
-    assert MISTAKES[options] in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
 
 
 OLD = Path(__file__).parents[2] / 'config/paper.yaml'

@@ -269,6 +269,7 @@ def tracking(ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> dict[
             for case in cases}
 
 
+@pytest.mark.slow
 def test_each_step_of_feedforward_lowers_the_tracking_error(
     tracking: dict[str, Tracking],
 ) -> None:
@@ -279,6 +280,7 @@ def test_each_step_of_feedforward_lowers_the_tracking_error(
     assert 1e-4 < rigid < 1e-3
 
 
+@pytest.mark.slow
 def test_a_hidden_effect_costs_what_feedforward_gained(tracking: dict[str, Tracking]) -> None:
     friction = tracking[CASES[2].name].position_rms
     assert tracking['hidden'].position_rms > 1.5 * friction

@@ -22,11 +22,11 @@ from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model, load_model
-from pprs_dynamics.simulation.arm_run import draw_motion
 from pprs_dynamics.simulation.export.exported_robot import TreePositions, export_robot
 from pprs_dynamics.simulation.export.expressed import MJCF, URDF, express
 from pprs_dynamics.simulation.export.replay import DURATION, Replay, replay_excitation
 from pprs_dynamics.simulation.export.writers import closures, written
+from pprs_dynamics.simulation.mechanism_run import draw_motion
 
 EXACT = 1e-9  # of the largest effort
 NO_LOADS = {'friction.drives.coulomb': (0.0,) * 6, 'friction.revolute.coulomb': 0.0,
@@ -278,16 +278,6 @@ def test_a_single_axis(kind: str, gravity: float, tmp_path: Path) -> None:
     left = -3.165 + 20.394 * (np.tanh(v / 0.0003) - np.tanh(v / 1e-9))
     assert result['replay_error'] == pytest.approx(np.sqrt(np.mean(left ** 2)), abs=1e-3)
     assert result['replay_error'] == pytest.approx(result['expected_error'], abs=1e-9)
-
-
-def test_a_recording_is_replayed(tmp_path: Path) -> None:
-    run = str(tmp_path / 'run.csv')
-    assert main(['simulate', '--duration', '6', '--noise', '0.01', '--output', run]) == 0
-    _, result = exported('config/paper.yaml', MJCF, tmp_path, '--recording', run)
-    assert result['replay_error'] == pytest.approx(result['expected_error'], rel=1e-3)
-    # The file lacks the friction that follows loads; the model has it, as the robot has.
-    assert result['measured_error_of_model'] < 0.3 * result['measured_error']
-    assert result['replayed'] == ['run.csv']
 
 
 def test_a_body_that_cannot_be_is_refused_and_nothing_is_written(

@@ -96,8 +96,7 @@ def _experiment() -> Page:
         (Accuracy('masses.payload', 'kg', 0.02, 0.01, 0.002),), 120.0, (),
         {f'velocity of {name}': 0.1 * k + 0.3 for k, name in enumerate(DRIVES)}, 4.0, path.motion,
         lambda time: model.drive_forces(path.motion(time)), model)
-    return experiment_page(experiment, path.motion(np.arange(0.0, 4.0, 0.01)),
-                           'ros2 run pprs_dynamics play_trajectory')
+    return experiment_page(experiment, path.motion(np.arange(0.0, 4.0, 0.01)))
 
 
 def _fleet(folder: Path) -> Page:

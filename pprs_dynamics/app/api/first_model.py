@@ -445,19 +445,17 @@ def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, ba
     place = os.path.relpath(robot.resolve(), output.resolve().parent)
     slides = all(description.joints[name].kind == PRISMATIC for name in drives)
     gain = ', '.join(['1.0'] * len(drives))
-    # Of an arm, joints that are not driven stand.
-    block, listed = (('robot', 'drives') if is_mjcf or description.loops else ('arm', 'joints'))
     lines = [
         f'# Model of {robot.name}'
         + (f', read beside {", ".join(recordings[:3])}' if recordings else '')
         + '. Lines with "guessed" or "not known" are to be checked.',
         '/**:',
         '  ros__parameters:',
-        f'    {block}:',
+        '    robot:',
         f'      {"mjcf" if is_mjcf else "urdf"}: {scalar(place)}  # from the folder of this file',
         f'      base: {scalar(base)}  # the link that stands',
         f'      tool: {scalar(branch.tool)}  # the link that carries the load',
-        f'      {listed}: [{", ".join(scalar(name) for name in drives)}]  # driven, in the order '
+        f'      drives: [{", ".join(scalar(name) for name in drives)}]  # driven, in the order '
         'of all results',
         f'      effort_unit: {"N" if slides else "N m"}  # not known from the files; A where '
         'recorded efforts are currents',

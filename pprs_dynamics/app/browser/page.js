@@ -41,7 +41,7 @@
     if (dark.matches) {
       for (const [from, to] of Object.entries(ON_BLACK)) text = text.replaceAll(from, to);
     }
-    const {data, layout, frames} = JSON.parse(text);
+    const {data, layout} = JSON.parse(text);
     const ink = dark.matches ? '#ececec' : '#1a1a1a';
     const grid = dark.matches ? '#3d4248' : '#e2e2e2';
     const paper = dark.matches ? '#16181b' : '#ffffff';
@@ -54,17 +54,7 @@
     Object.assign(layout, {paper_bgcolor: paper, plot_bgcolor: paper});
     layout.font = {size: 13, color: ink, family: 'system-ui, sans-serif', ...layout.font};
     layout.hoverlabel = {font: {size: 13}, ...layout.hoverlabel};
-    // The button that is active is nearly white in Plotly, whatever the page is.
-    for (const menu of layout.updatemenus ?? []) {
-      Object.assign(menu, {bgcolor: dark.matches ? '#b9bdc2' : '#ffffff', font: {color: '#1a1a1a'}});
-    }
-    if (layout.scene) {
-      for (const name of ['xaxis', 'yaxis', 'zaxis']) {
-        layout.scene[name] = {gridcolor: grid, color: ink, backgroundcolor: paper,
-                              ...layout.scene[name]};
-      }
-    }
-    return {data, layout, frames};
+    return {data, layout};
   }
 
   // Traces of a drive are shown where the menus stand on it.
@@ -79,9 +69,8 @@
     if (drawn.has(plot)) return;
     drawn.add(plot);
     const Plotly = await plotly();
-    const {data, layout, frames} = contentOf(plot);
+    const {data, layout} = contentOf(plot);
     await Plotly.newPlot(plot, data, layout, {displayModeBar: false, responsive: true});
-    if (frames?.length) await Plotly.addFrames(plot, frames);
     if (plot.dataset.time !== undefined) link(Plotly, plot);
     plot.dataset.drawn = Math.round(performance.now());
   }

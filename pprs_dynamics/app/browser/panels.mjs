@@ -44,7 +44,7 @@ export const showVerdict = (state) => {
   if (state.little) line.append(make('b', `${state.little} · `));
   const since = reference ? `since ${reference.recordings.join(', ')} ` : '';
   line.append(`error ${since}`, make('b', fall(before, now, state)), ` · noise ${amount(noise)} ${
-    state.unit}${state.noise_is_guess ? ' (first guess)' : ''}`);
+    noise === null ? '' : state.unit}`);
   if (state.verdict) {
     line.append(` · diagnosis: ${(reference ? CHANGES : VERDICTS)[state.verdict]}`);
   }

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs survey: many recordings into a store of results, on all cores or on a cluster."""
+"""`pprs survey`: put the results of many recordings into a store."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs trend: what changed on which robot, and when."""
+"""`pprs trend`: show what changed on which robot, and when."""
 
 from __future__ import annotations
 

@@ -22,10 +22,8 @@ from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import PLAIN
 
 HEIGHT = 320  # [px], of figures that say none
-# Of plotly.js 4.1.1: lines, bars and markers. It starts four times as fast as the whole library,
-# which is in the page only where something is drawn in three dimensions.
+# plotly.js 4.1.1 with lines, bars and markers only: it starts four times as fast as the whole.
 BASIC = 'plotly-basic.min.js.gz'
-BASIC_TYPES = ('scatter', 'bar')
 # uPlot 1.6.32, for the workbench.
 CURVES, CURVES_STYLE = 'uplot.iife.min.js.gz', 'uplot.min.css'
 
@@ -66,7 +64,6 @@ class Page:
         self._body: list[str] = []
         self._figures = 0
         self._menus = 0
-        self._types: set[str] = set()
 
     def heading(self, text: str) -> None:
         """Start a section."""
@@ -202,14 +199,12 @@ class Page:
         self._figures += 1
         name = f'figure-{self._figures}'
         content = figure.to_plotly_json()
-        self._types |= {trace.get('type', 'scatter') for trace in content['data']}
         layout = content['layout']
         layout.pop('template', None)  # the page's own colours are set in the browser
         height = layout.get('height') or HEIGHT
         title = layout.get('title')
         label = caption or str(title.get('text', '') if isinstance(title, dict) else title or '')
-        data = json.dumps({'data': content['data'], 'layout': layout,
-                           'frames': content.get('frames', [])}, cls=PlotlyJSONEncoder,
+        data = json.dumps({'data': content['data'], 'layout': layout}, cls=PlotlyJSONEncoder,
                           separators=(',', ':'))
         return (f'<figure><div class="plot" id="{name}" role="img" tabindex="0" '
                 f'aria-label="{escape(label or "Figure", quote=True)}" '
@@ -221,8 +216,7 @@ class Page:
         """Return the page."""
         library = ''
         if self._figures:
-            packed = _packed(BASIC) if self._types <= set(BASIC_TYPES) else _whole_plotly()
-            library = f'<script type="text/plain" id="plotly">{packed}</script>'
+            library = f'<script type="text/plain" id="plotly">{_packed(BASIC)}</script>'
         return ('<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
                 '<meta name="viewport" content="width=device-width, initial-scale=1">'
                 f'<title>{escape(self._title)}</title><style>{asset("page.css")}</style>'
@@ -262,14 +256,6 @@ def _force(value: float | None) -> str:
 def _packed(name: str) -> str:
     """Return a compressed library of the package, in letters."""
     return base64.b64encode(files('pprs_dynamics.app.report').joinpath(name).read_bytes()).decode()
-
-
-@cache
-def _whole_plotly() -> str:
-    """Return plotly.js as it comes with plotly, compressed, in letters."""
-    from plotly.offline import get_plotlyjs
-
-    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
 
 
 @cache

@@ -33,7 +33,7 @@ FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0
 def of_other_effects(request: EffectRequest, fitted: EffectFit, diagnosis: Diagnosis) -> list[str]:
     """Return why the diagnosis does not report this effect where it was asked for.
 
-    A rival within the margin of the diagnosis is no reason: the recordings cannot tell it from
+    A rival within the margin of the diagnosis is no reason: the recordings cannot separate it from
     the reported effect.
     """
     mine = next((one for one in diagnosis.effects if one.name == request.name), None)

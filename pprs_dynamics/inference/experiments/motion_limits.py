@@ -20,7 +20,7 @@ from pprs_dynamics.physics.three_pprs.passive_friction import IndependentChainsF
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """Limits of a motion beside those of the model file.
+    """Limits of a motion in addition to those of the model file.
 
     Parameters
     ----------

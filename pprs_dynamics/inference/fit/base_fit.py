@@ -227,7 +227,7 @@ def _told(model: MechanismModel, fit: ArmFit) -> tuple[str, ...]:
     if fit.standing:
         told.append(f'{", ".join(fit.standing)} hardly moves: its friction stays as it was')
     if model.efforts_in_amperes:
-        told.append(f'efforts are currents times {model.block}.gain: a gain that is wrong by '
+        told.append('efforts are currents times robot.gain: a gain that is wrong by '
                     '1 % makes all numbers wrong by 1 %')
     return tuple(told)
 

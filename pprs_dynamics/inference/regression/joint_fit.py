@@ -41,10 +41,12 @@ Integers = np.typing.NDArray[np.int_]
 # Prior precision of a coefficient that is known: far above any information on it, 1e6 or so.
 CERTAIN = 1e14
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
-# The fit has converged when a round changes the deviance by less; rounds are bounded.
-CONVERGED, MOST_ROUNDS = 0.01, 40
+# The fit has converged when the next round would change the deviance by less than the first, the
+# last one having changed it by less than the second; rounds are bounded.
+CONVERGED, NEARLY, MOST_ROUNDS = 0.01, 0.1, 40
 NOISE_STEPS = 3  # of the noise in a round: fitted to its end, rounds take a quarter longer
 MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
+MOST_PRODUCTS = 4000  # products of blocks on a drive that are kept: some 10 kB each
 MOST_EQUATIONS = 100  # of drives that are kept: some 0.2 to 1 MB each
 
 
@@ -199,17 +201,23 @@ class Regression:
 
         Of those that are not known all at once: a call is dearer than a product.
         """
+        known: dict[Block | None, Array] = {}
         for b in others:
-            if b is not None and (b, a, d) in self._products:
-                self._products[a, b, d] = self._products[b, a, d].transpose(0, 2, 1)
-        new = [b for b in others if (a, b, d) not in self._products]
+            if (found := self._products.get((a, b, d))) is not None:
+                known[b] = found
+            elif b is not None and (turned := self._products.get((b, a, d))) is not None:
+                known[b] = turned.transpose(0, 2, 1)
+        new = [b for b in others if b not in known]
         if new:
             rows = [self.base[d] if b is None else b.rows[d] for b in new]
             found = self.series[d].products(a.rows[d], np.concatenate(rows))
             for b, part in zip(new, np.split(found, np.cumsum(list(map(len, rows)))[:-1], axis=2),
                                strict=True):
-                self._products[a, b, d] = part
-        return [self._products[a, b, d] for b in others]
+                self._products[a, b, d] = known[b] = part
+            if len(self._products) > MOST_PRODUCTS:
+                for key in list(self._products)[:MOST_PRODUCTS // 2]:  # computed first
+                    self._products.pop(key, None)
+        return [known[b] for b in others]
 
     def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
         """Return the equations of a drive, kept: sets that follow each other differ on few."""
@@ -221,8 +229,9 @@ class Regression:
         return found
 
     def release(self) -> None:
-        """Let go of equations; they are made again, of products that are kept."""
+        """Forget equations and products, which are computed again where a fit needs them."""
         self._equations.clear()
+        self._products.clear()
 
     def fit(self, blocks: Sequence[Block], start: Array | None = None) -> JointFit:
         """Return the fit of blocks beside the base columns, the noise fitted with it.
@@ -239,14 +248,19 @@ class Regression:
             start = shapes.start(np.stack([drive.squares for drive in system.drives]), self.counts)
         amplitudes, spectra = start, shapes.spectra(start)
         solution = system.solve(spectra, self.counts)
+        last = np.inf
         for _ in range(MOST_ROUNDS - 1):
             before = solution.deviance
             amplitudes = shapes.fitted(amplitudes, solution.squares, self.counts,
                                        solution.leverage, NOISE_STEPS)
             spectra = shapes.spectra(amplitudes)
             solution = system.solve(spectra, self.counts)
-            if abs(before - solution.deviance) < CONVERGED:
+            change = abs(before - solution.deviance)
+            # Changes fall as a geometric series: the next one is change^2 / last.
+            if change < CONVERGED or (change < last and change ** 2 < CONVERGED * last / 2
+                                      and change < NEARLY):
                 break
+            last = change
         return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
                         spectra, solution.deviance, solution.squares, system.places)
 

@@ -91,7 +91,8 @@ class NoiseShapes:
         last = min(2 ** SLOPE_OCTAVES, len(numbers))
         slope = (np.log(single[:, 0] / single[:, last - 1]) / np.log(last) if last > 1
                  else np.zeros(len(single)))
-        slope = np.maximum(slope, np.median(slope))
+        ordered, half = np.sort(slope), len(slope) // 2
+        slope = np.maximum(slope, (ordered[half] + ordered[-half - 1]) / 2)  # the median
         along = np.mean(numbers ** -slope[:, None], axis=1)
         power[:, 0] = single.mean(axis=1) / along * 2.0 ** (CONTINUED_OCTAVES * slope)
         return power

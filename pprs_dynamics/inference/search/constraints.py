@@ -76,69 +76,130 @@ LEAST_MASS = 1e-6  # [kg] of a body
 DOUBTED = 2.0  # standard deviations of a mass within which it may be added or taken away
 
 
-def with_constraints(design: Design, regression: Regression, fit: JointFit,
-                     blocks: Mapping[Component, Block]) -> JointFit | None:
-    """Return a fit moved to the nearest coefficients that are possible; None where none are.
-
-    The fit itself where its coefficients are possible. The noise does not change, so that it
-    cannot absorb an impossible value.
+class Constraints:
+    """What coefficients of the effects of a design may be.
 
     Parameters
     ----------
     design : Design
-    regression : Regression
-    fit : JointFit
-    blocks : mapping of Component to Block
-        Columns of its effects.
     """
-    index = np.concatenate([np.zeros(0, dtype=int), *(
-        fit.places[block].start + np.arange(max(len(component.names), 1))
-        for component, block in blocks.items() if component.names)])
-    places = dict[Component, slice]()
-    for component in blocks:
-        at = sum(place.stop - place.start for place in places.values())
-        if component.names:
-            places[component] = slice(at, at + len(component.names))
-    mean, covariance = fit.coefficients[index], fit.covariance[np.ix_(index, index)]
-    linear = _linear(design, places, len(index))
-    found = _nearest(design, places, mean, covariance, linear)
-    if found is None:
-        return None
-    return regression.conditioned(fit, index, found.active) if len(found.active.b) else fit
 
+    def __init__(self, design: Design) -> None:
+        self.design = design
+        self._bounds: dict[Component, Array] = {}
+        self._totals: dict[tuple[int, str], float] = {}
+        self._planes: dict[tuple[Component, float], BodyPlanes] = {}
 
-def _nearest(design: Design, places: Mapping[Component, slice], mean: Array, covariance: Array,
-             linear: Inequalities) -> Constrained | None:
-    """Return the nearest possible coefficients, for each sign that a doubtful mass may have."""
-    bodies = [component for component in places if issubclass(component.effect, AddedBody)
-              and component.effect.has_extent]
-    signs = []
-    for component in bodies:
-        at = places[component].start
-        mass = mean[at] + _given(component)[0]
-        sign = 1.0 if mass >= 0 else -1.0
-        doubted = abs(mass) < DOUBTED * covariance[at, at] ** 0.5
-        signs.append((sign, -sign) if doubted else (sign,))
-    best: Constrained | None = None
-    for choice in product(*signs):
-        sets = [(places[component], _given(component),
-                 body_planes(_robot_without(design, component), component, sign))
-                for component, sign in zip(bodies, choice, strict=True)]
+    def applied(self, regression: Regression, fit: JointFit, blocks: Mapping[Component, Block],
+                ) -> JointFit | None:
+        """Return a fit moved to the nearest possible coefficients; None where none are possible.
 
-        def planes(c: Array, sets: list[tuple[slice, Array, BodyPlanes]] = sets) -> Inequalities:
-            found = Inequalities.none(len(c))
-            for place, given, of_body in sets:
-                more = of_body(c[place] + given)
-                A = np.zeros((len(more.b), len(c)))
-                A[:, place] = more.A
-                found = found.and_also(Inequalities(A, more.b - more.A @ given))
-            return found
-        found = nearest(mean, covariance, linear, planes)
-        if found is not None and (best is None or found.rise < best.rise):
-            best = found
-        if best is not None and best.rise == 0:
-            break
-    return best
+        The fit itself where its coefficients are possible. The noise does not change, so that it
+        cannot absorb an impossible value.
+
+        Parameters
+        ----------
+        regression : Regression
+        fit : JointFit
+        blocks : mapping of Component to Block
+            Columns of its effects.
+        """
+        places, first = dict[Component, slice](), 0
+        index = list[int]()
+        for component, block in blocks.items():
+            if count := len(component.names):
+                start = fit.places[block].start
+                index += range(start, start + count)
+                places[component] = slice(first, first + count)
+                first += count
+        if not index:
+            return fit
+        at = np.array(index)
+        found = self._nearest(places, fit.coefficients[at], fit.covariance[np.ix_(at, at)])
+        if found is None:
+            return None
+        return regression.conditioned(fit, at, found.active) if len(found.active.b) else fit
+
+    def _nearest(self, places: Mapping[Component, slice], mean: Array, covariance: Array,
+                 ) -> Constrained | None:
+        """Return the nearest possible coefficients, for each sign that a doubtful mass may have."""
+        linear = self._linear(places, len(mean))
+        bodies = [component for component in places if issubclass(component.effect, AddedBody)
+                  and component.effect.has_extent]
+        signs = []
+        for component in bodies:
+            at = places[component].start
+            mass = mean[at] + _given(component)[0]
+            sign = 1.0 if mass >= 0 else -1.0
+            doubted = abs(mass) < DOUBTED * covariance[at, at] ** 0.5
+            signs.append((sign, -sign) if doubted else (sign,))
+        best: Constrained | None = None
+        for choice in product(*signs):
+            sets = [(places[component], _given(component), self._planes_of(component, sign))
+                    for component, sign in zip(bodies, choice, strict=True)]
+
+            def planes(c: Array, sets: list[tuple[slice, Array, BodyPlanes]] = sets,
+                       ) -> Inequalities:
+                found = Inequalities.none(len(c))
+                for place, given, of_body in sets:
+                    more = of_body(c[place] + given)
+                    A = np.zeros((len(more.b), len(c)))
+                    A[:, place] = more.A
+                    found = found.and_also(Inequalities(A, more.b - more.A @ given))
+                return found
+            found = nearest(mean, covariance, linear, planes)
+            if found is not None and (best is None or found.rise < best.rise):
+                best = found
+            if best is not None and best.rise == 0:
+                break
+        return best
+
+    def _planes_of(self, component: Component, sign: float) -> BodyPlanes:
+        key = (component, sign)
+        if key not in self._planes:
+            # What is changed of a body of the input model is no body: all of it has to be one.
+            robot = with_bodies(self.design.given.robot, [
+                effect for effect in self.design.given.effects
+                if not (component.given and effect.name == component.effect.name)])
+            self._planes[key] = body_planes(robot, component, sign)
+        return self._planes[key]
+
+    def _linear(self, places: Mapping[Component, slice], size: int) -> Inequalities:
+        """Return the bounds of parameters and of the totals of every drive."""
+        unit = np.eye(size)
+        bounds = np.concatenate([self._bounds_of(component) for component in places], axis=1)
+        rows, least = [unit, -unit], [bounds[0], -bounds[1]]
+        totals: dict[tuple[int, Total], tuple[Array, float]] = {}
+        for component, place in places.items():
+            if (d := component.drive) is None:
+                continue
+            for k, name in enumerate(component.names):
+                for total in ADDS_TO.get((component.effect.name, name), ()):
+                    row, own = totals.get((d, total), (np.zeros(size), self.own(d, total[0])))
+                    totals[d, total] = (row + unit[place.start + k], own + _given(component)[k])
+        for row, own in totals.values():
+            rows.append(row[None])
+            least.append(np.array([-own]))
+        b = np.concatenate(least)
+        finite = np.isfinite(b)
+        return Inequalities(np.concatenate(rows)[finite], b[finite])
+
+    def _bounds_of(self, component: Component) -> Array:
+        """Return the least and largest of each coefficient beside the input model's, (2, k)."""
+        if component not in self._bounds:
+            turns = units_of(self.design.given, component.drive).turns
+            kinds = {p.name: p.of(turns) for p in (*component.effect.coefficients,
+                                                   *component.effect.linear)}
+            self._bounds[component] = np.array(
+                [(kinds[name].lower, kinds[name].upper) for name in component.names],
+            ).T - _given(component)
+        return self._bounds[component]
+
+    def own(self, drive: int, of: str) -> float:
+        """Return the inertia or friction that the input model has in a drive, without effects."""
+        if (drive, of) not in self._totals:
+            self._totals[drive, of] = own_total(self.design, drive, of)
+        return self._totals[drive, of]
 
 
 def _given(component: Component) -> Array:
@@ -146,39 +207,6 @@ def _given(component: Component) -> Array:
     known = dict(zip((c.name for c in component.effect.coefficients), component.given,
                      strict=False))
     return np.array([known.get(name, 0.0) for name in component.names])
-
-
-def _robot_without(design: Design, component: Component) -> Mechanism:
-    """Return the input model's robot without the body that a component changes."""
-    robot: Mechanism = with_bodies(design.given.robot, [
-        effect for effect in design.given.effects
-        if not (component.given and effect.name == component.effect.name)])
-    return robot
-
-
-def _linear(design: Design, places: Mapping[Component, slice], size: int,
-            ) -> Inequalities:
-    """Return the bounds of parameters and of the totals of every drive."""
-    rows, bounds = list[Array](), list[float]()
-    totals: dict[tuple[int, Total], tuple[Array, float]] = {}
-    for component, place in places.items():
-        given, d = _given(component), component.drive
-        turns = units_of(design.given, d).turns
-        kinds = {p.name: p.of(turns) for p in (*component.effect.coefficients,
-                                               *component.effect.linear)}
-        for k, name in enumerate(component.names):
-            row = np.eye(size)[place.start + k]
-            rows += [row, -row]
-            bounds += [kinds[name].lower - given[k], given[k] - kinds[name].upper]
-            if d is None:
-                continue
-            for total in ADDS_TO.get((component.effect.name, name), ()):
-                before, own = totals.get((d, total), (0.0 * row, own_total(design, d, total[0])))
-                totals[d, total] = before + row, own + given[k]
-    rows += [row for row, _ in totals.values()]
-    bounds += [-own for _, own in totals.values()]
-    finite = np.isfinite(bounds)
-    return Inequalities(np.array(rows).reshape(len(rows), size)[finite], np.array(bounds)[finite])
 
 
 def empty_totals(design: Design, fitted: CandidateSet, component: Component) -> tuple[str, ...]:

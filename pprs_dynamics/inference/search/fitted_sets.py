@@ -29,7 +29,7 @@ from pprs_dynamics.inference.search.candidates import (
     set_key,
 )
 from pprs_dynamics.inference.search.components import Components
-from pprs_dynamics.inference.search.constraints import with_constraints
+from pprs_dynamics.inference.search.constraints import Constraints
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
@@ -72,6 +72,7 @@ class FittedSets:
         self.prior_costs = PriorCosts.of(self.regression, decisions, design.given)
         self.components = Components(design, self.regression, self.prior_costs)
         self.settled: dict[Hashable, Any] = {}
+        self.constraints = Constraints(design)
         self._evaluated: dict[Hashable, CandidateSet] = {}
         self._nuisance: dict[Hashable, tuple[Block, ...]] = {}
 
@@ -114,7 +115,7 @@ class FittedSets:
                 self.blocks(candidates), start))
         fit = self.regression.fit(self.blocks(candidates, nuisance), start)
         fitted = self._set(candidates, fit, nuisance)
-        possible = with_constraints(self.design, self.regression, fit, fitted.blocks)
+        possible = self.constraints.applied(self.regression, fit, fitted.blocks)
         if possible is None:
             return replace(fitted, barred='no possible values come near')
         if possible is not fit:

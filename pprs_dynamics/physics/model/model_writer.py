@@ -30,12 +30,11 @@ from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.model.keys import (
+    DRIVES_KEY,
     FILES,
     Key,
     as_list,
-    drives_key,
     keys_of,
-    mechanism_block,
 )
 from pprs_dynamics.physics.model.ledger import BLOCK
 from pprs_dynamics.physics.model.model_file import build_model
@@ -282,7 +281,7 @@ def _rank(key: str, values: Mapping[str, Any]) -> tuple[int, ...]:
     and a node takes no effect whose parameters it does not have.
     """
     active, drives = values.get('effects.active') or (), values.get(
-        drives_key(mechanism_block(values)), DRIVES)
+        DRIVES_KEY, DRIVES)
     block, name, *rest = key.split('.')
     if block == 'effects' and not rest:
         return (1,)

@@ -19,7 +19,7 @@ import numpy as np
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
@@ -75,13 +75,14 @@ def application(hub: Hub, keys: Keys, used: Callable[[], None] = lambda: None) -
               *(Route(f'/api/{path}', with_body(work), methods=['POST'])
                 for path, work in api.changes().items())]
     app = Starlette(routes=routes, lifespan=lifespan, exception_handlers={
-        StaleError: _status(409), PprsError: _status(400), TooLongError: _status(413)})
+        StaleError: _status(409), PprsError: _status(400), TooLongError: _status(413),
+        ClientDisconnect: _status(400)})
     return AccessControl(app, keys, {UPLOAD: MOST_UPLOADED}, used)
 
 
 def _status(status: int) -> Callable[[Request, Exception], Response]:
     def answer(request: Request, error: Exception) -> Response:
-        return JSONResponse({'error': str(error) or 'the body is too long'}, status)
+        return JSONResponse({'error': str(error) or 'the body is too long or incomplete'}, status)
     return answer
 
 

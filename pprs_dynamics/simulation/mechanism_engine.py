@@ -4,7 +4,7 @@
 """MuJoCo's model of a mechanism: its kinematics, inertia, gravity and reactions.
 
 MuJoCo reads the description itself. Its masses, inertias, gravity and couplings are retained:
-`ArmEngine` raises where the model reads the description otherwise.
+`MechanismEngine` raises where the model reads the description otherwise.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.robot_block import described_gravity
-from pprs_dynamics.simulation.arm_forms import tilted, truth
 from pprs_dynamics.simulation.engine_loops import ClosedMotion, EngineLoops, cross
 from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState
+from pprs_dynamics.simulation.joint_forms import tilted, truth
 
 CARRIER = '_added_to_'  # body of what is added to a joint
 LEAST = 1e-12  # [kg, kg m^2], of bodies that another's inertia contains
@@ -45,7 +45,7 @@ AGREEMENT = 1e-6  # of the largest effort
 WIDEST, SPAN = 1.0, 0.3  # [rad, m] of a drive, and the share of it in which both are compared
 
 
-class ArmEngine:
+class MechanismEngine:
     """MuJoCo's model of a mechanism.
 
     Numbers that the model file states in place of the description's replace MuJoCo's.
@@ -65,7 +65,7 @@ class ArmEngine:
         robot = self.robot = self.described = model.robot
         structure = self.structure = robot.structure
         path = Path(structure.description.path)
-        is_mjcf = bool(model.values.get(f'{model.block}.mjcf'))
+        is_mjcf = bool(model.values.get('robot.mjcf'))
         links = structure.description.links
         refused = {} if is_mjcf else {name: parameters for name, parameters in links.items()
                                       if structure.links[name][0] and not _is_body(parameters)}
@@ -154,7 +154,7 @@ class ArmEngine:
             return
         k, drive = np.unravel_index(int(np.argmax(off)), off.shape)
         raise ModelError(
-            f'{model.block}.{"mjcf" if model.values.get(f"{model.block}.mjcf") else "urdf"}',
+            "robot.mjcf" if model.values.get("robot.mjcf") else "robot.urdf",
             structure.description.path, f'give one effort of {structure.drives[drive]}, but at '
             f'{motion.position[k].round(4).tolist()} it is {ours[k, drive]:.6g} in the model and '
             f'{theirs[k, drive]:.6g} in MuJoCo: please report this file')
