@@ -25,7 +25,7 @@ from benchmarks import ROOT
 from benchmarks.speed.model import CALLS, _print, _rounds
 from pprs_dynamics import MechanismModel
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, Evaluation
-from pprs_dynamics.simulation.arm_run import draw_motion
+from pprs_dynamics.simulation.mechanism_run import draw_motion
 
 BATCH = 5000
 ROUNDS = 25
@@ -90,7 +90,7 @@ def steps(rounds: int) -> None:
     bodies = robot.by_joint, robot.gravity_row
 
     def kept() -> None:
-        rows, _ = evaluation.follow(*given)
+        rows, _ = evaluation.forward_kinematics(*given)
         evaluation.forces(rows, *bodies)
 
     _print('hexapod, one motion', _rounds({

@@ -213,7 +213,7 @@ class Sensitivities:
         step = there.position_step
 
         def efforts(drive: int, move: float) -> Array:
-            return self._efforts(self.model, self._at(self.model, there.moved(drive, move)))
+            return self._efforts(self.model, self._at(self.model, there.perturbed(drive, move)))
 
         def column(drive: int) -> Array:
             change = (efforts(drive, -step) - before) / step
@@ -246,7 +246,7 @@ class Sensitivities:
 
     def _at(self, model: Any, state: Any) -> Any:
         """Return the same motion with the bodies and the reversals of another model."""
-        found = replace(state.loaded(model.robot), load=None, reversal=model.reversal)
+        found = replace(state.with_load(model.robot), load=None, reversal=model.reversal)
         for effect in model.effects:
             if isinstance(effect, BodyEffect):
                 found = effect.apply(found)
@@ -307,7 +307,7 @@ class Sensitivities:
             given = np.asarray(self.given.values[number.key])
             return np.asarray(-forces.total * RELATIVE_STEP * given / self.model.gain)
         if number.key.startswith('friction.'):
-            return self._efforts(moved, state.turning_over(moved.reversal)) - reference
+            return self._efforts(moved, state.with_smoothing(moved.reversal)) - reference
         if number.key.startswith('geometry.'):
             state = moved.at_drives(state)
         return self._efforts(moved, self._at(moved, state)) - reference
@@ -385,7 +385,7 @@ def passive_reversal_columns(friction: Effect, state: Any) -> Array:
     A row for each of `PASSIVE_WIDTHS`, times the width of the state.
     """
     before = friction.force(state)
-    return np.stack([friction.force(state.turning_over(replace(
+    return np.stack([friction.force(state.with_smoothing(replace(
         state.reversal, rate=factor * state.reversal.rate,
         slide=factor * state.reversal.slide))) - before
         for factor in PASSIVE_WIDTHS])

@@ -62,7 +62,7 @@ class BodyEffect(StructureEffect):
 
     def apply(self, state: Any) -> Any:
         """Return the state with the effect in its bodies."""
-        return state.loaded(self.changed(state.robot), self.load(state))
+        return state.with_load(self.changed(state.robot), self.load(state))
 
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the change of the rigid body's drive forces [N, N m], (N, D)."""

@@ -64,7 +64,7 @@ def solve(A: Any, B: Any, order: Any) -> Any:
     ----------
     A : (n, n) or (n, n, N) array
     B : (n, K) or (n, K, N) array
-    order : Tables
+    order : Model
         In which compiled code eliminates.
     """
     left, right = (np.asarray(each) for each in (A, B))

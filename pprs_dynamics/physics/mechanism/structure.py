@@ -34,9 +34,12 @@ from pprs_dynamics.physics.mechanism.description import (
     inertial_in,
     moved_along,
 )
-from pprs_dynamics.physics.mechanism.elimination import determining, given
-from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Integers, Tables
-from pprs_dynamics.physics.mechanism.tree_evaluation import Evaluation, survey
+from pprs_dynamics.physics.mechanism.elimination import (
+    with_actuated_coordinates,
+    with_elimination_order,
+)
+from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Integers, Model
+from pprs_dynamics.physics.mechanism.tree_evaluation import Evaluation, constraint_jacobian
 
 # Drives move by these between closings when a motion is walked to.
 STRIDE_TURN, STRIDE_SLIDE = 0.1, 0.1  # [rad], and of the mechanism's size
@@ -50,7 +53,7 @@ class Structure:
     Parameters
     ----------
     description : Description
-    tables : Tables
+    tables : Model
         Their drives are in the model's order.
     drives : tuple of str
     kinds : tuple of str
@@ -73,7 +76,7 @@ class Structure:
     """
 
     description: Description
-    tables: Tables
+    tables: Model
     drives: tuple[str, ...]
     kinds: tuple[str, ...]
     coordinates: tuple[str, ...]
@@ -293,7 +296,7 @@ class _Builder:
         self.coordinate[row] = self.coordinate[self.rows[leader.name]]
         self.ratio[row], self.offset[row] = ratio, offset
 
-    def tables(self, loops: tuple[Loop, ...], drives: tuple[str, ...], size: float) -> Tables:
+    def tables(self, loops: tuple[Loop, ...], drives: tuple[str, ...], size: float) -> Model:
         """Return tables with all rows of the loops, and no passive coordinates yet."""
         placed = [(*self._on(loop, 'a'), *self._on(loop, 'b')) for loop in loops]
         rows = [(k, row) for k, loop in enumerate(loops) for row in ROWS[loop.kind]]
@@ -308,7 +311,7 @@ class _Builder:
             starts.append(len(joints))
         driven = _integers([self.coordinate[self.rows[name]] for name in drives])
         none = _integers([])
-        return given(Tables(
+        return with_actuated_coordinates(Model(
             joints=np.column_stack((self.parent, self.turns, self.coordinate)).astype(np.int64),
             passive=none, drives=driven, places=none,
             closures=_integers([(a, b, *ends) for (a, _, b, _), ends in zip(
@@ -402,7 +405,7 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
           for limit in ('lower', 'upper', 'speed', 'effort')))
     mobility = closing.mobility(q, t.drives, _moves(structure) * closing.columns)
     units = np.where(build.slides, size, 1.0)
-    return replace(structure, mobility=mobility, tables=determining(
+    return replace(structure, mobility=mobility, tables=with_elimination_order(
         t, mobility.rows, mobility.passive, units, q))
 
 
@@ -468,9 +471,9 @@ def _require_joints(description: Description, drives: tuple[str, ...],
                              'or prismatic joint that mimics none')
 
 
-def _size(t: Tables, q: Array) -> float:
+def _size(t: Model, q: Array) -> float:
     """Return the mean distance of joints and closures from the base's origin [m]."""
-    _, _, m = survey(t, q, np.arange(len(q)))
+    _, _, m = constraint_jacobian(t, q, np.arange(len(q)))
     points = np.concatenate((m.p[0, 1:], m.pA[0], m.pB[0]))
     return max(float(np.mean(np.linalg.norm(points, axis=1))), 1e-3)
 
@@ -478,7 +481,7 @@ def _size(t: Tables, q: Array) -> float:
 def _moves(structure: Structure) -> Array:
     """Return the tool's motion and that of all centres of mass per rate of each coordinate."""
     t, size = structure.tables, structure.size
-    _, _, m = survey(t, structure.home, np.arange(len(structure.home)))
+    _, _, m = constraint_jacobian(t, structure.home, np.arange(len(structure.home)))
     row, frame = structure.links[structure.tool]
     points = [(row, m.p[0, row] + m.R[0, row] @ frame.p, True)]
     for body, parameters in enumerate(structure.inertial):

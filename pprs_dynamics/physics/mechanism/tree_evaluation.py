@@ -36,24 +36,24 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     TRANSMITTED,
     WARM_STEPS,
     WIDTH,
+    Data,
     Integers,
     JointFriction,
     Loads,
-    Motion,
-    Tables,
+    Model,
     actuator_efforts,
+    close_loops,
     constraint_forces,
-    follow,
+    forward_kinematics,
     inverse_dynamics,
     is_near,
-    is_sound,
+    is_regular_and_closed,
     jacobian,
     joint_friction,
-    place,
+    link_jacobians,
     predict,
-    reach,
     residual,
-    twist,
+    update_frame_placements,
 )
 
 # Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
@@ -101,10 +101,11 @@ def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, st
             is_closed = False
             for trial in range(0 if nearby and s == 0 else 1, 3):
                 if trial > 0 or is_near(t, start, q):
-                    is_closed = reach(t, m, start, q)
+                    is_closed = close_loops(t, m, start, q)
                 if is_closed:
-                    follow(t, m, given[1, s], given[2, s])
-                    if trial > 0 or (m.solution[STEPS] <= WARM_STEPS and is_sound(t, m, at_home)):
+                    forward_kinematics(t, m, given[1, s], given[2, s])
+                    if trial > 0 or (m.solution[STEPS] <= WARM_STEPS
+                                     and is_regular_and_closed(t, m, at_home)):
                         break
                 is_closed = False
                 for c in range(len(home)):
@@ -115,7 +116,7 @@ def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, st
                 closed[s, c] = start[c] = m.q[c]
             if s + 1 < len(closed) and is_near(t, start, given[0, s + 1]):
                 predict(t, m, given[0, s + 1], start)
-            if not stages & KEPT and not is_sound(t, m, at_home):
+            if not stages & KEPT and not is_regular_and_closed(t, m, at_home):
                 return s
         if stages & FORCES:
             if not stages & KEPT:
@@ -133,10 +134,10 @@ def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, st
     return -1
 
 
-def _twist(sizes: Any, integers: Any, reals: Any, motions: Any, W: Any, U: Any) -> None:
+def _link_jacobians(sizes: Any, integers: Any, reals: Any, motions: Any, W: Any, U: Any) -> None:
     t = read_tables(sizes, integers, reals)
     for s in range(len(motions)):
-        twist(t, read_motion(sizes, motions[s], reals), W[s], U[s])
+        link_jacobians(t, read_motion(sizes, motions[s], reals), W[s], U[s])
 
 
 class Evaluation:
@@ -144,15 +145,15 @@ class Evaluation:
 
     Parameters
     ----------
-    t : Tables
+    t : Model
     home : (C,) array
         Closed coordinates.
     """
 
-    def __init__(self, t: Tables, home: Array) -> None:
+    def __init__(self, t: Model, home: Array) -> None:
         self.tables, self.home, self.packed = t, home, packed_tables(t)
         self.sizes = self.packed.sizes
-        self._lengths = length_of(Motion, self.sizes), length_of(Loads, self.sizes)
+        self._lengths = length_of(Data, self.sizes), length_of(Loads, self.sizes)
         self._no_bodies = np.zeros((len(t.joints), 10))
         self._friction = NO_FRICTION, np.array(NO_FRICTION[:2]), np.array(NO_FRICTION[2:])
         drives = len(t.drives)
@@ -162,23 +163,23 @@ class Evaluation:
 
     @cached_property
     def at_home(self) -> Array:
-        """`Motion.solution` at home, (4,)."""
+        """`Data.solution` at home, (4,)."""
         still = np.zeros((3, 1, len(self.tables.drives)))
         still[0] = self.home[self.tables.drives]
-        rows, _ = self.follow(*still)
+        rows, _ = self.forward_kinematics(*still)
         solution: Array = self.motion(rows).solution[0]
         return solution
 
-    def motion(self, rows: Array) -> Motion:
-        """Return by name what rows of `follow` hold."""
-        return views(Motion, self.sizes, rows)
+    def motion(self, rows: Array) -> Data:
+        """Return by name what rows of `forward_kinematics` hold."""
+        return views(Data, self.sizes, rows)
 
     def loads(self, rows: Array) -> Loads:
         """Return by name what rows of `forces` hold."""
         return views(Loads, self.sizes, rows)
 
-    def follow(self, q: Array, v: Array, a: Array, start: Array | None = None,
-               nearby: Array | None = None) -> tuple[Array, int]:
+    def forward_kinematics(self, q: Array, v: Array, a: Array, start: Array | None = None,
+                           nearby: Array | None = None) -> tuple[Array, int]:
         """Return the motion of all links for positions, velocities and accelerations of the drives.
 
         Parameters
@@ -203,7 +204,7 @@ class Evaluation:
 
     def forces(self, rows: Array, inertial: Array, gravity: Array,
                wrenches: Mapping[int, tuple[Array, Array]] | None = None) -> Array:
-        """Return what joints and closures transmit, in rows (N, K), for rows of `follow`.
+        """Return what joints and closures transmit, (N, K), for rows of `forward_kinematics`.
 
         Parameters
         ----------
@@ -227,7 +228,7 @@ class Evaluation:
         found = np.zeros((len(rows), len(self.tables.drives)))
         m, o = samples_last(self.motion(rows)), samples_last(self.loads(loads))
         # Loads are everybody's: what is of one friction alone does not go through them.
-        o = o._replace(rubbed=np.empty_like(o.rubbed))
+        o = o._replace(tau_friction=np.empty_like(o.tau_friction))
         with np.errstate(all='ignore'):
             joint_friction(self.tables, m, o, friction, found.T)
         return found
@@ -248,12 +249,12 @@ class Evaluation:
         actuators : (OF_DRIVE, D) array, optional
             See `actuator_efforts`; without it the drives have no rotor and no friction.
         start, nearby : (N, C) and (C,) arrays, optional
-            See `follow`.
+            See `forward_kinematics`.
 
         Returns
         -------
         InverseDynamicsResult or None
-            None where a sample is out of reach or too near a singularity: `follow` says which.
+            None where a sample is out of reach or singular: `forward_kinematics` says which.
         """
         given = np.array(motion)
         samples, drives = given.shape[1:]
@@ -264,15 +265,15 @@ class Evaluation:
             self._no_actuators if actuators is None else actuators, closed, efforts)
         return None if failed >= 0 else InverseDynamicsResult(closed, efforts)
 
-    def twists(self, rows: Array) -> tuple[Array, Array]:
+    def link_jacobians(self, rows: Array) -> tuple[Array, Array]:
         """Return angular and linear velocities of links per rate of drives, (N, J + 1, 3, D)."""
         t = self.tables
         W, U = np.zeros((2, len(rows), 3 * len(t.joints), len(t.drives)))
-        loop = compiled_or_none(_twist, len(rows))
+        loop = compiled_or_none(_link_jacobians, len(rows))
         if loop is not None:
             loop(*self.packed, rows, W, U)
         else:
-            twist(t, samples_last(self.motion(rows)), *samples_last((W, U)))
+            link_jacobians(t, samples_last(self.motion(rows)), *samples_last((W, U)))
         shape = len(rows), len(t.joints), 3, len(t.drives)
         return W.reshape(shape), U.reshape(shape)
 
@@ -321,12 +322,12 @@ class Evaluation:
         m, o = samples_last(self.motion(rows)), samples_last(self.loads(loads))
         q, v, a = np.moveaxis(given, 1, -1)
         if stages & MOTION:
-            if not reach(t, m, self.home if start is None else start.T, q):
+            if not close_loops(t, m, self.home if start is None else start.T, q):
                 size = m.solution[OPEN]
                 return int(np.argmax(~(size < np.inf) | (size == np.max(size))))
-            follow(t, m, v, a)
+            forward_kinematics(t, m, v, a)
             closed[:] = m.q.T
-            if not stages & KEPT and not is_sound(t, m, at_home):
+            if not stages & KEPT and not is_regular_and_closed(t, m, at_home):
                 return 0
         if stages & FORCES:
             inverse_dynamics(t, m, inertial, gravity, o)
@@ -342,18 +343,18 @@ class Evaluation:
 def samples_last(arrays: Any) -> Any:
     """Return views with the samples last, as NumPy takes the equations."""
     moved = (np.moveaxis(array, 0, -1) for array in arrays)
-    return type(arrays)(*moved) if isinstance(arrays, Motion | Loads) else tuple(moved)
+    return type(arrays)(*moved) if isinstance(arrays, Data | Loads) else tuple(moved)
 
 
-def survey(t: Tables, q: Array, columns: Integers) -> tuple[Array, Array, Motion]:
+def constraint_jacobian(t: Model, q: Array, columns: Integers) -> tuple[Array, Array, Data]:
     """Return all rows and their derivatives by some coordinates, (r,) and (r, K), at one place."""
     sizes = packed_tables(t).sizes
-    m = views(Motion, sizes, np.zeros((1, length_of(Motion, sizes))))
+    m = views(Data, sizes, np.zeros((1, length_of(Data, sizes))))
     m.q[0] = q
     one = type(m)(*(array[0].data for array in m))
     places = np.full((len(q), 2), -1)
     places[columns, 0] = np.arange(len(columns))
-    place(t, one)
+    update_frame_placements(t, one)
     residuals = np.array([residual(t, one, r) for r in range(len(t.rows))])
     J = np.zeros((len(t.rows), len(columns)))
     jacobian(t, one, places, J, np.empty((len(J), 0)))

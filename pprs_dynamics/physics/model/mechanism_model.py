@@ -328,7 +328,7 @@ class MechanismModel(ForceModel):
     def _state(self, motion: JointMotion, found: InverseDynamicsResult) -> MechanismState:
         """Return the state of the mechanism whose efforts are known already."""
         state = self.mechanism(motion)
-        vars(state).update(found=found, rigid_force=found.efforts[RIGID])
+        vars(state).update(inverse_dynamics=found, rigid_force=found.efforts[RIGID])
         return state
 
     def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,

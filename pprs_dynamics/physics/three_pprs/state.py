@@ -211,7 +211,7 @@ class ThreePprsState:
         """By which a drive is moved for derivatives [m]."""
         return POSITION_STEP * self.robot.geometry.rod_length
 
-    def moved(self, drive: int, step: float) -> ThreePprsState:
+    def perturbed(self, drive: int, step: float) -> ThreePprsState:
         """Return the state with a drive at other positions, to first order; all move as before."""
         from scipy.spatial.transform import Rotation  # here: commands start without it
 
@@ -263,13 +263,13 @@ class ThreePprsState:
         return transferred(self.robot.geometry.kernel_parameters, self.kinematics.chain_table,
                            self.kinematics.inverse_table, self.resistances(joints), printed)
 
-    def turning_over(self, reversal: Reversal) -> ThreePprsState:
+    def with_smoothing(self, reversal: Reversal) -> ThreePprsState:
         """Return the state with a sgn of other widths; all else is computed once for both."""
         state = replace(self, reversal=reversal)
         vars(state)['rigid_body'] = self.rigid_body
         return state
 
-    def loaded(self, robot: Robot, load: StructureLoad | None = None) -> ThreePprsState:
+    def with_load(self, robot: Robot, load: StructureLoad | None = None) -> ThreePprsState:
         """Return a state of this motion with other bodies, and with an additional load.
 
         The robot must have the geometry that the state was solved for.
