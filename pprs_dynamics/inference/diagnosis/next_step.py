@@ -19,7 +19,7 @@ from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredC
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
     from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-    from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
+    from pprs_dynamics.inference.readings.findings import NoMeasurement
     from pprs_dynamics.physics.model.force_model import ForceModel
 
 OWN_FRICTION = ('friction.viscous', 'friction.coulomb')  # of an arm's model file
