@@ -10,14 +10,15 @@ PYTHON ?= $(shell for p in python3 python3.13 python3.12 python3.11; do \
 # Side by side, processes with several threads each for linear algebra only wait for each other.
 export OPENBLAS_NUM_THREADS ?= 1
 
-.PHONY: help demo demo-feedforward test test-nodes test-others fuzz reproduce feedforward localisation score adoption benchmark \
-	naming reference reliability reliability-full experiments decisions mutants fleet workbench docs lint clean
+.PHONY: help demo demo-feedforward test test-nodes test-others test-slow fuzz reproduce feedforward localisation score adoption benchmark \
+	naming reference reliability reliability-full experiments decisions mutants workbench docs lint clean
 
 help:
 	@echo 'make demo       install into $(VENV); a hidden effect is found, added, and the error falls'
 	@echo 'make demo-feedforward   the nodes over topics: forces and a picture'
 	@echo 'make test       install into $(VENV), run every test, ruff and mypy'
 	@echo 'make test-nodes, test-others   the two halves of it, which run side by side'
+	@echo 'make test-slow  the slow tests, which run before a release'
 	@echo 'make fuzz       the tests of properties with new examples (10 minutes)'
 	@echo 'make docs       the documentation as a site, into build/docs/html'
 	@echo 'make reproduce  the figures and claims of the paper, into output/'
@@ -33,7 +34,6 @@ help:
 	@echo 'make experiments   how often a designed experiment settles what was ambiguous (long; it can be stopped)'
 	@echo 'make decisions  the score with each chosen number of the diagnosis halved and doubled (an hour)'
 	@echo 'make mutants    mistakes put into the modules that decide: which of them the tests see (two hours)'
-	@echo 'make fleet      a fleet of the physics engine, surveyed: what is found of what changed (long)'
 	@echo 'make workbench   how fast the workbench answers, in a real browser (5 minutes)'
 	@echo 'make clean      remove $(VENV) and everything that was built'
 
@@ -50,11 +50,16 @@ test: $(VENV)/.test lint
 	$(MAKE) --jobs 2 --output-sync=target test-nodes test-others
 
 test-nodes: $(VENV)/.test
-	$(BIN)/python -m pytest test -n 2 --dist loadfile -m nodes $(PYTEST)
+	$(BIN)/python -m pytest test -n 2 --dist loadfile -m 'nodes and not slow' $(PYTEST)
 
 test-others: $(VENV)/.test
 	nice -n 10 $(BIN)/python -m pytest test -n 2 --dist loadfile --no-loadscope-reorder \
-	    -m 'not nodes' $(PYTEST)
+	    -m 'not nodes and not slow' --file-budget 20 $(PYTEST)
+
+# What runs before a release: the site, colcon, demonstrations, clusters, long diagnoses, pictures.
+test-slow: $(VENV)/.test $(VENV)/.docs
+	$(BIN)/python -m pytest test -n 2 --dist loadfile -m slow $(PYTEST)
+	$(MAKE) naming NAMING=small
 
 # Property tests with examples that no run has seen.
 fuzz: $(VENV)/.test
@@ -80,7 +85,7 @@ localisation: $(VENV)/.test
 	$(BIN)/python -m benchmarks.scores.localisation 100
 
 score: $(VENV)/.test
-	$(BIN)/python -m benchmarks.scores.diagnosis --table docs/diagnosis_table.md
+	$(BIN)/python -m benchmarks.scores.diagnosis --table benchmarks/results/diagnosis.md
 
 adoption: $(VENV)/.test
 	$(BIN)/python -m benchmarks.scores.adoption 24
@@ -101,11 +106,11 @@ reliability: $(VENV)/.test
 reliability-full: $(VENV)/.test
 	$(BIN)/python -m benchmarks.node.reliability --full
 
-# Public problems; tables and picture of docs/benchmark.md. What is there is not run again.
+# Public problems; tables and picture of benchmarks/results/naming.md. What is there is not run again.
 NAMING ?= full
 NAMING_PROBLEMS := $(if $(filter small,$(NAMING)),12,72)
 NAMING_FOLDER := output/naming$(if $(filter small,$(NAMING)),-small)
-NAMING_PAGE := $(if $(filter small,$(NAMING)),$(NAMING_FOLDER)/benchmark.md,docs/benchmark.md)
+NAMING_PAGE := $(if $(filter small,$(NAMING)),$(NAMING_FOLDER)/benchmark.md,benchmarks/results/naming.md)
 naming: $(VENV)/.naming
 	$(BIN)/python -m benchmarks.naming.run make $(NAMING_FOLDER) --seed 2 --problems $(NAMING_PROBLEMS)
 	$(BIN)/python -m benchmarks.naming.run enter $(NAMING_FOLDER) $(if $(filter small,$(NAMING)),--whole)
@@ -121,9 +126,6 @@ decisions: $(VENV)/.test
 
 mutants: $(VENV)/.test
 	$(BIN)/python benchmarks/mutants.py --json output/mutants.json
-
-fleet: $(VENV)/.test
-	$(BIN)/python -m benchmarks.fleets.fleet
 
 workbench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.speed.workbench 30 docs/images/workbench.png

@@ -66,8 +66,7 @@ setup(
         'sim': ['mujoco>=4.0'],
         'fast': ['numba>=0.60'],
         'bags': ['rosbags>=0.11'],
-        'fleet': ['dask>=2025.1', 'distributed>=2025.1', 'pyarrow>=17', 'ruptures>=1.1.9',
-                  'fsspec>=2024.6'],
+        'fleet': ['distributed>=2025.1', 'pandas>=2', 'pyarrow>=17', 'ruptures>=1.1.9'],
         # Tables by columns of the model file: pyarrow reads Parquet.
         'tables': ['pyarrow>=17'],
         'workbench': ['starlette>=0.40', 'uvicorn>=0.30'],
@@ -80,7 +79,6 @@ setup(
         'test': ['pytest>=8', 'pytest-xdist>=3.5', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3',
                  'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11', 'pandas>=2',
                  'axe-playwright-python>=0.1.4',  # accessibility of pages
-                 'polars>=1', 'duckdb>=1', 'moto[server]>=5', 's3fs>=2024.6', 'cryptography>=42',
                  'cosmic-ray>=8.3',  # make mutants
                  'jsonschema>=4',  # ~/status against its schema
                  'types-PyYAML', 'scipy-stubs', 'sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1',

@@ -50,7 +50,7 @@ TESTS = {
     'physics/model/limits.py': ('physics/test_limits.py',),
     'physics/model/ledger.py': ('physics/test_ledger.py',),
     'inference/residuals/noise.py': ('inference/test_noise.py',),
-    'inference/residuals/paired_errors.py': ('inference/test_gates.py',),
+    'inference/search/held_out.py': ('inference/test_gates.py',),
     'inference/regression/joint_fit.py': ('inference/test_joint_fit.py',
                                           'inference/test_noise.py'),
     'inference/regression/normal_equations.py': ('inference/test_joint_fit.py',),
@@ -66,7 +66,6 @@ TESTS = {
     'ros/setpoints.py': ('ros/test_setpoints.py',),
     'app/workbench/server/change_log.py': ('app/test_change_log.py',),
     'app/workbench/server/access.py': ('app/test_workbench_safety.py',),
-    'app/fleet/change_points.py': ('app/test_change_points.py',),
 }
 
 

@@ -141,8 +141,9 @@ def record(story: Story, seed: int, duration: float) -> None:
               'catalogue knows and a few that it\ndoes not is drawn and hidden in it. Its name '
               f'goes to {story.file("truth.json")}, which stays closed till the end.')
     # The folder is the demonstration's own, which may run again.
-    common = ('--effect', 'random', '--seed', str(seed), '--duration', f'{duration:g}',
-              '--overwrite')
+    for name in ('run.mcap', 'other.mcap'):
+        (story.folder / name).unlink(missing_ok=True)
+    common = ('--effect', 'random', '--seed', str(seed), '--duration', f'{duration:g}')
     first = story.start('simulate', '--output', story.file('run.mcap'), *common,
                         '--json', story.file('truth.json'))
     # Beside the first, as there are two cores; its bar would write over the first one's.

@@ -1,16 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Makes docs/tutorial.md and its pictures: python docs/tutorial.py [FOLDER].
+"""Update the outputs and pictures of docs/tutorial.md: python docs/tutorial.py [FOLDER].
 
-The recordings stand in for a user's own: the simulated robot with a hidden effect. Everything
-that the commands write and say goes to the folder (by default output/tutorial); what of it a
-reader should look at goes into the text, docs/tutorial_text.md, in place of @NAME@.
+The recordings are those of the simulated robot with a hidden effect. What the commands write goes
+to the folder (by default output/tutorial). Parts of it replace the blocks of the page that follow a
+comment with their name.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -80,15 +81,13 @@ def main() -> None:
         IMAGES / 'tutorial_after.png', *residuals, answer['noise_floor'],
         f'On a motion that was not fitted, {HIDDEN} takes the error from {fall[0]:.3f} to '
         f'{fall[1]:.3f} N; noise alone is {answer["noise_floor"]:.3f} N')
-    for page, picture, opened in (
-            ('before', 'compare', ''), ('why', 'diagnose', ''),
-            ('why', 'tutorial_what_if', 'What if')):
-        photograph(folder / f'{page}.html', IMAGES / f'{picture}.png', opened)
+    for page, picture in (('before', 'compare'), ('why', 'diagnose')):
+        photograph(folder / f'{page}.html', IMAGES / f'{picture}.png')
     write_page(folder)
 
 
-def photograph(page: Path, picture: Path, opened: str) -> None:
-    """Take a picture of a page in Chromium, of its first screen or of a part that is opened."""
+def photograph(page: Path, picture: Path) -> None:
+    """Take a picture of the first screen of a page in Chromium."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as running:
@@ -96,28 +95,27 @@ def photograph(page: Path, picture: Path, opened: str) -> None:
                                           args=['--no-sandbox'])
         tab = browser.new_page(viewport={'width': 1280, 'height': 900})
         tab.goto(page.resolve().as_uri())
-        if opened:
-            summary = tab.locator(f'summary:has-text("{opened}")')
-            summary.click()
-            tab.wait_for_selector('#what-if[data-ready]')
-            summary.evaluate('(one) => one.scrollIntoView()')
-        else:
-            tab.wait_for_selector('.plot[data-drawn]')
+        tab.wait_for_selector('.plot[data-drawn]')
         tab.wait_for_timeout(500)  # [ms], for the last curve
         tab.screenshot(path=picture)
         browser.close()
 
 
 def write_page(folder: Path) -> None:
-    """Write the tutorial with what the commands have said."""
-    text = (DOCS / 'tutorial_text.md').read_text()
+    """Replace the blocks of the page by what the commands printed."""
+    page = DOCS / 'tutorial.md'
+    text = page.read_text(encoding='utf-8')
     for name, (command, first, last) in EXCERPTS.items():
         lines = (folder / f'{command}.txt').read_text().splitlines()[1:]
         start = next(k for k, line in enumerate(lines) if line.strip() and line.startswith(first))
         end = next(k for k in range(start + 1, len(lines)) if lines[k].startswith(last))
         shown = '\n'.join(line.rstrip() for line in lines[start:end]).rstrip()
-        text = text.replace(f'@{name}@', f'```text\n{shown}\n```')
-    (DOCS / 'tutorial.md').write_text(text)
+        text, count = re.subn(rf'(<!-- {name.lower()} -->\n```text\n).*?(\n```)',
+                              lambda found, shown=shown: found[1] + shown + found[2], text,
+                              flags=re.S)
+        if count != 1:
+            raise ValueError(f'{page} has no block {name.lower()}')
+    page.write_text(text, encoding='utf-8')
 
 
 def draw_where(residuals: Residuals) -> None:

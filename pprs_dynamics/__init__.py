@@ -3,7 +3,7 @@
 
 """Forces of parallel robots with friction in every joint, and which effect a model lacks.
 
-What stands here is stable; what is behind it may move.
+These names are stable; what is behind them may move.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
         adopt,
         adopt_all,
     )
-    from pprs_dynamics.app.api.changed import ChangeResult, changed
     from pprs_dynamics.app.api.compare import ComparisonResult, compare
     from pprs_dynamics.app.api.diagnose import DiagnosisResult, diagnose
     from pprs_dynamics.app.api.fit import FitResult, fit
@@ -58,26 +57,26 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
     from pprs_dynamics.physics.mechanism.motion import PlatformMotion
     from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
-    from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel, ModelState
+    from pprs_dynamics.physics.model.drive_model import DriveModel
+    from pprs_dynamics.physics.model.force_model import Forces, ModelState
     from pprs_dynamics.physics.model.mechanism_model import MechanismModel
     from pprs_dynamics.physics.model.model_file import build_model, load_model
 
 __all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'Array', 'Card', 'CatalogueEffect',
-           'ChangeResult', 'ComparisonResult', 'ConvergenceError', 'DiagnosisResult',
-           'DriveEffect', 'DriveForces', 'DriveModel', 'DriveRange', 'DriveSamples', 'EffectError',
-           'Excitation', 'ExperimentResult', 'FitResult', 'GainEffect', 'HelicalPath',
+           'ComparisonResult', 'ConvergenceError', 'DiagnosisResult', 'DriveEffect',
+           'DriveModel', 'DriveRange', 'DriveSamples', 'EffectError',
+           'Excitation', 'ExperimentResult', 'FitResult', 'Forces', 'GainEffect', 'HelicalPath',
            'JointMotion', 'LimitError', 'MeasurementEffect', 'MechanismModel',
            'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError', 'MotionLimits',
            'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session', 'SimulationResult',
            'SingularityError', 'StructureEffect', 'UnknownNameError', 'UnreadableFileError',
-           'WorkspaceError', 'adopt', 'adopt_all', 'build_model', 'changed', 'compare', 'diagnose',
+           'WorkspaceError', 'adopt', 'adopt_all', 'build_model', 'compare', 'diagnose',
            'fit', 'load_model', 'next_experiment', 'read_recording', 'simulate', 'write_recording']
 __version__ = '0.1.0'
 
 # Loaded at first use: `pprs --help` and a node's refusal need neither numpy nor a model.
 _HOMES = {
     'app.api.adopt': ('AdoptionResult', 'AdoptionRunResult', 'adopt', 'adopt_all'),
-    'app.api.changed': ('ChangeResult', 'changed'),
     'app.api.compare': ('ComparisonResult', 'compare'),
     'app.api.diagnose': ('DiagnosisResult', 'diagnose'),
     'app.api.fit': ('FitResult', 'fit'),
@@ -100,7 +99,8 @@ _HOMES = {
     'physics.mechanism.motion': ('PlatformMotion',),
     'physics.mechanism.paths': ('Excitation', 'HelicalPath'),
     'physics.model.mechanism_model': ('MechanismModel',),
-    'physics.model.drive_model': ('DriveForces', 'DriveModel', 'ModelState'),
+    'physics.model.drive_model': ('DriveModel',),
+    'physics.model.force_model': ('Forces', 'ModelState'),
     'physics.model.model_file': ('build_model', 'load_model'),
 }
 _MODULES = {name: f'{__name__}.{module}' for module, names in _HOMES.items() for name in names}

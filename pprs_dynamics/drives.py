@@ -102,7 +102,7 @@ class RecordedColumns(NamedTuple):
     decimal : {'.', ','}
         What is between the whole and the rest of a number.
     files : mapping of str to str
-        By quantity, or `time`: files that make one recording, from its folder; * stands for what
+        By quantity, or `time`: files that make one recording, from its folder; * is what
         recordings differ in.
     channels : mapping of str to str or int
         By quantity: a column of the whole machine, for drives that have none of their own.

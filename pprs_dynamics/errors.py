@@ -59,7 +59,7 @@ def beside(path: object) -> str:
 
 
 class Missing:
-    """Stands for a value that is absent, unlike None."""
+    """Marks a value that is absent, unlike None."""
 
     def __repr__(self) -> str:
         return 'missing'
@@ -80,7 +80,7 @@ class ModelError(PprsError, ValueError):
     key : str
         Full dotted name, e.g. ``geometry.rod_length``.
     value : object
-        What was found there; MISSING where nothing was.
+        The value there; MISSING if there is none.
     rule : str
         What is required, completing "must ...".
     source : str, optional
@@ -186,7 +186,7 @@ class MotionError(PprsError, ValueError):
     quantity : str
         The quantity of the motion, e.g. ``orientation``.
     found : str
-        What was found, with the sample.
+        The value, with the sample.
     rule : str
         What is required.
     kind : {'shape', 'finite', 'unit_length', 'time'}
@@ -206,7 +206,7 @@ class PoseError(PprsError):
     sample : int
         Index of the first such sample.
     found : str
-        What was found there.
+        The value there.
     rule : str
         What is required.
     """

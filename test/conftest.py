@@ -15,6 +15,7 @@ from types import ModuleType
 
 import pytest
 from discovery import in_a_hurry
+from file_budget import pytest_runtest_makereport  # noqa: F401
 from hypothesis import settings
 from listed_skips import (  # noqa: F401
     pytest_addoption,

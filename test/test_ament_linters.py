@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 PACKAGE = str(Path(__file__).parents[1] / 'pprs_dynamics')
 # Left to the judgement of people: docstrings of what is named for itself, and of properties, which
 # say what they are and not what to do.

@@ -16,7 +16,7 @@ import pytest
 from node_bench import bench
 from ros_processes import environment, node_process
 
-pytestmark = pytest.mark.nodes
+pytestmark = [pytest.mark.nodes, pytest.mark.slow]
 
 PROJECT = Path(__file__).parents[1]
 TESTED = ('pyproject.toml', 'test', 'demo', 'benchmarks', 'docs', 'README.md')

@@ -53,6 +53,8 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.simulation.arm_forms import NAMES
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
 
+pytestmark = pytest.mark.slow
+
 DRIVES = ('a', 'b')
 EFFECTS = ('viscous', 'coulomb', 'spring', 'offset')
 DRIFT = Truth('p', 'axis', 'single', 'white', 1.0, (Named('spring', ('b',), {

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from benchmarks import ROOT
 from benchmarks.naming.entrants import CONTROL, ENTRANTS, OURS, PART, PEER, PEERS
 from benchmarks.naming.problems import Answer, Named, Truth
 from benchmarks.naming.scoring import (
@@ -23,9 +24,9 @@ from benchmarks.naming.scoring import (
     seconds,
     set_size,
 )
+from benchmarks.results import RESULTS, write_results
 
 LIBRARIES = ('pprs_dynamics', 'numpy', 'scipy', 'scikit-learn', 'skglm', 'pysindy', 'mujoco')
-BEGIN, END = '<!-- figures: made by make naming -->', '<!-- end of figures -->'
 MAIN = ('right', 'first', 'named', 'exact', 'wrong alone', 'false alarms', 'unknown',
         'right drives', 'intervals hold')
 ASKED_OF_SOME = ('right drives', 'intervals hold')  # of those that an entrant tells
@@ -41,14 +42,12 @@ SHORT = {'pprs diagnose': 'pprs', 'adaptive group LASSO': 'group LASSO', 'Bayesi
 
 
 def write_page(scored: Mapping[str, Scored], real: Mapping[str, Scored], page: Path) -> None:
-    """Put the figures into a page, between its marks, and the picture beside it."""
-    picture = page.parent / 'images' / 'naming.png'
+    """Write a page with all tables, and the picture for `docs` or next to the page."""
+    picture = (ROOT / 'docs' if page.parent == RESULTS else page.parent) / 'images' / 'naming.png'
     picture.parent.mkdir(parents=True, exist_ok=True)
     draw(scored, picture)
-    text = page.read_text() if page.exists() else f'# The naming benchmark\n\n{BEGIN}\n{END}\n'
-    before, _, rest = text.partition(BEGIN)
-    after = rest.partition(END)[2]
-    page.write_text(f'{before}{BEGIN}\n{tables(scored)}\n{of_real_machines(real)}\n{versions()}\n{END}{after}')
+    write_results(page, 'The naming benchmark', 'make naming',
+                  f'{tables(scored)}\n{of_real_machines(real)}\n{versions()}')
 
 
 def tables(scored: Mapping[str, Scored]) -> str:

@@ -29,19 +29,13 @@ from pathlib import Path
 from benchmarks import ROOT
 from benchmarks.naming.columns import problem_of
 from benchmarks.naming.problems import Named, Truth
+from benchmarks.real import davinci, emps_files, recorded_data, ur10e
 from pprs_dynamics.app.commands.pprs import main as pprs
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model
 
-sys.path.insert(0, str(ROOT / 'docs'))
-
-import arms
-import closed_chain
-import emps
-import recorded_data
-
-UR10E_FREE = tuple(f'{name}.csv.gz' for name in arms.FITTED)
+UR10E_FREE = tuple(f'{name}.csv.gz' for name in ur10e.FITTED)
 UR10E_JOINTS = ('shoulder_lift_joint', 'elbow_joint', 'wrist_2_joint')
 RECORDINGS = Path(__file__).parent / 'recordings'  # that are shipped
 
@@ -99,18 +93,18 @@ def _without(machine: str, folder: str, recording: str, model: str | Callable[[P
                       zero=f'friction.{kind}') for drive in drives)
 
 
-UR10E, PSM = _written('arm.yaml', lambda: arms.MODEL), _written('psm.yaml', closed_chain.model_text)
+UR10E, PSM = _written('arm.yaml', lambda: ur10e.MODEL), _written('psm.yaml', davinci.model_text)
 PARTS = (
     *(Part('emps', 'emps', name, 'asymmetric_friction', ('axis',),
-           str(ROOT / 'config' / 'single_axis.yaml')) for name in (emps.IDENTIFICATION,
-                                                                   emps.PULSES)),
-    Part('ur10e', 'ur10e', f'{arms.LOADED}.csv.gz', 'payload_mass', None, UR10E, UR10E_FREE),
-    *_without('ur10e', 'ur10e', f'{arms.HELD_OUT}.csv.gz', UR10E, UR10E_JOINTS, 'coulomb',
+           str(ROOT / 'config' / 'single_axis.yaml')) for name in (emps_files.IDENTIFICATION,
+                                                                   emps_files.PULSES)),
+    Part('ur10e', 'ur10e', f'{ur10e.LOADED}.csv.gz', 'payload_mass', None, UR10E, UR10E_FREE),
+    *_without('ur10e', 'ur10e', f'{ur10e.HELD_OUT}.csv.gz', UR10E, UR10E_JOINTS, 'coulomb',
               UR10E_FREE),
-    *_without('ur10e', 'ur10e', f'{arms.HELD_OUT}.csv.gz', UR10E, UR10E_JOINTS[:2], 'viscous',
+    *_without('ur10e', 'ur10e', f'{ur10e.HELD_OUT}.csv.gz', UR10E, UR10E_JOINTS[:2], 'viscous',
               UR10E_FREE),
-    *(Part('psm', 'dvrk', f'{name}.csv.gz', 'link_mass', None, PSM, (closed_chain.FREE,), True)
-      for name in closed_chain.LOADED),
+    *(Part('psm', 'dvrk', f'{name}.csv.gz', 'link_mass', None, PSM, (davinci.FREE,), True)
+      for name in davinci.LOADED),
     Part('pendulum', 'pendulum', 'kg.csv.gz', 'payload_mass', None, 'pendulum.yaml',
          ('free.csv.gz',)),
     Part('pendulum', 'pendulum', 'gc.csv.gz', '', None, 'pendulum.yaml'),
@@ -165,7 +159,7 @@ def make(part: Part, data: Path, folder: Path) -> None:
     for urdf in base.parent.glob('*.urdf'):
         shutil.copy(urdf, target)
     if part.recording.endswith('.mat'):
-        write_recording(target / 'recording.csv', emps.read_emps(data / part.recording))
+        write_recording(target / 'recording.csv', emps_files.read_emps(data / part.recording))
     else:
         (target / 'recording.csv').write_bytes(
             gzip.decompress((data / part.recording).read_bytes()))

@@ -5,7 +5,7 @@
 
     python -m benchmarks.naming.run make FOLDER --seed 1 --problems 72
     python -m benchmarks.naming.run enter FOLDER [--entrant NAME …] [--minutes 4]
-    python -m benchmarks.naming.run score FOLDER [--page docs/benchmark.md]
+    python -m benchmarks.naming.run score FOLDER [--page benchmarks/results/naming.md]
     python -m benchmarks.naming.run reveal FOLDER PROBLEM
 
 `enter` runs what is missing, or was answered by other code or settings, and can be stopped. An

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Runs the feedforward node's benchmarks and writes docs/reliability.md from what they found.
+"""Run the benchmarks of the feedforward node and write their results.
 
     python -m benchmarks.node.reliability [--full] [PART ...]
 
@@ -23,10 +23,10 @@ from typing import Any
 
 from benchmarks import ROOT
 from benchmarks.node import fuzz, latency, parameter_storm, restart, soak, stall
-from benchmarks.node.reliability_page import HEAD, RELEASES, SECTIONS
+from benchmarks.node.reliability_page import SECTIONS
+from benchmarks.results import write_results
 
 KEPT = ROOT / 'output' / 'reliability'
-PAGE = ROOT / 'docs' / 'reliability.md'
 # Part: its module, and its size in short and in full.
 PARTS: dict[str, tuple[ModuleType, float, float]] = {
     'latency': (latency, 10.0, 60.0),
@@ -65,7 +65,7 @@ def main() -> int:
         if hasattr(part, 'passed') and not part.passed(found):
             print(f'{name}: FAILED')
             good = False
-    PAGE.write_text(page())
+    write_results('reliability', 'Reliability of the feedforward node', 'make reliability', page())
     return 0 if good else 1
 
 
@@ -84,7 +84,7 @@ def kept_size(name: str) -> float:
 
 def page() -> str:
     """Return the page, from what has been kept."""
-    text = [HEAD]
+    text = []
     for name, (_, _, full) in PARTS.items():
         file = KEPT / f'{name}.json'
         title, words = SECTIONS[name]
@@ -100,7 +100,7 @@ def page() -> str:
         text.append(words(kept['found']))
         text.append(f'{size}; {kept["cores"]} cores, load of the machine over the last five '
                     f'minutes {kept["load"]}.\n')
-    return '\n'.join([*text, RELEASES])
+    return '\n'.join(text)
 
 
 if __name__ == '__main__':

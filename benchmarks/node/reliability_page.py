@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Words of docs/reliability.md, which `reliability.py` writes."""
+"""Sections of the reliability results."""
 
 from __future__ import annotations
 
@@ -9,37 +9,6 @@ from collections.abc import Callable
 from typing import Any
 
 from benchmarks.node import latency
-
-HEAD = """# How far the feedforward node can be relied on
-
-`make reliability` runs all of this (about 20 minutes) and writes this page; `make
-reliability-full` does it at full size (an hour and more). What stands here was measured with
-Kilted on a virtual machine that other programs used too: a load over the number of cores means
-that node and client waited for a processor. The tests contain short forms of all but the first.
-"""
-
-RELEASES = """## Releases of ROS 2
-
-Run with the wheels of PyPI, Python 3.11 and Fast DDS:
-
-| release | rclpy | rmw_fastrtps_cpp | what was run |
-|---|---|---|---|
-| Kilted | 9.1.2 | 9.3.3 | every test, and all of the above |
-| Jazzy | 7.1.6 | 8.4.3 | the tests of the nodes over DDS; not those of `colcon` and of adoption \
-in closed loop, nor the above |
-
-Neither was run from a distribution's packages, nor with another middleware.
-
-Names of rclpy that are not public stand in `pprs_dynamics/ros/node/rclpy_internals.py` and nowhere
-else: `rclpy_implementation.WaitSet` with what it waits for and takes, and
-`Node._parameter_overrides`. Both releases have them, and so has the source of rclpy 8.0.0. Where
-one is missing, takes other arguments, raises, or leaves a timer unserved that is tried at the
-start, rclpy's own executor serves the node, which says so in the log and answers more slowly: it
-takes 0.57 to 0.84 ms of processor time a message at 500 Hz instead of 0.34 ms (two rounds, on a
-busy machine); and parameters are asked for one by one, by the names in the
-model's table, the parameter files and the command line. `test/ros/test_rclpy_internals.py` and
-`test/ros/test_executor.py` take the names away and talk to the node.
-"""
 
 
 def _latency(found: dict[str, Any]) -> str:

@@ -4,7 +4,7 @@
 """How often `diagnose` is right about physics hidden in recordings.
 
     python -m benchmarks.scores.diagnosis --quick
-    python -m benchmarks.scores.diagnosis --seeds 20 --nothing 200 --table docs/diagnosis_table.md
+    python -m benchmarks.scores.diagnosis --table benchmarks/results/diagnosis.md
 
 Every case's outcome is appended to FILE at once, and cases that are there are not run again: the
 run can be stopped and continued, and `--seeds` raised later. The table is made from that file.
@@ -28,6 +28,7 @@ import numpy as np
 from benchmarks import OUTPUT
 from benchmarks.hidden.off_forms import CAN_BE_OFF
 from benchmarks.hidden.recordings import PINK, Case, load_case, make_case, save_case
+from benchmarks.results import write_results
 from benchmarks.scores.cases import Each, engine, read_outcomes, run_missing, scoring_parser
 from benchmarks.scores.diagnosis_table import judge, make_table
 from benchmarks.scores.oracle import consult
@@ -199,10 +200,9 @@ def main() -> int:
     with engine(options) as each:
         run(todo, diagnose, file, each, recordings)
     table = make_table(read_outcomes(file))
+    print(table)
     if options.table:
-        options.table.write_text(table)
-    else:
-        print(table)
+        write_results(options.table, 'Hidden effects in the simulated 3-PPRS', 'make score', table)
     return 0
 
 

@@ -46,7 +46,7 @@ from benchmarks.scores.cases import Outcome, here, read_outcomes, run_missing
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.paired_errors import paired_gain
+from pprs_dynamics.inference.search.held_out import predictive_gain
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
 from pprs_dynamics.simulation.hidden_forces import FrictionTemperature
@@ -158,7 +158,7 @@ def _goes_on_to_claim(live: LiveDiagnosis, place: Scene, stream: Stream, seed: i
     assert live.last is not None
     before, _ = measure_residuals(live.model, [recording])
     after, _ = measure_residuals(live.last.adopted, [recording])
-    if paired_gain(before, after, live.last.noise).certainty < SCREEN:
+    if predictive_gain(before, after).certainty < SCREEN:
         return False
     return bool(live.with_window(recording, start).claimed)
 

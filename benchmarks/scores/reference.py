@@ -47,7 +47,7 @@ URDF = ('<?xml version="1.0"?><robot name="made_up"><link name="stand"/>'
         + JOINT.format('reach', 'prismatic', 'beam', 'slider', 0.4, '1 0 0') + '</robot>')
 MODEL = '''/**:
   ros__parameters:
-    arm: {urdf: made_up.urdf, base: stand, tool: slider, joints: [turn, swing, reach]}
+    robot: {urdf: made_up.urdf, base: stand, tool: slider, drives: [turn, swing, reach]}
     friction: {viscous: [8.0, 5.0, 20.0], coulomb: [6.0, 4.0, 9.0], offset: [0.3, -0.2, 0.5]}
 '''
 

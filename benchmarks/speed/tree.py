@@ -90,13 +90,15 @@ def steps(rounds: int) -> None:
     bodies = robot.by_joint, robot.gravity_row
 
     def kept() -> None:
-        rows, _ = evaluation.follow(*given)
+        rows, _ = evaluation.forward_kinematics(*given)
         evaluation.forces(rows, *bodies)
 
     _print('hexapod, one motion', _rounds({
-        'in one pass, nothing kept': lambda: evaluation.found(given, *bodies, NO_FRICTION),
-        'with friction of every joint': lambda: evaluation.found(given, *bodies, friction),
-        'all elements eliminated': lambda: full.found(given, *bodies, NO_FRICTION),
+        'in one pass, nothing kept': lambda: evaluation.inverse_dynamics(
+            given, *bodies, NO_FRICTION),
+        'with friction of every joint': lambda: evaluation.inverse_dynamics(
+            given, *bodies, friction),
+        'all elements eliminated': lambda: full.inverse_dynamics(given, *bodies, NO_FRICTION),
         'links and loads kept': kept}, rounds), 1e6 / BATCH)
 
 

@@ -23,6 +23,7 @@ from pprs_dynamics.physics.model.margins import Margins, margins
 from pprs_dynamics.ros.force_command import (
     HOLD_GRAVITY,
     SILENT,
+    DriveTrajectory,
     Feedforward,
     ForceCommand,
     parameters_for,
@@ -56,6 +57,7 @@ except ImportError:  # then nothing is known of a controller
 # Poses of a stream hardly differ within that time [s], and margins cost as much as the model.
 MARGINS_PERIOD = 0.01
 LAST_WORD = Duration(seconds=0.3)  # that a listener gets to take the last command
+STOP_TIME = 0.25  # [s] of a stop along a path where `stop_time` is 0
 
 
 class FeedforwardNode(ExplainsRefusals, ManagedNode):
@@ -112,6 +114,9 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         return super().on_activate(state)
 
     def _create_topics(self) -> None:
+        # What a controller has of this node's; whether any ever had; whether it is to be held.
+        self._sent: DriveTrajectory | None = None
+        self._has_sent = self._hold_is_due = False
         # Its memory begins anew.
         self._feedforward = Feedforward(self._settings.model, self._settings.node_values)
         self._commands = self._publisher(Float64MultiArray, '~/commands')
@@ -209,14 +214,16 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             position, velocity, _ = forces.drive_motion
             self._joint_command.publish(self._written.joint_state(
                 request.first_stamp, answer.effort[0], position[0], velocity[0]))
+        self._sent = None
         if self._joint_trajectory.get_subscription_count():
-            drives = self._feedforward.ending_at_rest(
+            drives = self._sent = self._feedforward.ending_at_rest(
                 answer, self._settings.node_values['stop_time'])
+            self._has_sent = True
             self._joint_trajectory.publish(self._written.joint_trajectory(
                 request.start, drives.offsets, drives, drives.effort))
             left = request.start + int(drives.offsets[-1]) - self.get_clock().now().nanoseconds
             self._controller.sent(drives.drive_motion[0], left / NANOSECONDS,
-                                  bool(drives.drive_motion[1][-1].any()))
+                                  not drives.ends_at_rest)
         for name, each in self._parts.items():
             if each.get_subscription_count():
                 each.publish(self._written.joint_state(
@@ -275,90 +282,114 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         return f'{self._joint_trajectory.topic_name}: {said}' if said else ''
 
     def _on_controller(self, state: Any) -> None:
-        """Hold a controller that becomes active: by itself it holds a pose without any effort."""
-        reference = self._controller.heard(state)
-        if (reference is None or self._watchdog is None or self.state != 'active'
-                or self._watchdog.fresh
+        """Hold a controller that becomes active: by itself it holds a pose without any effort.
+
+        Only one that this node has commanded before, and that stands: it may be another's now.
+        """
+        has_become_active = self._controller.heard(state)
+        self._hold_is_due |= has_become_active and self._has_sent
+        reference = self._controller.at_rest
+        if (not self._hold_is_due or reference is None or self._watchdog is None
+                or self.state != 'active' or self._watchdog.fresh
                 or self._settings.node_values['timeout_action'] != HOLD_GRAVITY):
             return
+        self._hold_is_due = False
         try:
-            self._hold_trajectory(self._feedforward.hold_at(reference), 0)
+            self._send_hold(self._feedforward.hold_at(reference))
         except PprsError as error:
             self.get_logger().warning(f'the controller holds without gravity: {error}')
         else:
             self.get_logger().info('the controller has become active: it holds with gravity')
 
-    def _hold_trajectory(self, held: ForceCommand, left: int) -> None:
-        """Let a trajectory controller come to rest at a pose within a time [ns], and hold it."""
-        if self._joint_trajectory.get_subscription_count():
-            self._joint_trajectory.publish(self._written.joint_trajectory(
-                0, np.array([left]), held.forces, held.effort))
+    def _send_hold(self, held: ForceCommand) -> None:
+        """Let the trajectory controller hold a pose at rest from now on."""
+        self._sent = DriveTrajectory(np.zeros(1, np.int64), held.forces.drive_motion, held.effort)
+        self._joint_trajectory.publish(self._written.joint_trajectory(
+            0, self._sent.offsets, held.forces, held.effort))
 
     def _reject(self, rejection: Rejection) -> None:
         self._counters[rejection.code] += 1
         text, watchdog = rejection.text, self._watchdog
         if rejection.code == 'EFFECT' and watchdog is not None and watchdog.fresh:
             # Not the message is wrong but the model: waiting for a better one would help nothing.
-            left = watchdog.left
             watchdog.stop()
             self._counters['stale'] += 1
-            text = f'{text}; {self._do_timeout_action(left)}'
+            text = f'{text}; {self._do_timeout_action()}'
         self._status.report('ERROR', rejection.code, text)
         self._log.warning('rejected', f'rejected, {rejection.code}: {text}')
 
     # --- stale commands -------------------------------------------------------------------------
 
-    def _on_stale(self) -> None:
-        node_values, complaint = self._settings.node_values, self._complaint
+    def _on_stale(self, clock_stands: bool) -> None:
+        complaint, timeout = self._complaint, self._settings.node_values['command_timeout']
         done = self._do_timeout_action()
+        ended = self._feedforward.has_come_to_rest and not clock_stands
+        self._counters['stale'] += not ended
         if complaint:
             self._status.report('ERROR', 'CONTROLLER', f'{complaint}; sent: {done}')
-            self._counters['stale'] += not self._feedforward.has_come_to_rest
-            return
-        if self._feedforward.has_come_to_rest:
+        elif ended:
             self._status.report('OK', 'DONE', f'the trajectory has ended at rest: {done}')
-            return
-        self._counters['stale'] += 1
-        text = f'no valid trajectory for {node_values["command_timeout"]:g} s: {done}'
-        self._status.report('STALE', 'STALE', text)
-        self._log.warning('stale', text)
+        else:
+            reason = ('the clock has stood still' if clock_stands else 'no valid trajectory')
+            text = f'{reason} for {timeout:g} s: {done}'
+            self._status.report('STALE', 'STALE', text)
+            self._log.warning('stale', text)
 
     def _last_word(self) -> None:
         """Do the timeout's action now where a command is in force, and see it off."""
         if self._watchdog is None or not self._watchdog.fresh:
             return
-        left = self._watchdog.left
         self._watchdog.stop()
-        self.get_logger().info(f'ends: {self._do_timeout_action(left)}')
+        self.get_logger().info(f'ends: {self._do_timeout_action()}')
         for each in (self._commands, self._joint_command, self._joint_trajectory, self._current):
             if each is not None:
                 each.wait_for_all_acked(LAST_WORD)
 
-    def _do_timeout_action(self, left: int = 0) -> str:
+    def _do_timeout_action(self) -> str:
         """Send what the action says on every topic, once, and return it in words.
 
-        Parameters
-        ----------
-        left : int
-            Until the end of the last trajectory, whose last pose is held [ns].
+        The pose that is held is that of the trajectory at the present ROS time: the robot is
+        nowhere else.
         """
         action = self._settings.node_values['timeout_action']
+        left = 0 if self._watchdog is None else self._watchdog.left
         if action == SILENT:
             return 'nothing goes out, the last command stays in force'
+        gravity = action == HOLD_GRAVITY
         try:
-            held = self._feedforward.hold(gravity=action == HOLD_GRAVITY)
+            held = self._feedforward.hold(gravity, left)
+            self._command(held)
+            if self._joint_command.get_subscription_count():
+                self._joint_command.publish(self._written.joint_state(
+                    self.get_clock().now().nanoseconds, held.effort[0],
+                    held.forces.mechanism.position[0], held.forces.mechanism.velocity[0]))
+            controller = self._end_trajectory(held, left, gravity)
         except PprsError as error:
             return f'the last command stays in force, as none can be given: {error}'
-        self._command(held)
-        if self._joint_command.get_subscription_count():
-            self._joint_command.publish(self._written.joint_state(
-                self.get_clock().now().nanoseconds, held.effort[0],
-                held.forces.mechanism.position[0], held.forces.mechanism.velocity[0]))
-        self._hold_trajectory(held, left)
-        if action != HOLD_GRAVITY:
-            return 'efforts are zero'
         failed = [name for name in self._feedforward.parts if name not in held.forces.parts]
-        return f'the last pose is held at rest{", without " if failed else ""}{", ".join(failed)}'
+        pose = 'the last pose' if left <= 0 else 'the pose on the path'
+        done = f'{pose} is held at rest' if gravity else 'efforts are zero'
+        return (f'{done}, without {", ".join(failed)}' if gravity and failed else done) + controller
+
+    def _end_trajectory(self, held: ForceCommand, left: int, gravity: bool) -> str:
+        """Let the trajectory controller come to rest on its path; return how, in words.
+
+        A controller that holds a trajectory which ends at rest gets nothing: any other message
+        would replace the rest of the path by a straight line.
+        """
+        if self._sent is None:
+            return ''
+        if left > 0:
+            if self._sent.ends_at_rest:
+                return '; a trajectory controller completes its trajectory, which ends at rest'
+            stop_time = self._settings.node_values['stop_time'] or STOP_TIME
+            self._sent = self._feedforward.stop(left, stop_time, gravity)
+            self._joint_trajectory.publish(self._written.joint_trajectory(
+                0, self._sent.offsets, self._sent, self._sent.effort))
+            return f'; a trajectory controller stops along the path in {stop_time:g} s'
+        if not self._sent.ends_as(held):
+            self._send_hold(held)
+        return ''
 
     # --- status ---------------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import LimitError, PprsError
 from pprs_dynamics.measurement.files.samples import Indices
+from pprs_dynamics.physics.mechanism.drive_path import DrivePath
 from pprs_dynamics.physics.mechanism.pose_spline import load_splines
 from pprs_dynamics.physics.model.force_model import RIGID_BODY, Forces, ModelState
 from pprs_dynamics.physics.model.limits import DriveLimits
@@ -28,6 +29,8 @@ from pprs_dynamics.ros.node.parameters import NodeParameter, node_parameter
 REVERSAL_VELOCITY = 'friction.reversal_velocity'
 CLAMP = 'clamp'
 HOLD_GRAVITY, ZERO, SILENT = 'hold_gravity', 'zero', 'silent'
+STILL = 1.1920929e-07  # [m/s, rad/s] joint_trajectory_controller's own bound for standing
+SAME_EFFORT = 1e-9  # [N, N m]
 
 FRAME = node_parameter('frame_id', '', 'frame of poses and forces; empty: base, for a platform',
                        stays=True)
@@ -112,6 +115,16 @@ class DriveTrajectory(NamedTuple):
     offsets: Indices
     drive_motion: tuple[Array, ...]
     effort: Array
+
+    @property
+    def ends_at_rest(self) -> bool:
+        """Whether the last point stands, by joint_trajectory_controller's own bound."""
+        return bool((np.abs(self.drive_motion[1][-1]) <= STILL).all())
+
+    def ends_as(self, held: ForceCommand) -> bool:
+        """Return whether the last point is a pose at rest with the efforts of a command."""
+        return (self.ends_at_rest and not self.drive_motion[2][-1].any()
+                and bool((np.abs(self.effort[-1] - held.effort[0]) <= SAME_EFFORT).all()))
 
 
 class _Leaving(NamedTuple):
@@ -293,8 +306,8 @@ class Feedforward:
             (np.concatenate((position, stop)), np.concatenate((velocity, rest)),
              np.concatenate((acceleration, rest))), np.concatenate((found.effort, effort)))
 
-    def hold_at(self, position: Array) -> ForceCommand:
-        """Return what holds the drives at rest at a position, (D,).
+    def hold_at(self, position: Array, gravity: bool = True) -> ForceCommand:
+        """Return the command that holds the drives at rest at a position, (D,).
 
         Raises
         ------
@@ -303,32 +316,78 @@ class Feedforward:
         """
         rest = np.zeros((1, len(position)))
         motion = self._model.motion_of_drives(position[None], rest, rest).held()
-        request = TrajectoryRequest(motion, 0, np.zeros(1, dtype=np.int64))
-        return self._at_rest(request, gravity=True)
+        return self._at_rest(TrajectoryRequest(motion, 0, np.zeros(1, dtype=np.int64)), gravity)
 
-    def hold(self, gravity: bool) -> ForceCommand:
-        """Return what goes out to hold the last accepted pose at rest, or zeros.
+    def hold(self, gravity: bool, left: int = 0) -> ForceCommand:
+        """Return the command that holds a pose of the last accepted trajectory at rest.
 
         Effects of other packages that fail are left out: a drive must be held without them, too.
+
+        Parameters
+        ----------
+        gravity : bool
+            False: all efforts are zero.
+        left : int
+            Time from the pose to the end of the trajectory [ns].
 
         Raises
         ------
         Rejection, PprsError
             Where there is no such force, e.g. as the model has changed since.
         """
+        last = self._accepted()
+        if left <= 0:
+            return self._at_rest(last.request, gravity)
+        path, now = _path_of(last), (int(last.request.offsets[-1]) - left) / NANOSECONDS
+        return self.hold_at(path.at(np.array([now])).position[0], gravity)
+
+    def stop(self, left: int, duration: float, gravity: bool) -> DriveTrajectory:
+        """Return a trajectory along the last accepted one that comes to rest.
+
+        Parameters
+        ----------
+        left : int
+            Time from where it begins to the end of the accepted one [ns].
+        duration : float
+            Of the stop [s].
+        gravity : bool
+            False: all efforts are zero.
+
+        Raises
+        ------
+        Rejection, PprsError
+            Where there are no such forces.
+        """
+        last = self._accepted()
+        now = (int(last.request.offsets[-1]) - left) / NANOSECONDS
+        path = _path_of(last).stop(now, duration)
+        lower, upper = self._limits.strokes
+        motion = self._model.motion_of_drives(
+            np.clip(path.position, lower, upper), path.velocity, path.acceleration)
+        forces = self._model.sound_at(motion).drive_forces(motion)
+        assert path.time is not None  # `stop` gives it
+        return DriveTrajectory(
+            np.array([round(moment * NANOSECONDS) for moment in path.time]), forces.drive_motion,
+            self._allowed(forces, gravity))
+
+    def _accepted(self) -> ForceCommand:
         if self._last is None:
             raise Rejection('EMPTY', 'no trajectory has been accepted')
-        return self._at_rest(self._last.request, gravity)
+        return self._last
 
     def _at_rest(self, request: TrajectoryRequest, gravity: bool) -> ForceCommand:
         # The forces at rest, not those of the way there: no memory of it.
         motion = request.motion.held()
         forces = self._model.sound_at(motion).drive_forces(motion)
+        return ForceCommand(request, forces, self._allowed(forces, gravity))
+
+    def _allowed(self, forces: Forces, gravity: bool) -> Array:
+        """Return scaled forces within the limits, or zeros, (N, D); raise where not finite."""
         effort = self._limits.clamped(self._scale * forces.total) if gravity else (
             np.zeros_like(forces.total))
         if not np.all(np.isfinite(effort)):
             raise Rejection('OUTPUT', 'the model gave an effort that is not finite')
-        return ForceCommand(request, forces, effort)
+        return np.asarray(effort)
 
     def _checked(self, request: TrajectoryRequest, forces: Forces) -> ForceCommand:
         effort = self._scale * forces.total if self._scales else forces.total
@@ -372,3 +431,9 @@ class Feedforward:
         assert self._epoch is not None  # `answer` sets it
         return request.motion.with_time(
             (request.start - self._epoch + request.offsets) / NANOSECONDS)
+
+
+def _path_of(command: ForceCommand) -> DrivePath:
+    """Return the path of the drives, its times counted from the start of the request [s]."""
+    position, velocity, _ = command.forces.drive_motion
+    return DrivePath(command.request.offsets / NANOSECONDS, position, velocity)

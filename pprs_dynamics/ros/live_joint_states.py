@@ -13,7 +13,7 @@ import json
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -21,27 +21,23 @@ from typing import Any
 
 import rclpy
 from rclpy.context import Context
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter_client import AsyncParameterClient
-from rclpy.qos import QoSPolicyKind, QoSProfile
 from rclpy.signals import SignalHandlerOptions
-from rclpy.subscription import Subscription
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
-from pprs_dynamics.errors import EffectError, PprsError, UnreadableFileError
-from pprs_dynamics.inference.residuals.live import ERROR_SPAN, LiveComparison
+from pprs_dynamics.errors import PprsError, UnreadableFileError
+from pprs_dynamics.inference.residuals.live import ERROR_SPAN
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.ros.live_stream import LiveStream
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
-from pprs_dynamics.ros.messages.measured_states import MeasuredStates
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.model_transaction import ACTIVE, PATIENCE, ModelSteps, running
-from pprs_dynamics.ros.node.qos import LATCHED, MEASURED, OFFERED
+from pprs_dynamics.ros.node.clocks import steady_timer
+from pprs_dynamics.ros.node.qos import LATCHED, MEASURED
 from pprs_dynamics.system.numbers import finite
 
 NAME = 'workbench'
@@ -73,22 +69,15 @@ class LiveJointStates(Node):
     def __init__(self, model: ForceModel, topic: str, monitor: str, feedforward: str,
                  **options: Any) -> None:
         super().__init__(NAME, **options)
-        self.model = model
-        self._comparison = LiveComparison(model)
-        # What drives there are, and how the machine calls them, stays.
-        self._states = MeasuredStates(RobotNames.of(model).joints)
-        self._lock = threading.Lock()
         self._ring: deque[tuple[int, Any, Any]] = deque(maxlen=MOST_SAMPLES)
         self._residuals: deque[tuple[float, Any]] = deque()
-        self._origin: int | None = None
         self._arrived = 0.0
-        self._counters = {'received': 0, 'rejected': 0}
-        self._trouble = ''
+        self._rejected = 0
+        self.stream = LiveStream(self, model, self._take, self._reject, topic=topic)
+        self.stream.listen()
         self._monitor: list[float] | None = None
         self._diagnosis: dict[str, Any] | None = None
         self._heard = 0.0
-        self._topic, self._offers_less = topic, False
-        self._states_heard = self._hear(MEASURED)
         # Raw, as what is no message of the kind would end the executor.
         self.create_subscription(Float64MultiArray, f'{monitor}/error', self._on_error, MEASURED,
                                  raw=True)
@@ -98,26 +87,9 @@ class LiveJointStates(Node):
         for name in (monitor, feedforward):
             self.create_subscription(String, f'{name}/status', partial(self._on_status, name),
                                      LATCHED, raw=True)
-        self.create_timer(COMPARED, self._compare)
+        steady_timer(self, COMPARED, self._compare)
         self.clients_of = {name: AsyncParameterClient(self, name)
                            for name in (monitor, feedforward)}
-
-    def _hear(self, profile: QoSProfile) -> Subscription:
-        """Subscribe to the joint states, and notice a publisher that offers less than is asked."""
-        return self.create_subscription(
-            JointState, self._topic, self._on_state, profile, raw=True,
-            event_callbacks=SubscriptionEventCallbacks(incompatible_qos=self._on_less))
-
-    def _on_less(self, event: Any) -> None:
-        # Not here: the subscription whose event this is would be destroyed within its callback.
-        self._offers_less = event.last_policy_kind == QoSPolicyKind.RELIABILITY
-
-    def _take_what_is_offered(self) -> None:
-        """Hear a driver whose joint states are best effort, as drivers over a network publish."""
-        if self._offers_less:
-            self._offers_less = False
-            self.destroy_subscription(self._states_heard)
-            self._states_heard = self._hear(OFFERED)
 
     def full_name(self, name: str) -> str:
         """Return a node's name with its namespace."""
@@ -155,28 +127,17 @@ class LiveJointStates(Node):
             if isinstance(found, dict):
                 self._statuses[name] = found
 
-    def use_model(self, model: ForceModel) -> None:
-        """Compare with another model from now on."""
-        with self._lock:
-            self.model = model
-            self._comparison.use_model(model)
+    @property
+    def model(self) -> ForceModel:
+        """What is compared with."""
+        return self.stream.model
 
-    def _on_state(self, data: bytes) -> None:
-        self._counters['received'] += 1
-        try:
-            samples = self._states.read(data)
-        except Rejection as rejection:
-            self._counters['rejected'] += 1
-            self._trouble = str(rejection)
-            return
-        with self._lock:
-            for stamp, position, effort in samples:
-                self._arrived = time.monotonic()
-                if self._origin is None:
-                    self._origin = stamp
-                self._ring.append((stamp, position, effort))
-                self._comparison.push((stamp - self._origin) / conversions.NANOSECONDS, position,
-                                      effort)
+    def _take(self, stamp: int, position: Any, effort: Any) -> None:
+        self._arrived = time.monotonic()
+        self._ring.append((stamp, position, effort))
+
+    def _reject(self, rejection: Rejection) -> None:
+        self._rejected += 1
 
     def _on_error(self, data: bytes) -> None:
         with suppress(Rejection):
@@ -190,18 +151,10 @@ class LiveJointStates(Node):
                 self._diagnosis = found
 
     def _compare(self) -> None:
-        self._take_what_is_offered()
-        with self._lock:
-            try:
-                compared = self._comparison.evaluate()
-            except PprsError as error:
-                self._trouble = str(error)
-                if isinstance(error, EffectError):  # its memory may be half advanced
-                    self._comparison.use_model(self.model)
-                return
-            if compared is None:
-                return
-            self._trouble = ''
+        compared = self.stream.compare()
+        if compared is None:
+            return
+        with self.stream.lock:
             self._residuals.extend(zip(compared.time.tolist(), compared.residual, strict=True))
             last = self._residuals[-1][0]
             while not last - SHOWN <= self._residuals[0][0] <= last:  # stamps may go back, too
@@ -215,7 +168,7 @@ class LiveJointStates(Node):
         PprsError
             Where that is no recording.
         """
-        with self._lock:
+        with self.stream.lock:
             samples = list(self._ring)
         if not samples:
             raise UnreadableFileError('joint_states', 'nothing has come in yet')
@@ -227,15 +180,18 @@ class LiveJointStates(Node):
     def to_dict(self) -> dict[str, Any]:
         """Return how it stands, and what was left of late [N]."""
         now = time.monotonic()
-        with self._lock:
-            running = self._comparison.running_error().tolist()
+        with self.stream.lock:
+            running = self.stream.comparison.running_error().tolist()
             late = list(self._residuals)
             span = ((self._ring[-1][0] - self._ring[0][0]) / conversions.NANOSECONDS
                     if self._ring else 0.0)
             age = now - self._arrived if self._arrived else None
         step = max(1, len(late) // 1000)
-        return {**self._counters, 'drives': list(self.model.drives), 'age': age, 'kept': span,
-                'trouble': self._trouble, 'diagnosis': self._diagnosis,
+        waits = self.stream.waits_for()
+        trouble = str(self.stream.trouble or '') or (waits[1] if waits else '')
+        return {'received': self.stream.counters['received'], 'rejected': self._rejected,
+                'drives': list(self.model.drives), 'age': age, 'kept': span,
+                'trouble': trouble, 'diagnosis': self._diagnosis,
                 'effects': list(self.model.values.get(ACTIVE, ())),
                 'error': [finite(value) for value in running],
                 'monitor_error': [finite(value) for value in self._monitor]
@@ -256,12 +212,16 @@ class LiveNodes:
         As `LiveJointStates`.
     namespace : str
         In which relative names are resolved.
+    arguments : sequence of str
+        Of ROS 2, with --ros-args: remappings, use_sim_time, QoS overrides.
     """
 
     def __init__(self, model: ForceModel, topic: str = 'joint_states', monitor: str = 'monitor',
-                 feedforward: str = 'feedforward', namespace: str = '') -> None:
+                 feedforward: str = 'feedforward', namespace: str = '',
+                 arguments: Sequence[str] = ()) -> None:
         self._context = Context()
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=list(arguments), context=self._context,
+                   signal_handler_options=SignalHandlerOptions.NO)
         self._node = LiveJointStates(model, topic, monitor, feedforward, namespace=namespace,
                                      context=self._context)
         self._steps = ModelSteps(self._node.clients_of, model.values)
@@ -317,14 +277,14 @@ class LiveNodes:
         answer = self._steps.set_model(model.values, self._confirmed(confirmed))
         if answer.is_done:
             self._models.append(self._node.model)
-            self._node.use_model(model)
+            self._node.stream.use_model(model)
         return {'is_set': answer.is_done, 'nodes': answer.said}
 
     def restore(self, confirmed: str) -> dict[str, Any]:
         """Set the nodes back to what they had before the last model; see `set_model`."""
         answer = self._steps.restore(self._confirmed(confirmed))
         if answer.is_done:
-            self._node.use_model(self._models.pop())
+            self._node.stream.use_model(self._models.pop())
         return {'is_set': answer.is_done, 'nodes': answer.said}
 
     @property

@@ -19,20 +19,14 @@ from std_msgs.msg import Float64MultiArray, String
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_effort
-from pprs_dynamics.errors import EffectError, PprsError
-from pprs_dynamics.inference.residuals.live import (
-    ARM_WINDOW,
-    ERROR_SPAN,
-    WINDOW,
-    Compared,
-    LiveComparison,
-)
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.residuals.live import ARM_WINDOW, ERROR_SPAN, WINDOW, Compared
 from pprs_dynamics.physics.model.keys import is_mechanism
 from pprs_dynamics.ros.diagnosis_worker import ADOPTED, DiagnosisWorker, StreamWindows
 from pprs_dynamics.ros.force_command import FRAME
+from pprs_dynamics.ros.live_stream import LiveStream
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
-from pprs_dynamics.ros.messages.measured_states import MeasuredStates
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
 from pprs_dynamics.ros.node.all_joints import AllJoints
 from pprs_dynamics.ros.node.clocks import steady_timer
@@ -42,13 +36,7 @@ from pprs_dynamics.ros.node.model_services import ModelServices, NotAdoptedError
 from pprs_dynamics.ros.node.parameters import NodeParameter, node_parameter, overrides
 from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import files_given, hardware_of
-from pprs_dynamics.ros.node.qos import (
-    EVERY_MESSAGE,
-    LATCHED,
-    MEASURED,
-    publisher,
-    subscription,
-)
+from pprs_dynamics.ros.node.qos import EVERY_MESSAGE, LATCHED, publisher
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 from pprs_dynamics.system.plain_text import for_json
@@ -93,7 +81,6 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         ManagedNode.__init__(self, 'monitor', allow_undeclared_parameters=True, **options)
         self._log = ThrottledLog(self)
         self._worker = DiagnosisWorker()
-        self._input: Any = None
         self._publishers_made: list[Any] = []
         self._clocks: list[Timer] = []
         parameters: tuple[NodeParameter, ...] = PARAMETERS
@@ -104,8 +91,11 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         node_values = self._settings.node_values
         prepare_beside(self, self._settings.model)
         self._names = RobotNames.of(self._settings.model, node_values['frame_id'])
-        self._counters = {'received': 0, 'samples': 0, 'compared': 0, 'gaps': 0, 'bridged': 0,
-                          **dict.fromkeys(REJECTIONS, 0)}
+        self._stream = LiveStream(
+            self, self._settings.model, self._take, self._reject, lambda: self.state == 'active',
+            window=node_values['window'], span=node_values['error_span'])
+        self._counters = self._stream.counters
+        self._counters.update(dict.fromkeys(REJECTIONS, 0))
         self._share, self._counted = 1.0, (0, 0)
         self._files = files_given(options.get('cli_args') or sys.argv)
         self._joints = AllJoints()
@@ -125,12 +115,9 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
 
     def _begin_stream(self) -> None:
         node_values = self._settings.node_values
-        self._comparison = LiveComparison(
-            self._settings.model, node_values['window'], node_values['error_span'])
-        self._states = MeasuredStates(self._names.joints)
+        self._stream.begin(self._settings.model)
         self._windows = StreamWindows(node_values['diagnose_every'], node_values['diagnose_span'])
-        self._begins_anew, self._cannot_begin, self._changed = False, False, ''
-        self._origin: int | None = None
+        self._changed = ''
         self._latest: tuple[int, Array] | None = None
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -151,8 +138,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._error = self._publisher(Float64MultiArray, '~/error')
         self._all_joints = self._publisher(JointState, '~/joint_states_full')
         self._tf = self._publisher(TFMessage, '/tf') if TFMessage else None
-        self._input = subscription(self, JointState, 'joint_states', self._on_state, raw=True,
-                                   profile=MEASURED)
+        self._stream.listen()
         self._clocks = [steady_timer(self, 1.0 / node_values['update_rate'], self._compare)]
         if node_values['diagnose_every']:
             self._diagnosis = self._publisher(String, '~/diagnosis', LATCHED)
@@ -165,37 +151,19 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
     def _destroy_topics(self) -> None:
         for clock in self._clocks:
             self.destroy_timer(clock)
-        if self._input is not None:
-            self.destroy_subscription(self._input)
+        self._stream.close()
         for each in self._publishers_made:
             self.destroy_publisher(each)
-        self._clocks, self._input, self._publishers_made = [], None, []
+        self._clocks, self._publishers_made = [], []
 
     def _use(self) -> None:
-        self._begins_anew = True
+        self._stream.use_model(self._settings.model)
 
     # --- measurements -----------------------------------------------------------------------------
 
-    def _on_state(self, data: bytes) -> None:
-        if self.state != 'active':
-            return
-        self._counters['received'] += 1
-        try:
-            samples = self._states.read(data)
-        except Rejection as rejection:
-            self._reject(rejection)
-            return
-        self._counters['samples'] += len(samples)
-        for stamp, position, effort in samples:
-            self._latest = stamp, position
-            if self._cannot_begin:
-                return  # samples would pile up
-            if self._origin is None:
-                self._origin = stamp
-            # Counted from the first stamp: seconds since 1970 would cost digits.
-            self._comparison.push((stamp - self._origin) / conversions.NANOSECONDS, position,
-                                  effort)
-            self._windows.push(stamp, position, effort)
+    def _take(self, stamp: int, position: Array, effort: Array) -> None:
+        self._latest = stamp, position
+        self._windows.push(stamp, position, effort)
 
     def _draw(self) -> None:
         """Publish where all joints are, for programs that draw the robot."""
@@ -219,24 +187,10 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         if self.state != 'active':
             return
         self._draw()
-        try:
-            if self._begins_anew:
-                self._cannot_begin = True
-                self._comparison.use_model(self._settings.model)
-                self._begins_anew = self._cannot_begin = False
-            compared = self._comparison.evaluate()
-        except PprsError as error:
-            # An effect that failed may have left its memory half advanced.
-            self._begins_anew = self._begins_anew or isinstance(error, EffectError)
-            self._reject(Rejection.of(error))
+        if (compared := self._stream.compare()) is None:
             return
-        self._counters['gaps'] = self._comparison.gaps
-        self._counters['bridged'] = self._comparison.bridged
-        if compared is None:
-            return
-        self._counters['compared'] += len(compared.time)
         self._publish(compared)
-        running = self._comparison.running_error()
+        running = self._stream.comparison.running_error()
         self._error.publish(Float64MultiArray(data=running.tolist()))
         self._status.facts['error'] = [round(value, 6) if np.isfinite(value) else None
                                        for value in running.tolist()]
@@ -245,7 +199,9 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
                 if np.isfinite(running).any() else
                 'no running error: efforts are not measured, or all joints stand')
         text += f'; {self._share:.0%} of the samples are compared'
-        if drives := self._comparison.unexplained():
+        if self._stream.measures_no_effort:
+            self._status.report('WARN', 'WAITING', f'nothing is compared: {text}')
+        elif drives := self._stream.comparison.unexplained():
             self._status.report(
                 'WARN', 'UNEXPLAINED', f'the error of {", ".join(drives)} is as large as the '
                 f'effort: this is another machine, or its efforts are no measurement; {text}')
@@ -262,7 +218,10 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
             self._status.report('OK', 'OK', text)
 
     def _refresh(self) -> None:
-        """Bring the share of samples that are compared up to date."""
+        """Bring the share of samples that are compared up to date; warn where there are none."""
+        if self.state == 'active' and (reason := self._stream.waits_for()):
+            code, text = reason
+            self._status.report('WARN', code, f'nothing is compared: {text}')
         samples, compared = self._counters['samples'], self._counters['compared']
         came, were = samples - self._counted[0], compared - self._counted[1]
         self._counted = samples, compared
@@ -319,9 +278,8 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
                                (self._residual, compared.residual)):
             if topic.get_subscription_count():
                 for time, effort in zip(compared.time, efforts, strict=True):
-                    stamp = self._origin + round(time * conversions.NANOSECONDS)
                     topic.publish(conversions.joint_state(
-                        stamp, effort, names=self._names))
+                        self._stream.stamp_of(time), effort, names=self._names))
 
     def _reject(self, rejection: Rejection) -> None:
         self._counters[rejection.code] += 1

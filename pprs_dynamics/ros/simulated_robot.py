@@ -78,7 +78,8 @@ OF_JOINTS = (
 # What of a running robot changes: what is hidden in it, and parameters of ROS 2 itself.
 CHANGEABLE = ('hidden_effects', 'hidden_scale', 'seed')
 OF_ROS = ('use_sim_time', 'start_type_description_service')
-# A node that was stopped for longer than this [s] goes on from now instead of catching up.
+# A node that was stopped for longer than this [s], or whose clock was set back by more, goes on
+# from now instead of catching up or waiting.
 LONGEST_CATCH_UP = 0.5
 # Between them the executor takes one command: with more, commands at 200 Hz would pile up.
 CYCLES_AT_ONCE = 2
@@ -137,8 +138,10 @@ class SimulatedRobotNode(ExplainsRefusals):
 
     def _on_timer(self) -> None:
         behind = self._now() - self._lag - self._robot.time
-        if behind > LONGEST_CATCH_UP:
+        if abs(behind) > LONGEST_CATCH_UP:  # where it is negative, the clock was set back
             self._lag += behind
+            if behind < 0:
+                self._queue.clear()
         # A few at a time: commands must get through even where the machine cannot keep up.
         for _ in range(CYCLES_AT_ONCE):
             late = self._now() - self._lag - self._robot.time

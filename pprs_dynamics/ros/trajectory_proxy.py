@@ -29,7 +29,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.preparation import prepare
-from pprs_dynamics.ros.force_command import Feedforward, parameters_for
+from pprs_dynamics.ros.force_command import STILL, Feedforward, parameters_for
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.serialisation import CommandObjects
@@ -61,7 +61,6 @@ Result = FollowJointTrajectory.Result
 # [s] after the last point of a goal at rest in which its inertia's effort goes over to none: the
 # controller holds the effort of the very last point until it is told another.
 SETTLING = 0.02
-STILL = 1.1920929e-07  # [m/s, rad/s] joint_trajectory_controller's own bound for standing
 # Share of a goal's motion before the end of which the answer that it is reached is not believed;
 # a controller's clock and its last cycles take less.
 LEFT_AT_MOST = 0.1
@@ -144,19 +143,18 @@ class TrajectoryProxyNode(ExplainsRefusals):
     def _on_controller(self, state: Any) -> None:
         """Let the controller hold with gravity where it would hold without."""
         self._speed_scaling = max(self._speed_scaling, state.speed_scaling_factor)
-        if self._controller.heard(state) is not None:  # it has become active
-            self._hold_is_due = True
+        has_become_active = self._controller.heard(state)
+        # What another commands is not held.
+        self._hold_is_due |= has_become_active and self._counters['passed_on'] > 0
+        reference = self._controller.at_rest
         # It would go over to the hold in the middle of a goal, which brings its own efforts.
-        if not (self._hold_is_due and self._relay.is_idle) or (
-                not set(self._joints) <= set(state.joint_names)):
+        if not (self._hold_is_due and self._relay.is_idle) or reference is None:
             return
-        values = dict(zip(state.joint_names, state.reference.positions, strict=False))
         self._hold_is_due = False
         model = self._settings.model
         try:
-            held = Feedforward(model, self._settings.node_values).hold_at(
-                np.array([values[joint] for joint in self._joints]))
-        except (PprsError, KeyError) as error:
+            held = Feedforward(model, self._settings.node_values).hold_at(reference)
+        except PprsError as error:
             self.get_logger().warning(f'the controller holds without gravity: {error}')
             return
         self._hold.publish(CommandObjects(RobotNames.of(model)).joint_trajectory(

@@ -3,44 +3,61 @@
 
 """MuJoCo's model of a mechanism: its kinematics, inertia, gravity and reactions.
 
-MuJoCo reads the URDF by a parser of its own; the model's numbers are put into its bodies.
+MuJoCo reads the description itself. Its masses, inertias, gravity and couplings are retained:
+`ArmEngine` raises where the model reads the description otherwise.
 """
 
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.description import Frame, body_at, principal_inertia
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.mechanism.description import (
+    PARAMETERS,
+    Frame,
+    body_at,
+    inertial_in,
+    principal_inertia,
+)
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+from pprs_dynamics.physics.mechanism.mjcf import readable_spec
 from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
-from pprs_dynamics.physics.mechanism.urdf import expanded
+from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.robot_block import described_gravity
 from pprs_dynamics.simulation.arm_forms import tilted, truth
 from pprs_dynamics.simulation.engine_loops import ClosedMotion, EngineLoops, cross
 from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState
 
-COMPILER = {'fusestatic': 'true', 'balanceinertia': 'false'}
+CARRIER = '_added_to_'  # body of what is added to a joint
+LEAST = 1e-12  # [kg, kg m^2], of bodies that another's inertia contains
+COMPILER = {'fusestatic': 'false', 'balanceinertia': 'false', 'boundmass': str(LEAST),
+            'boundinertia': str(LEAST)}
 SLOWEST = 1e-9  # of the width in which friction turns over, below which tanh(x) / x is 1
-LEAST = 1e-9  # [kg, kg m^2], of bodies that another's inertia contains
+AGREEMENT = 1e-6  # of the largest effort
+WIDEST, SPAN = 1.0, 0.3  # [rad, m] of a drive, and the share of it in which both are compared
 
 
 class ArmEngine:
     """MuJoCo's model of a mechanism.
 
-    Its kinematics, inertia, gravity and reactions: of the model it has the numbers, and how the
-    description is assembled.
+    Numbers that the model file states in place of the description's replace MuJoCo's.
 
     Parameters
     ----------
     model : MechanismModel
+
+    Raises
+    ------
+    ModelError
+        If MuJoCo computes other efforts from the description than the model.
     """
 
     def __init__(self, model: MechanismModel) -> None:
@@ -48,66 +65,118 @@ class ArmEngine:
         robot = self.robot = self.described = model.robot
         structure = self.structure = robot.structure
         path = Path(structure.description.path)
-        if path.suffix == '.urdf' or model.values.get(f'{model.block}.urdf'):
-            self.model = mujoco.MjModel.from_xml_string(_bare(path))
+        is_mjcf = bool(model.values.get('robot.mjcf'))
+        links = structure.description.links
+        refused = {} if is_mjcf else {name: parameters for name, parameters in links.items()
+                                      if structure.links[name][0] and not _is_body(parameters)}
+        if is_mjcf:
+            spec = readable_spec(mujoco, str(path))
         else:
-            self.model = mujoco.MjModel.from_xml_path(str(path))
+            spec = mujoco.MjSpec.from_string(_bare(path, refused))
+            spec.fuse_static()
+        placed = {body.name: structure.links[body.name] for body in spec.bodies[1:]
+                  if body.name in structure.links}
+        self._frames = {0: Frame()}
+        of_row: dict[int, str] = {}
+        for name, (row, frame) in placed.items():
+            if row and row not in of_row:
+                of_row[row], self._frames[row] = name, frame
+                self._add_carrier(spec.body(name), row)
+        self.model = spec.compile()
+        self.links = {0: 0} | {row: int(self.model.body(name).id) for row, name in of_row.items()}
+        for name, row in structure.rows.items():  # of several joints on a body
+            if row not in self.links:
+                self.links[row] = int(self.model.jnt_bodyid[self.model.joint(name).id])
+        self._added = {row: np.zeros(PARAMETERS) for row in of_row}
         # MuJoCo's world is the root of the description, ours its base.
         hung = {joint.child for joint in structure.description.joints.values()}
         root = next(name for name in structure.description.links if name not in hung)
         self.root = structure.links[root][1]
         self.state = EngineState(mujoco, self.model, structure, self.root)
         self.data = self.state.data
-        self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self.model.dof_armature[:], self.model.dof_damping[:] = 0.0, 0.0
         self.model.dof_frictionloss[:], self.model.jnt_stiffness[:] = 0.0, 0.0
-        # All that is fixed to a joint is in its inertial parameters: other bodies weigh nothing.
-        self.model.body_mass[1:], self.model.body_inertia[1:] = LEAST, LEAST
-        self.links = {row: int(self.model.body(structure.moved_by[row]).id)
-                      for row in {0, *structure.rows.values(), *structure.tables.loop_a.tolist(),
-                                  *structure.tables.loop_b.tolist(), *robot.bodies.tolist()} if row}
-        self.links[0] = 0
         self._names = {row: name for name, row in structure.rows.items()}
-        self.loops = EngineLoops(self.state, self.links)
+        self.loops = EngineLoops(self.state, self.links, self._frames)
         self._last: tuple[JointMotion, ClosedMotion] | None = None
+        for name, parameters in refused.items():
+            row, frame = structure.links[name]
+            self._carry(row, inertial_in(frame, parameters))
         for row, parameters in zip(robot.bodies, robot.inertial, strict=True):
-            self._set_body(self.links[int(row)], parameters)
-        mujoco.mj_setConst(self.model, self.data)
-        self.gravity = np.asarray(robot.gravity, dtype=float)
+            if not np.array_equal(parameters, structure.inertial[row]):
+                for name, (of, _) in placed.items():
+                    if of == row:
+                        body = self.model.body(name).id
+                        self.model.body_mass[body] = self.model.body_inertia[body] = LEAST
+                self._carry(int(row), parameters - self._added[int(row)])
+        weightless = self.model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
+        own = np.zeros(3) if weightless else self.model.opt.gravity
+        self.gravity = (self.root.R @ own if robot.gravity == described_gravity(structure)
+                        else np.array(robot.gravity))
+        self.model.opt.disableflags = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self.wrench = np.zeros(6)  # that the tool applies at its origin, in the base's axes
+        mujoco.mj_setConst(self.model, self.data)
+        self._require_agreement(model)
 
-    def _set_body(self, body: int, parameters: Array) -> None:
-        mass, centre, moments, axes = principal_inertia(parameters)
+    def _add_carrier(self, body: Any, row: int) -> None:
+        """Add a body to one of the description's, in the joint's frame, for what is added to it."""
+        frame = self._frames[row].inverse
+        carrier = body.add_body(name=f'{CARRIER}{row}', pos=frame.p, quat=self._quaternion(frame.R))
+        # Off the frame, else MuJoCo takes short cuts that hold for this inertia alone.
+        carrier.mass, carrier.ipos, carrier.iquat = LEAST, (0.1, 0.2, 0.3), (1.0, 0.1, 0.2, 0.3)
+        carrier.inertia, carrier.explicitinertial = (LEAST, 1.1 * LEAST, 1.2 * LEAST), True
+
+    def _quaternion(self, R: Array) -> Array:
+        quaternion = np.empty(4)
+        self.engine.mju_mat2Quat(quaternion, np.ascontiguousarray(R).ravel())
+        return quaternion
+
+    def _carry(self, row: int, parameters: Array) -> None:
+        """Add inertial parameters (10,) to what a joint moves, in the joint's frame."""
+        self._added[row] = self._added[row] + parameters
+        body = self.model.body(f'{CARRIER}{row}').id
+        mass, centre, moments, axes = principal_inertia(self._added[row])
         self.model.body_mass[body], self.model.body_ipos[body] = mass, centre
         self.model.body_inertia[body] = np.maximum(moments, LEAST)
-        quaternion = np.empty(4)
-        self.engine.mju_mat2Quat(quaternion, axes.ravel())
-        self.model.body_iquat[body] = quaternion
-
-    def _put(self, robot: Mechanism, row: int) -> None:
-        self.robot = robot
-        at = int(np.flatnonzero(robot.bodies == row)[0])
-        self._set_body(self.links[row], robot.inertial[at])
+        self.model.body_iquat[body] = self._quaternion(axes)
         self.engine.mj_setConst(self.model, self.data)
+
+    def _require_agreement(self, model: MechanismModel) -> None:
+        """Raise ModelError where MuJoCo's efforts without friction are others than the model's."""
+        structure, random = self.structure, np.random.default_rng(0)
+        middle, way = structure.room(WIDEST)
+        rates = random.uniform(-1.0, 1.0, (3, 2, len(middle)))
+        rates[0] *= SPAN * way * (0.1 if structure.loops else 1.0)
+        motion = JointMotion(middle + rates[0], rates[1], rates[2], np.arange(2.0))
+        ours, theirs = model.mechanism(motion).transmitted, self.torques(motion)
+        off = np.abs(ours - theirs)
+        if np.max(off) <= AGREEMENT * max(float(np.abs(theirs).max()), 1.0):
+            return
+        k, drive = np.unravel_index(int(np.argmax(off)), off.shape)
+        raise ModelError(
+            "robot.mjcf" if model.values.get("robot.mjcf") else "robot.urdf",
+            structure.description.path, f'give one effort of {structure.drives[drive]}, but at '
+            f'{motion.position[k].round(4).tolist()} it is {ours[k, drive]:.6g} in the model and '
+            f'{theirs[k, drive]:.6g} in MuJoCo: please report this file')
 
     def add_payload(self, mass: float, offset: Array) -> None:
         """Hang a point mass on the tool, `offset` from its origin in its axes [m]."""
         x, y, z = offset
-        tool = self.structure.tool
         point = mass * np.array([1, x, y, z, y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z,
                                  x * x + y * y])
-        row = self.structure.links[tool][0]
-        self.links.setdefault(row, int(self.model.body(self.structure.moved_by[row]).id))
-        self._put(self.robot.with_body(tool, point), row)
+        row, frame = self.structure.links[self.structure.tool]
+        self._carry(row, inertial_in(frame, point))
+        self.robot = self.robot.with_body(self.structure.tool, point)
 
     def add_to_link(self, body: int, mass: float) -> None:
         """Put a point mass at the centre of a body [kg]."""
         row = int(self.robot.bodies[body])
         parameters = self.robot.inertial[body]
         link = self.robot.body_names[body]
-        _, frame = self.structure.links[link]
-        centre = frame.inverse.of_point(parameters[1:4] / parameters[0])
-        self._put(self.robot.with_body(link, body_at(mass, tuple(centre), np.zeros((3, 3)))), row)
+        centre = parameters[1:4] / parameters[0]
+        self._carry(row, body_at(mass, tuple(centre), np.zeros((3, 3))))
+        at = self.structure.links[link][1].inverse.of_point(centre)
+        self.robot = self.robot.with_body(link, body_at(mass, tuple(at), np.zeros((3, 3))))
 
     def hide_payload(self, random: np.random.Generator, scale: float, ahead: float,
                      ) -> dict[str, Any]:
@@ -239,10 +308,8 @@ class ArmEngine:
         data = self.data
         forces = self.loops.transmitted(needed, efforts)
         self.loops.apply(forces)
-        row, frame = self.structure.links[self.structure.tool]
         if self.wrench.any():
-            body = self.links[row]
-            at = Frame(data.xmat[body].reshape(3, 3), data.xpos[body]).of_point(frame.p)
+            body, at = self._tool()
             force, moment = (self.root.R.T @ part for part in (self.wrench[:3], self.wrench[3:]))
             data.xfrc_applied[body, :3] -= force
             data.xfrc_applied[body, 3:] -= moment + np.cross(at - data.xipos[body], force)
@@ -250,28 +317,39 @@ class ArmEngine:
         data.xfrc_applied[:] = 0.0
         return forces
 
+    def _tool(self) -> tuple[int, Array]:
+        """Return the body that has the tool, and the tool's origin in the engine's world."""
+        row, frame = self.structure.links[self.structure.tool]
+        body, own = self.links[row], self._frames[row].inverse
+        there = Frame(self.data.xmat[body].reshape(3, 3), self.data.xpos[body])
+        return body, there.of_point(own.of_point(frame.p))
+
     def _of_wrench(self) -> Array:
         """Return the efforts of all joints with which the tool applies the wrench, (nv,)."""
-        row, frame = self.structure.links[self.structure.tool]
-        body, efforts = self.links[row], np.zeros(self.model.nv)
-        at = Frame(self.data.xmat[body].reshape(3, 3), self.data.xpos[body]).of_point(frame.p)
+        (body, at), efforts = self._tool(), np.zeros(self.model.nv)
         self.engine.mj_applyFT(self.model, self.data, self.root.R.T @ self.wrench[:3],
                                self.root.R.T @ self.wrench[3:], at, body, efforts)
         return efforts
 
 
-def _bare(path: Path) -> str:
-    """Return a URDF without meshes, every link with some mass: it is set afterwards."""
+def _is_body(parameters: Array) -> bool:
+    """Return whether MuJoCo takes a body: no moment of inertia above the sum of the others."""
+    _, _, (low, middle, high), _ = principal_inertia(parameters)
+    return bool(low >= 0 and high <= low + middle)
+
+
+def _bare(path: Path, refused: Container[str]) -> str:
+    """Return a URDF without shapes, and without the inertia of links that MuJoCo refuses."""
     robot = ElementTree.fromstring(expanded(str(path)))
     for link in robot.findall('link'):
-        for part in (*link.findall('visual'), *link.findall('collision'),
-                     *link.findall('inertial')):
+        inertia = link.findall('inertial') if link.get('name', '') in refused else []
+        for part in (*link.findall('visual'), *link.findall('collision'), *inertia):
             link.remove(part)
-        inertial = ElementTree.SubElement(link, 'inertial')
-        # Off the frame, else MuJoCo takes short cuts that hold for this inertia alone.
-        ElementTree.SubElement(inertial, 'origin', xyz='0.1 0.2 0.3', rpy='0.1 0.2 0.3')
-        ElementTree.SubElement(inertial, 'mass', value='1')
-        ElementTree.SubElement(inertial, 'inertia', ixx='1', iyy='1.1', izz='1.2', ixy='0', ixz='0',
-                               iyz='0')
+    names = {link.get('name') for link in robot.findall('link')}
+    if WORLD not in names and any(
+            parent.get('link') == WORLD for parent in robot.findall('joint/parent')):
+        ElementTree.SubElement(robot, 'link', name=WORLD)
+    for other in robot.findall('mujoco'):
+        robot.remove(other)
     ElementTree.SubElement(ElementTree.SubElement(robot, 'mujoco'), 'compiler', COMPILER)
     return ElementTree.tostring(robot, encoding='unicode')

@@ -274,7 +274,7 @@ def _wind_up(model: MechanismModel, motion: JointMotion, loads: Array, random: n
 
 def _behind_encoder(model: MechanismModel, read: JointMotion, random: np.random.Generator,
                     scale: float) -> tuple[JointMotion, dict[str, Any]]:
-    """Return the motion of an arm one of whose encoders is beside its axis, and which.
+    """Return the motion of an arm with one eccentric encoder, and the truth about it.
 
     Its control follows what the encoders say.
     """

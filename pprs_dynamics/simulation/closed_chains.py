@@ -300,7 +300,7 @@ class ClosedChains:
         acceleration : (15,) array
             Of all joints.
         passive : (9,) array
-            Forces and torques on the passive joints and the platform beside the reactions.
+            Forces and torques on the passive joints and the platform, without the reactions.
         """
         needed = (equations.M.dot(acceleration) + equations.bias).take(PASSIVE_DOFS) - passive
         reactions = needed.dot(equations.J_d_inverse).reshape(3, 3)

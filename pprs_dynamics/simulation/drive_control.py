@@ -32,9 +32,9 @@ class ControlSettings:
     Parameters
     ----------
     stiffness, damping : float or (D,) sequence
-        Gains of position [N/m] and velocity [N s/m]. By default about 7 Hz and a damping ratio
-        of 0.9 for the 1.5 to 2 kg that a drive of the paper's robot moves: 1 N of unknown
-        force costs a quarter of a millimetre, as on a real machine of this size.
+        Gains of position [N/m] and velocity [N s/m]. The defaults give about 7 Hz and a damping
+        ratio of 0.9 for the 1.5 to 2 kg that a drive of the paper's robot moves. An unknown
+        force of 1 N then costs a quarter of a millimetre, as on a real machine of this size.
     gravity_compensation : bool
         Add the efforts that hold the model's weight at the setpoint.
     command_timeout : float
@@ -207,8 +207,8 @@ class DriveControl:
     def _as_late(self, speed: Array, measured: Array) -> Array:
         """Return the wanted velocity, delayed like the measured one.
 
-        Else the loop would take the lag of differentiation for an error: at 80 Hz and 150 N s/m
-        0.3 N per m/s^2, more than a feedforward leaves to it.
+        Otherwise the lag of differentiation would count as an error: at 80 Hz and 150 N s/m 0.3 N
+        per m/s^2, more than the residual of a feedforward.
         """
         if self._smoothing == 1.0:
             return speed

@@ -3,11 +3,11 @@
 
 """Loops closed by the engine's own kinematics, and what they transmit.
 
-With J the engine's derivatives of the drives' positions, of the closures, of coupled joints and of
-joints that stand, by its velocities, J v = (v_a, 0): positions by Newton's method, the rates of
-all joints T as the columns of J^+ that belong to the drives, accelerations with J_dot v by
-differences along the motion. Of the closures' forces those of the rows that determine the passive
-joints are taken; where others are implied, it is not determined which of both carry.
+J is the engine's Jacobian of the drives, the closures, coupled joints and locked joints, so that
+J v = (v_a, 0). Positions come from Newton's method. The rates of all joints T are the columns of
+J^+ that belong to the drives. Accelerations use J_dot v by differences along the motion. Of the
+closures' forces only those of rows that determine passive joints are computed; which of several
+redundant rows carries a load is not determined.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
+from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.tree_equations import AXES, KIND, LOOP, TRANSLATION
-from pprs_dynamics.simulation.engine_state import LEAST_SINGULAR, EngineState, couplings
+from pprs_dynamics.simulation.engine_state import LEAST_SINGULAR, EngineState
 
 CLOSED = 1e-11  # [m, rad], of Newton's last step
 MOST_STEPS = 40
@@ -55,9 +56,12 @@ class EngineLoops:
     state : EngineState
     links : mapping of int to int
         The engine's bodies by the joints that move them.
+    frames : mapping of int to Frame
+        Those of the bodies in the frames of their joints.
     """
 
-    def __init__(self, state: EngineState, links: Mapping[int, int]) -> None:
+    def __init__(self, state: EngineState, links: Mapping[int, int],
+                 frames: Mapping[int, Frame]) -> None:
         self.state = state
         model, t = state.model, state.structure.tables
         self._rows, self._weights = t.rows, t.row_reals[:, :2].T
@@ -66,11 +70,16 @@ class EngineLoops:
         self._bodies = np.array([[links[int(row)] for row in side]
                                  for side in (t.loop_a, t.loop_b)], dtype=int)
         self._R, self._p = np.array([t.a_R, t.b_R]), np.array([t.a_p, t.b_p])
+        for side, rows in enumerate((t.loop_a, t.loop_b)):
+            for k, row in enumerate(rows):
+                own = frames[int(row)].inverse @ Frame(self._R[side, k], self._p[side, k])
+                self._R[side, k], self._p[side, k] = own.R, own.p
         self._moves = _moved_by(model)[self._bodies]  # (2, L, nv)
         self._sign = self._moves[1].astype(float) - self._moves[0]
-        self._coupled = [(state.place(name), state.place(leader), state.dof(name),
-                          state.dof(leader), ratio, offset)
-                         for name, leader, ratio, offset in couplings(state.structure)]
+        self._coupled = [(*(int(model.jnt_qposadr[k]) for k in (a, b)),
+                          *(int(model.jnt_dofadr[k]) for k in (a, b)), ratio, offset)
+                         for a, b, ratio, offset in state.couplings
+                         if model.jnt_dofadr[a] not in state.standing]
         self._couplings = np.zeros((len(self._coupled), model.nv))
         for row, (_, _, dof, leader, ratio, _) in zip(self._couplings, self._coupled, strict=True):
             row[dof], row[leader] = 1.0, -ratio
@@ -264,7 +273,7 @@ class EngineLoops:
         return found
 
     def apply(self, forces: Array) -> None:
-        """Have the closures' forces (L, 6) act on the engine's bodies, beside what acts there."""
+        """Add the closures' forces (L, 6) to those on the engine's bodies."""
         data, at = self.state.data, self.frames()[1][1]
         for bodies, sign in zip(self._bodies, (-1.0, 1.0), strict=True):
             moments = forces[:, 3:] + cross(at - data.xipos[bodies], forces[:, :3])

@@ -17,15 +17,6 @@ from pprs_dynamics.physics.mechanism.structure import Structure
 LEAST_SINGULAR = 1e-8  # of the largest singular value; closures may say a thing twice
 
 
-def couplings(structure: Structure) -> list[tuple[str, str, float, float]]:
-    """Return coupled joints: name, the free joint that each follows, ratio and offset."""
-    t, joints = structure.tables, structure.description.joints
-    leaders = {int(t.coordinate[row]): name for name, row in structure.rows.items()
-               if joints[name].mimic is None}
-    return [(name, leaders[int(t.coordinate[row])], float(t.ratio[row]), float(t.offset[row]))
-            for name, row in structure.rows.items() if joints[name].mimic is not None]
-
-
 class EngineState:
     """The state of a model of MuJoCo whose joints are those of a structure.
 
@@ -74,6 +65,33 @@ class EngineState:
         return np.array(standing, dtype=int)
 
     @cached_property
+    def couplings(self) -> list[tuple[int, int, float, float]]:
+        """Joints that follow others, by MuJoCo: their numbers, ratio and offset of positions."""
+        model, off = self.model, self.engine.mjtDisableBit.mjDSBL_EQUALITY
+        found = []
+        for e in range(0 if model.opt.disableflags & off else model.neq):
+            if model.eq_type[e] == self.engine.mjtEq.mjEQ_JOINT and model.eq_active0[e]:
+                a, b = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
+                y, x = (float(model.qpos0[model.jnt_qposadr[k]]) for k in (a, b))
+                offset, ratio = model.eq_data[e, :2].tolist()
+                found.append((a, b, ratio, y + offset - ratio * x))
+        return found
+
+    @cached_property
+    def rest(self) -> Array:
+        """Positions of all joints where the drives are at 0, (nq,): locked ones within limits."""
+        model, rest = self.model, self.model.qpos0.copy()
+        for name, position in self.structure.locked.items():
+            k, at = self.number(name), self.place(name)
+            rest[at] = np.clip(position, *model.jnt_range[k]) if model.jnt_limited[k] else position
+        for _ in self.couplings:  # chains of them
+            for a, b, ratio, offset in self.couplings:
+                if self.joints[a] in self.structure.locked:
+                    at, of = (model.jnt_qposadr[k] for k in (a, b))
+                    rest[at] = ratio * rest[of] + offset
+        return rest
+
+    @cached_property
     def _hinged(self) -> tuple[Array, Array, Array]:
         """Joints of one coordinate: places in `qpos` and `qvel`, and rows of the tables."""
         found = [(int(self.model.jnt_qposadr[k]), int(self.model.jnt_dofadr[k]),
@@ -93,7 +111,7 @@ class EngineState:
     def put(self, m: Any, k: int) -> None:
         """Put positions, velocities and accelerations of sample k of a motion in place."""
         t, data = self.structure.tables, self.data
-        data.qpos[:], data.qvel[:], data.qacc[:] = self.model.qpos0, 0.0, 0.0
+        data.qpos[:], data.qvel[:], data.qacc[:] = self.rest, 0.0, 0.0
         for q, v, row in self._free:
             R = self.root.R.T @ m.R[k, row]
             quaternion = np.empty(4)

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from pprs_dynamics.errors import suggestion
-from pprs_dynamics.physics.effects.former_names import FORMER, told_general_name
 from pprs_dynamics.simulation import hidden_bodies, hidden_forces, sensors
 from pprs_dynamics.simulation.hidden_effect import (
     DriveBound,
@@ -50,7 +49,7 @@ def draw_effects(
 ) -> list[HiddenEffect]:
     """Return a hidden effect per name.
 
-    The name `random` stands for one drawn at random; drives may follow, as in
+    The name `random` is one drawn at random; drives may follow, as in
     `coulomb_friction:lift_1,lift_2`.
 
     Raises
@@ -81,10 +80,6 @@ def draw_effect(name: str, rng: np.random.Generator, scale: float = 1.0) -> Hidd
         For another name.
     """
     name, _, drives = name.partition(':')
-    former = FORMER.get(name)
-    if former is not None:
-        name = told_general_name(name)
-        drives = former.place if name == hidden_forces.JointFriction.name else drives
     if name not in HIDDEN_EFFECTS:
         raise HiddenEffectError(f'no hidden effect is called {name!r}'
                                 f'{suggestion(name, HIDDEN_EFFECTS)}; there are '

@@ -138,7 +138,7 @@ class Hysteresis(DriveForce):
 
 
 class FrictionDrift(SteepDriveForce):
-    """Cold friction that fades as dissipated heat warms the drive, and comes back as it cools."""
+    """Cold friction that fades as dissipated heat warms the drive, and returns as it cools."""
 
     name: ClassVar[str] = 'friction_drift'
     form: ClassVar[str] = 'F exp(-w / w_0) v / sqrt(v^2 + w_r^2), dw/dt = F |v| - w / tau'
@@ -216,7 +216,7 @@ def effort_offset(m: DriveMoment, force: Array) -> Array:
                    rest=Range('m', -0.05, 0.05, lifts=(0.15, 0.25)),
                    hardening=Range('m', 0.15, 0.3, 'log', neutral=1.0))
 def drive_spring(m: DriveMoment, stiffness: Array, rest: Array, hardening: Array) -> Array:
-    """A cable chain or counterbalance that stiffens as it is drawn out."""
+    """A cable chain or counterbalance that stiffens with its length."""
     x = m.position - rest
     return stiffness * x * (1 + (x / hardening) ** 2)
 
@@ -319,7 +319,7 @@ class JointFriction(HiddenJointFriction):
                        rest=Range('rad', 1.2, 1.6), hardening=Range('rad', 0.8, 1.5))
 def joint_spring(m: PlatformMoment, stiffness: float, rest: float, hardening: float,
                  ) -> tuple[Array, Array, Array]:
-    """Cable looms across the revolute joints C_i, stiffening as they bend."""
+    """Cable looms across the revolute joints C_i, stiffening with the angle."""
     x = m.rod_angle - rest
     return -stiffness * x * (1 + (x / hardening) ** 2), np.zeros(3), np.zeros(3)
 

@@ -30,7 +30,7 @@ class Walk:
     Parameters
     ----------
     data : bytes
-        Its second byte tells the order of bytes.
+        Its second byte is the order of bytes.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Walk:
         self.at, self.words, self.arrays = HEADER, list[int](), list[tuple[int, int]]()
 
     def over(self, size: int, alignment: int = 4) -> None:
-        """Go over that many bytes of values."""
+        """Skip that many bytes of values."""
         self.at = aligned(self.at, alignment) + size
 
     def count(self) -> int:
@@ -67,24 +67,24 @@ class Walk:
         return count
 
     def text(self) -> slice:
-        """Go over a text, and return where it stands."""
+        """Skip a text and return its place."""
         count = self.count()
         self.at += count
         return slice(self.at - count, self.at)
 
     def texts(self) -> list[slice]:
-        """Go over a sequence of texts, and return where they stand."""
+        """Skip a sequence of texts and return their places."""
         return [self.text() for _ in range(self.count())]
 
     def numbers(self, each: int = 1) -> None:
-        """Go over a sequence of elements that are `each` numbers of 8 bytes."""
+        """Skip a sequence of elements that are `each` numbers of 8 bytes."""
         count = self.count()
         if count:
             self.over(8 * each * count, 8)
         self.arrays.append((self.at - 8 * each * count, count))
 
     def header(self) -> list[slice]:
-        """Go over a header and the names of joints, and return where these stand."""
+        """Skip a header and the names of joints, and return the places of the names."""
         self.over(STAMP.size)
         self.text()
         return self.texts()

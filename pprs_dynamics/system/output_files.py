@@ -14,11 +14,10 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import IO, cast
-from uuid import uuid4
+from typing import IO
 
 from pprs_dynamics.errors import UnreadableFileError
 
@@ -34,23 +33,24 @@ def new_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
     Raises
     ------
     UnreadableFileError
-        Where it cannot be written; the old content is as it was, and nothing else is left.
+        If it cannot be written. The old content then remains; a kill may leave a file `.pprs_*`.
     """
     target = writable_file(path)
     with _told(path):
-        # A file without a name, of which even a kill in mid-write leaves nothing.
-        file = _nameless(target.parent)
-        if file is None:
-            with _named(target) as file:
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=PREFIX)
+        try:
+            with os.fdopen(handle, 'w+b') as file:
                 yield file
-            return
-        with file:
-            yield file
-            _finish(file)
-            if not _give_name(file.fileno(), target):
-                file.seek(0)
-                with _named(target) as copy:
-                    shutil.copyfileobj(file, copy)
+                file.flush()
+                os.fsync(file.fileno())
+            # mkstemp makes files that only their owner may read.
+            umask = os.umask(0)
+            os.umask(umask)
+            os.chmod(name, PERMISSIONS & ~umask)
+            os.replace(name, target)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)
+            raise
 
 
 @contextmanager
@@ -73,7 +73,7 @@ def new_folder(path: str | PathLike[str]) -> Iterator[Path]:
 
 @contextmanager
 def scratch_folder(path: Path) -> Iterator[Path]:
-    """Give a folder beside `path` that is taken away with all that is left in it at the end.
+    """Give a temporary folder next to `path`, which is removed with its content at the end.
 
     Raises
     ------
@@ -139,60 +139,3 @@ def _told(path: str | PathLike[str]) -> Iterator[None]:
     except OSError as error:
         raise UnreadableFileError(
             path, f'cannot be written: {error.strerror or error}') from None
-
-
-def _nameless(folder: Path) -> IO[bytes] | None:
-    """Return an open file without a name; None where the system or the file system has none."""
-    flag = getattr(os, 'O_TMPFILE', None)
-    if flag is None:
-        return None
-    try:
-        # What else is wrong the other way will tell.
-        handle = os.open(folder, flag | os.O_RDWR, PERMISSIONS)
-    except OSError:
-        return None
-    return cast('IO[bytes]', os.fdopen(handle, 'w+b'))
-
-
-def _give_name(handle: int, target: Path) -> bool:
-    """Put a file without a name in the place of another; False where it cannot have a name."""
-    name = f'{PREFIX}{uuid4().hex}'
-    folder = os.open(target.parent, os.O_RDONLY)
-    try:
-        try:
-            # With a folder given, Python follows the link in /proc to the file itself.
-            os.link(f'/proc/self/fd/{handle}', name, dst_dir_fd=folder, follow_symlinks=True)
-        except OSError:
-            return False
-        try:
-            os.replace(name, target.name, src_dir_fd=folder, dst_dir_fd=folder)
-        except BaseException:
-            os.unlink(name, dir_fd=folder)
-            raise
-        with suppress(OSError):
-            os.fsync(folder)  # the new entry on the disk, too
-        return True
-    finally:
-        os.close(folder)
-
-
-@contextmanager
-def _named(target: Path) -> Iterator[IO[bytes]]:
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=PREFIX)
-    try:
-        with os.fdopen(handle, 'w+b') as file:
-            yield cast('IO[bytes]', file)
-            _finish(file)
-        # mkstemp makes files that only their owner may read.
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(name, PERMISSIONS & ~umask)
-        os.replace(name, target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
-def _finish(file: IO[bytes]) -> None:
-    file.flush()
-    os.fsync(file.fileno())

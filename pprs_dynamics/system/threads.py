@@ -13,6 +13,9 @@ import os
 
 
 def use_one_thread() -> None:
-    """Tell numpy's libraries so; to be called before numpy is imported. The user's word counts."""
+    """Limit numpy's libraries to one thread, unless the environment says otherwise.
+
+    Call it before numpy is imported.
+    """
     for library in ('OPENBLAS', 'OMP', 'MKL'):
         os.environ.setdefault(f'{library}_NUM_THREADS', '1')

@@ -255,6 +255,7 @@ def loop(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return names
 
 
+@pytest.mark.slow
 def test_the_loop_finds_what_was_hidden_and_the_error_falls(loop: dict[str, Any]) -> None:
     found, answer, (hidden,) = loop['found'], loop['answer'], loop['run'].effects
     assert found.verdict == 'effect'
@@ -271,6 +272,7 @@ def test_the_loop_finds_what_was_hidden_and_the_error_falls(loop: dict[str, Any]
     assert abs(force['value'] - hidden['parameters'][drive]['force']) < 4 * force['std']
 
 
+@pytest.mark.slow
 def test_results_of_the_loop_show_themselves(loop: dict[str, Any], tmp_path: Path) -> None:
     for name in ('run', 'before', 'found', 'answer', 'after'):
         result = loop[name]

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The pages' JavaScript modules by themselves, in Node's own test runner; and as one script."""
+"""The pages' JavaScript modules by themselves, in Node's own test runner."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ import subprocess
 from pathlib import Path
 
 import pytest
-
-from pprs_dynamics.app.report.what_if_part import MODULES
 
 ROOT = Path(__file__).parents[2]
 MODULE_FOLDER = ROOT / 'pprs_dynamics' / 'app' / 'browser'
@@ -25,7 +23,7 @@ def node(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 
 @needs_node
-@pytest.mark.parametrize('name', ['curve_files', 'format', 'ridge', 'client', 'views'])
+@pytest.mark.parametrize('name', ['curve_files', 'format', 'client', 'views'])
 def test_modules_do_what_they_say(name: str) -> None:
     done = node('--test', ROOT / 'test' / 'browser' / f'{name}.test.mjs')
     assert done.returncode == 0, done.stdout
@@ -37,11 +35,3 @@ def test_modules_do_what_they_say(name: str) -> None:
 @pytest.mark.parametrize('file', sorted(one.name for one in MODULE_FOLDER.glob('*js')))
 def test_each_script_is_one(file: str) -> None:
     assert node('--check', MODULE_FOLDER / file).returncode == 0
-
-
-def test_a_page_has_every_module_that_its_own_import() -> None:
-    for name in MODULES:
-        used = [line.rpartition("'./")[2].rstrip("';\n")
-                for line in (MODULE_FOLDER / name).read_text().splitlines()
-                if "from './" in line]
-        assert {*used} <= {*MODULES}

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""compare --mcap and --beside: what people open in their own tools, and before beside after."""
+"""compare --mcap and --beside: files for PlotJuggler and Foxglove; two models on one recording."""
 
 from __future__ import annotations
 
@@ -83,7 +83,8 @@ def test_layouts_ask_for_what_the_bag_holds(
 ) -> None:
     """PlotJuggler names TOPIC/JOINT/effort, Foxglove an index: each must be there, none left."""
     monkeypatch.chdir(folder)
-    assert main(['compare', 'run.csv', '--mcap', 'out.mcap', '--overwrite']) == 0
+    (folder / 'out.mcap').unlink(missing_ok=True)
+    assert main(['compare', 'run.csv', '--mcap', 'out.mcap']) == 0
     with AnyReader([folder / 'out.mcap']) as reader:
         names = {connection.topic: tuple(reader.deserialize(data, connection.msgtype).name)
                  for connection, _, data in reader.messages() if connection.topic in EFFORTS}
@@ -101,11 +102,11 @@ def test_layouts_ask_for_what_the_bag_holds(
     assert sorted(shown) == there
 
 
-@pytest.mark.parametrize('beside', ['better.yaml', 'other.csv'])
-def test_before_stands_beside_after(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], beside: str,
+def test_errors_of_two_models_on_one_recording(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(folder)
+    beside = 'better.yaml'
     assert main(['compare', 'run.csv', '--beside', beside, '--json', 'both.json',
                  '--report', 'both.html']) == 0
     content = json.loads((folder / 'both.json').read_text())
@@ -117,7 +118,7 @@ def test_before_stands_beside_after(
     assert beside in (folder / 'both.html').read_text()
 
 
-def test_what_cannot_stand_beside_is_one_sentence(
+def test_a_model_of_other_drives_or_a_recording_beside_is_refused(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(folder)
@@ -125,4 +126,4 @@ def test_what_cannot_stand_beside_is_one_sentence(
     said = capsys.readouterr().err.strip().splitlines()
     assert len(said) == 1
     assert 'drives of the model' in said[0]
-    assert main(['compare', 'run.csv', '--beside', 'nothing.csv']) == 2
+    assert main(['compare', 'run.csv', '--beside', 'other.csv']) == 2

@@ -27,6 +27,8 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import read_recording
 
+pytestmark = pytest.mark.slow
+
 DEMO = Path(diagnosis_demo.__file__)
 SEED, DURATION = 26, 8.0  # [s]
 REVEALED = 'What was hidden'

@@ -311,10 +311,10 @@ def test_what_init_writes_reads_the_recording_as_it_was(
 
 def test_the_tool_is_the_flange_and_the_base_what_all_hangs_on(robot: Path) -> None:
     values = first_model(robot).model.values
-    assert (values['arm.base'], values['arm.tool']) == ('base', 'flange')
-    assert values['arm.joints'] == JOINTS
+    assert (values['robot.base'], values['robot.tool']) == ('base', 'flange')
+    assert values['robot.drives'] == JOINTS
     values = first_model(robot, tool='camera', drives=('elbow',)).model.values
-    assert (values['arm.tool'], values['arm.joints']) == ('camera', ('elbow',))
+    assert (values['robot.tool'], values['robot.drives']) == ('camera', ('elbow',))
     with pytest.raises(ModelError, match=r'--tool: unknown link flnge .*flange'):
         first_model(robot, tool='flnge')
 
@@ -382,12 +382,12 @@ def test_of_two_arms_the_recorded_one_is_taken_and_without_a_recording_one_is_as
 
     chosen = first_model(robot, ask=ask)
     assert len(asked) == 2
-    assert chosen.model.values['arm.tool'] in asked[1]
+    assert chosen.model.values['robot.tool'] in asked[1]
     assert any('--tool' in note for note in first_model(robot).notes)
     right = tuple(f'right_{joint}' for joint in JOINTS)
     first = first_model(robot, bag(tmp_path, right), ask=ask)
     assert first.model.drives == right
-    assert first.model.values['arm.tool'] == 'right_flange'
+    assert first.model.values['robot.tool'] == 'right_flange'
     assert len(asked) == 2
 
 

@@ -13,6 +13,8 @@ import yaml
 
 from pprs_dynamics.app.commands.pprs import main
 
+pytestmark = pytest.mark.slow
+
 HEXAPOD = 'config/hexapod.yaml'
 
 

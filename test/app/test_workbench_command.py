@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""`pprs workbench` on what else it may be given: nothing, folders, surveys, a single axis."""
+"""`pprs workbench` on what else it may be given: nothing, folders, a single axis."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from workbench_server import workbench
 
 from pprs_dynamics import load_model
 from pprs_dynamics.app.commands import workbench as workbench_command
-from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench import Session
 from pprs_dynamics.app.workbench.robot_motion import robot_motion
 from pprs_dynamics.app.workbench.server.serve import serve
@@ -45,23 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_a_survey_opens_its_recordings(folder: Path) -> None:
-    store = folder / 'store'
-    assert main(['survey', str(folder / 'data' / 'run.csv'), '--output', str(store), '--effects',
-                 'payload_mass', '--workers', '1']) == 0
-    with workbench(store, folder=folder) as bench:
-        bench.enter()
-        bench.wait(lambda screen: not screen['is_beginning'])
-        assert bench.screen()['is_empty']
-        surveyed = bench.get('/api/files').json['surveyed']
-        assert [one['recording'] for one in surveyed] == ['run.csv']
-        assert bench.post('/api/open', name='survey/1').status == 400
-        assert bench.post('/api/open', name='survey/../data').status == 400
-        opened = bench.post('/api/open', name=surveyed[0]['name'])
-        assert opened.status == 200
-        assert [one['name'] for one in bench.screen()['recordings']] == ['run.csv']
-
-
+@pytest.mark.slow
 def test_without_a_recording_it_waits_for_one(folder: Path) -> None:
     with workbench(folder / 'data', folder=folder) as bench:
         bench.enter()

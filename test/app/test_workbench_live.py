@@ -159,6 +159,7 @@ def diagnosis(content: dict[str, Any]) -> Iterator[None]:
     context.try_shutdown()
 
 
+@pytest.mark.slow
 @needs_browser
 def test_ticked_effects_go_to_running_nodes_and_the_error_falls(bench: Workbench) -> None:
     with chromium() as browser:

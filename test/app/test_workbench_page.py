@@ -302,6 +302,7 @@ def test_a_second_browser_follows(page: Page, browser: Any, bench: Workbench) ->
     second.context.close()
 
 
+@pytest.mark.slow
 def test_adopt_refuse_export_undo(page: Page, folder: Path) -> None:
     page.tick('payload_mass')
     page.tick('drive_spring')

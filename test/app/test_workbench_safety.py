@@ -10,6 +10,7 @@ import json
 import re
 import socket
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -341,3 +342,17 @@ def test_a_port_that_is_taken_is_one_line(bench: Workbench) -> None:
     assert done.returncode == 2
     assert done.stderr.count('\n') == 1
     assert f'127.0.0.1:{bench.port}: cannot be listened on' in done.stderr
+
+
+def test_a_browser_that_goes_away_in_an_upload_leaves_no_traceback(
+    bench: Workbench, folder: Path,
+) -> None:
+    head = (f'POST /api/upload?name=x.csv HTTP/1.1\r\nHost: {bench.host}\r\n'
+            f'Origin: http://{bench.host}\r\nCookie: {bench.cookie}\r\n'
+            'Content-Type: application/octet-stream\r\nContent-Length: 1000\r\n\r\n')
+    with socket.create_connection(('127.0.0.1', bench.port)) as client:
+        client.sendall(head.encode() + b'time,')
+        time.sleep(0.3)
+    time.sleep(0.5)
+    assert bench.get('/api/files').status == 200
+    assert 'Traceback' not in (folder / 'workbench.log').read_text()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import os
 import subprocess
 import sys
@@ -89,8 +90,8 @@ def test_ticks_lower_the_error_at_once_and_find_what_was_hidden(session: Session
     told = next(one for one in session.to_dict()['effects'] if one['name'] == 'payload_mass')
     assert told['evidence'] == pytest.approx(shown.without['payload_mass'].total)
     assert told['evidence_terms'].startswith('fit + ')
-    noise = session.noise['lift_2']
-    assert session.errors()['lift_2'].now == pytest.approx(noise, rel=0.1)
+    # Noise is shown once the diagnosis has estimated it.
+    assert math.isnan(session.errors()['lift_2'].noise)
 
 
 def test_without_ticks_the_error_is_that_of_the_model(session: Session) -> None:
@@ -401,6 +402,7 @@ def test_the_session_imports_neither_ros_nor_a_server() -> None:
     assert not set(loaded) & {'rclpy', 'starlette', 'uvicorn', 'plotly', 'rich', 'matplotlib'}
 
 
+@pytest.mark.slow
 def test_the_notebook_runs_as_it_stands(capsys: pytest.CaptureFixture[str]) -> None:
     file = Path(__file__).parents[2] / 'docs' / 'workbench_session.ipynb'
     notebook = json.loads(file.read_text())
@@ -517,6 +519,7 @@ def test_a_scatter_of_a_long_recording_keeps_every_peak() -> None:
     assert drawn_samples(x[:500], y[:500]).tolist() == list(range(500))
 
 
+@pytest.mark.slow
 def test_a_reference_stays_when_a_recording_goes(tmp_path: Path) -> None:
     healthy, run, other = (write_hidden(tmp_path / f'{seed}.csv', seed, hidden={
         'effects.active': ['coulomb_friction'], 'effects.coulomb_friction.lift_2.force': 0.2})
@@ -584,8 +587,10 @@ class TestASavedSession:
     @pytest.mark.parametrize(('change', 'said'), [
         (lambda run, file: run.write_text(run.read_text() + '\n'), 'run.csv has changed since'),
         (lambda run, file: run.unlink(), 'run.csv: No such file'),
+        (lambda run, file: file.write_text(file.read_text().replace(str(run), '/dev/zero')),
+         '/dev/zero'),
         (lambda run, file: file.write_text('{'), 'session.json: '),
-        (lambda run, file: file.write_text(100_000 * '['), 'session.json: .*deep'),
+        (lambda run, file: file.write_text(100_000 * '['), 'session.json: .*depth'),
         (lambda run, file: file.write_text('[]'), 'is no session'),
         (lambda run, file: file.write_text(file.read_text().replace('"ticks": [', '"tick": [')),
          'is no session')])

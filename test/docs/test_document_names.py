@@ -66,7 +66,7 @@ def wrong_commands(line: str) -> Iterator[str]:
             yield f'pprs {command}'
             continue
         yield from (f'pprs {command} {found}' for found in re.findall(r'(?<!\S)(--[a-z-]+)', rest)
-                    if found not in options(command) | {'--help'})
+                    if found not in options(command) | {'--help', '--demo'})
     for found in re.findall(r'^make ([a-z-]+)', line):
         if not re.search(rf'^{found}:', (PROJECT / 'Makefile').read_text(), re.M):
             yield f'make {found}'
@@ -82,7 +82,8 @@ def wrong_options(line: str) -> Iterator[str]:
     """Yield options that are shown alone, or with a script, and are of nothing."""
     if re.match(r'(?:\w+=\S+ )*(colcon|pip|cd|ros2) ', line):
         return
-    known = FOREIGN | script_options() | {found for name in COMMANDS for found in options(name)}
+    known = FOREIGN | {'--demo'} | script_options() | {
+        found for name in COMMANDS for found in options(name)}
     yield from (found for found in re.findall(r'(?<![\w-])(--[a-z][a-z-]+)', line)
                 if found not in known)
 

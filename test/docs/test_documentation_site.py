@@ -18,6 +18,8 @@ from documents import PROJECT
 
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 
+pytestmark = pytest.mark.slow
+
 DOCS = PROJECT / 'docs'
 # Short words of the laws that are no symbols of theirs: numbers, derivatives, transposed, English.
 NO_SYMBOLS = {'pi', 'd', 't', 'T', "A'", 'w_dot', 'omega_n', 'dl', 'dq', 'dt', 'dz', 'e', 'i',

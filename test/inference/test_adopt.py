@@ -24,7 +24,7 @@ from short_recordings import short_recordings
 
 from benchmarks.scores import adoption
 from pprs_dynamics import DriveModel, PlatformMotion
-from pprs_dynamics.inference.adoption import loop, objections
+from pprs_dynamics.inference.adoption import loop
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.request import EffectRequest
@@ -157,7 +157,7 @@ def test_a_wrong_effect_is_refused_and_the_right_one_named(files: Files, effect:
 def test_an_effect_that_makes_another_recording_worse_is_refused(files: Files) -> None:
     answer = requested(files, HIDDEN, files.other_robot)
     assert not answer.adopted
-    assert 'the error on the validation recordings does not fall' in answer.reason
+    assert 'on the validation recordings does not fall' in answer.reason
     assert answer.held_out_after > answer.held_out_before
 
 
@@ -230,7 +230,7 @@ def test_where_nothing_is_missing_nothing_is_added() -> None:
     model, recording = synthetic({})
     answer = adopt(model, EffectRequest.of('platform_inertia'), [recording])
     assert not answer.adopted
-    assert 'do not call for it' in answer.reason
+    assert 'do not call for platform_inertia' in answer.reason
 
 
 MISTAKES = {
@@ -311,6 +311,7 @@ def test_the_node_starts_with_the_written_file(
         assert process.poll() is None
 
 
+@pytest.mark.slow
 def test_the_loop_walks_by_itself_until_nothing_is_left(
     score: ModuleType, tmp_path: Path,
 ) -> None:
@@ -358,13 +359,6 @@ def test_a_refused_effect_does_not_end_the_walk(monkeypatch: pytest.MonkeyPatch)
     assert asked == ['force_ripple', 'coulomb_friction', 'force_ripple']
     assert walk.model == ('coulomb_friction',)
     assert (walk.ended, walk.reason) == ('refused', 'force_ripple: it does not fall')
-
-
-def test_a_model_that_is_not_what_was_fitted_is_refused() -> None:
-    assert objections.of_linearity(1.2, 1.7, 'N') == []
-    said, = objections.of_linearity(1.2, 26.8, 'N')
-    assert '26.8 N' in said
-    assert '1.2 N' in said
 
 
 def test_a_recording_in_pieces_has_a_fingerprint_of_its_own(tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ def heavier(folder: Path) -> MechanismModel:
     return arm.real_arm(folder, **{
         'links.mass': tuple(changed[:, 0]), 'links.moment': tuple(changed[:, 1:4].ravel()),
         'links.inertia': tuple((changed[:, 4:][:, [0, 2, 5, 1, 3, 4]]).ravel()),
-        'arm.armature': (0.5, 0.3, 2.0)})
+        'robot.armature': (0.5, 0.3, 2.0)})
 
 
 def test_a_fit_recovers_friction_and_predicts_a_motion_it_never_saw(tmp_path: Path) -> None:
@@ -172,7 +172,7 @@ def write_currents(folder: Path, model: MechanismModel, gain: tuple[float, ...],
 @pytest.mark.parametrize('name', ['run.csv', 'run.csv.gz'])
 def test_currents_times_gains_are_efforts(tmp_path: Path, name: str) -> None:
     gain = (10.0, 4.0, 30.0)
-    model = arm.real_arm(tmp_path, **{'arm.gain': gain})
+    model = arm.real_arm(tmp_path, **{'robot.gain': gain})
     path = write_currents(tmp_path, model, gain, name)
     run = read_recording(path, model.recorded)
     assert run.effort == pytest.approx(arm.record(model, arm.motion(20.0), NOISE).effort)
@@ -186,19 +186,19 @@ def test_a_gain_within_its_tolerance_is_calibrated_and_leaves_the_payload_alone(
         tmp_path: Path) -> None:
     """Currents that a wrong gain made efforts of: the model with the right one explains them."""
     gain, wrong = (10.0, 4.0, 30.0), (10.0, 4.2, 30.0)
-    real = arm.real_arm(tmp_path, **{'arm.gain': gain})
+    real = arm.real_arm(tmp_path, **{'robot.gain': gain})
     path = write_currents(tmp_path, real, gain, 'run.csv')
-    given = build_model({**real.values, 'arm.gain': wrong, 'tolerances.arm.gain': 0.1},
+    given = build_model({**real.values, 'robot.gain': wrong, 'tolerances.robot.gain': 0.1},
                         real.source)
     run = read_recording(path, given.recorded)
     found = diagnose(given, [run])
     assert found.verdict == 'adequate'
     after = {one.label: one.after for one in found.calibrated}
-    assert after['arm.gain[2]'] == pytest.approx(4.0, rel=0.01)
+    assert after['robot.gain[2]'] == pytest.approx(4.0, rel=0.01)
 
 
 def test_a_bag_in_amperes_is_multiplied_where_the_model_says_so(tmp_path: Path) -> None:
-    model = arm.real_arm(tmp_path, **{'arm.gain': (2.0, 2.0, 2.0), 'arm.effort_unit': 'A'})
+    model = arm.real_arm(tmp_path, **{'robot.gain': (2.0, 2.0, 2.0), 'robot.effort_unit': 'A'})
     run = arm.record(model, arm.motion(5.0), 0.0)
     write_recording(tmp_path / 'bag.mcap', run)
     read = read_recording(tmp_path / 'bag.mcap', model.recorded)

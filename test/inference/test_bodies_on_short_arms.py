@@ -18,7 +18,7 @@ from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.model_file import build_model, load_model
 
 NOISE = 0.05  # [N m]
 
@@ -76,3 +76,21 @@ def test_a_slow_motion_tells_the_moment_of_a_load_and_not_its_mass(tmp_path: Pat
     # Where the mass is as sure, mass and centre say it.
     quick = adopt(model, requested('payload_mass', model), [record(adoption.after)])
     assert 'moment_z' not in dict(parameter_rows(quick))
+
+
+def test_the_interval_of_a_mass_has_every_centre_that_the_path_allows(tmp_path: Path) -> None:
+    """0.48 kg at 0.15 m looks like 0.144 kg at the tool, 0.5 m from the axis."""
+    planar_arm(tmp_path, 1)
+    urdf, file = tmp_path / 'arm.urdf', tmp_path / 'arm.yaml'
+    urdf.write_text(urdf.read_text().replace('</robot>', (
+        '<link name="flange"/><joint name="fixed" type="fixed"><parent link="rod_1"/>'
+        '<child link="flange"/><origin xyz="0 0 -0.5"/></joint></robot>')))
+    file.write_text(file.read_text().replace('tool: rod_1', 'tool: flange'))
+    model = load_model(file)
+    recording = record(build_model({
+        **model.values, 'effects.active': ['payload_mass'], 'effects.payload_mass.mass': 0.48,
+        'effects.payload_mass.z': 0.35}, model.source), pace=0.1)
+    adoption = adopt(model, requested('payload_mass', model), [recording])
+    assert adoption.adopted, adoption.reason
+    mass = adoption.parameters['mass']
+    assert abs(mass.value - 0.48) < 2 * mass.std

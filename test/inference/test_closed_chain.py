@@ -9,13 +9,13 @@ A part of each run, and the base model fitted to that part: short enough to be r
 from __future__ import annotations
 
 import shutil
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.real import davinci as closed_chain
+from benchmarks.real.recorded_data import find_data, missing
 from pprs_dynamics import MechanismModel
 from pprs_dynamics.inference.fit.arm_fit import columns_of, fit_arm
 from pprs_dynamics.inference.regression.design import Design
@@ -23,11 +23,6 @@ from pprs_dynamics.inference.search.candidates import EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
-
-sys.path.insert(0, str(Path(__file__).parents[2] / 'docs'))
-
-import closed_chain
-from recorded_data import find_data, missing
 
 DATA = find_data('dvrk', closed_chain.FREE)
 pytestmark = pytest.mark.skipif(DATA is None, reason=missing('dvrk'))

@@ -21,7 +21,7 @@ from pprs_command import pprs
 from pprs_dynamics.measurement.files.recording import write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
-pytestmark = pytest.mark.nodes
+pytestmark = [pytest.mark.nodes, pytest.mark.slow]
 
 HIDDEN = 'coulomb_friction'
 DURATION, SEED = 6.0, 1  # [s]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -247,9 +246,8 @@ def test_a_single_axis_tells_the_same(mistake: str) -> None:
 
 
 def test_a_real_drive_is_called_right() -> None:
-    sys.path.insert(0, str(DOCS))
-    import emps
-    from recorded_data import find_data, missing
+    from benchmarks.real import emps_files as emps
+    from benchmarks.real.recorded_data import find_data, missing
 
     data = find_data('emps', emps.IDENTIFICATION)
     if data is None:

@@ -45,8 +45,8 @@ def loaded(mass: float) -> np.ndarray:
     return heavier.drive_forces(MOTION).total
 
 
-@pytest.mark.parametrize('since', [4.0, 7.313])
-def test_a_payload_that_is_picked_up_is_told_with_its_mass_and_its_moment(since: float) -> None:
+def test_a_payload_that_is_picked_up_is_told_with_its_mass_and_its_moment() -> None:
+    since = 7.313  # [s]
     picked = np.where((since < TIME)[:, None], loaded(0.2), FORCES.total)
     found = diagnosed(picked)
     assert found.verdict == 'effect'
@@ -61,6 +61,7 @@ def test_a_payload_that_is_picked_up_is_told_with_its_mass_and_its_moment(since:
     assert np.nanstd(found.remaining) < 1.1 * 0.05 / np.sqrt(5)
 
 
+@pytest.mark.slow
 def test_what_begins_in_the_middle_is_not_adopted_throughout() -> None:
     recording = recorded(np.where((TIME > 4.0)[:, None], loaded(0.2), FORCES.total))
     answer = adopt(MODEL, EffectRequest.of('payload_mass').placed(MODEL), [recording])
@@ -68,6 +69,7 @@ def test_what_begins_in_the_middle_is_not_adopted_throughout() -> None:
     assert 'it is there since 4' in answer.reason
 
 
+@pytest.mark.slow
 def test_what_is_there_from_the_first_strokes_on_has_no_beginning() -> None:
     """Before it the robot has hardly moved, as friction that has not turned over would show."""
     picked = np.where((TIME > 0.3)[:, None], loaded(0.2), FORCES.total)
@@ -124,8 +126,9 @@ def weaker(forces: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(('change', 'name', 'key', 'value', 'tolerance'), [
-    (lagging, 'effort_filter', 'swing.time_constant', np.sqrt(2) / (2 * np.pi * 12.0), 0.001),
-    (late, 'time_delay', 'swing.delay', 0.02, 0.0005),
+    pytest.param(lagging, 'effort_filter', 'swing.time_constant',
+                 np.sqrt(2) / (2 * np.pi * 12.0), 0.001, marks=pytest.mark.slow),
+    pytest.param(late, 'time_delay', 'swing.delay', 0.02, 0.0005, marks=pytest.mark.slow),
     (weaker, 'current_gain', 'swing.temperature', -0.005, 0.0002)])
 def test_what_sensors_begin_to_do_has_a_date_its_own_name_and_its_own_shape(
         tmp_path: Path, change: Callable[[np.ndarray], np.ndarray], name: str, key: str,
@@ -134,7 +137,7 @@ def test_what_sensors_begin_to_do_has_a_date_its_own_name_and_its_own_shape(
 
     A Butterworth filter is as late as two equal lags of together sqrt(2) over its cut-off [rad/s].
     """
-    arm = made_up_arm.real_arm(tmp_path, **{'arm.gear_ratio': (50.0, 50.0, 1.0)})
+    arm = made_up_arm.real_arm(tmp_path, **{'robot.gear_ratio': (50.0, 50.0, 1.0)})
     moved = made_up_arm.motion(30.0)
     forces = arm.drive_forces(moved).total
     effort = np.where(ARM_TIME[:, None] < 15.0, forces, change(forces))

@@ -23,7 +23,7 @@ VALUES = {'temperature': 0.002, 'ripple': 0.05, 'phase': 0.3, 'reference': 30.0,
 
 @pytest.fixture(scope='module')
 def arm(tmp_path_factory):
-    return real_arm(tmp_path_factory.mktemp('arm'), **{'arm.gear_ratio': (50.0, 50.0, 1.0)})
+    return real_arm(tmp_path_factory.mktemp('arm'), **{'robot.gear_ratio': (50.0, 50.0, 1.0)})
 
 
 def with_gain(arm, **values):

@@ -279,8 +279,10 @@ def case(row: str, *effects: str, seed: int = 3, snr: float = 1.0, noise: float 
     return diagnose(model, [recording]), truth
 
 
-@pytest.mark.parametrize('name', ['hysteresis', 'time_delay', 'payload_offset', 'force_ripple',
-                                  'joint_friction'])
+@pytest.mark.parametrize('name', [
+    'hysteresis', 'force_ripple', 'joint_friction',
+    pytest.param('time_delay', marks=pytest.mark.slow),
+    pytest.param('payload_offset', marks=pytest.mark.slow)])
 def test_a_hidden_effect_is_named(name: str) -> None:
     found, truth = case('effects', name)
     named = [one.name for one in found.effects]
@@ -291,6 +293,7 @@ def test_a_hidden_effect_is_named(name: str) -> None:
     assert found.effects[0].error_after < found.effects[0].error_before
 
 
+@pytest.mark.slow
 def test_what_shows_beside_others_alone_is_confirmed() -> None:
     """A tilt raises the error as long as a spring is missing, and lowers it to a fifth then."""
     names = ('base_tilt', 'drive_spring', 'friction_drift')
@@ -304,6 +307,7 @@ def test_what_shows_beside_others_alone_is_confirmed() -> None:
     assert linear_error(fits, with_tilt) > linear_error(fits, without_tilt)
 
 
+@pytest.mark.slow
 def test_a_search_goes_on_from_a_set_that_holds_around_itself() -> None:
     """The first search takes the wrench for zeros; around these it finds the truth, far away."""
     names = ('external_wrench', 'time_delay', 'force_ripple')
@@ -311,6 +315,7 @@ def test_a_search_goes_on_from_a_set_that_holds_around_itself() -> None:
     assert sorted(one.name for one in found.effects) == sorted(names)
 
 
+@pytest.mark.slow
 def test_what_might_have_been_left_out_as_well_is_a_rival() -> None:
     """A stop of rubber, at 20 times the noise, within the lack of fit of a spring and a ripple."""
     found, _ = case('effects', 'stop_contact', seed=108, snr=10.0)
@@ -319,6 +324,7 @@ def test_what_might_have_been_left_out_as_well_is_a_rival() -> None:
     assert 'stop_contact' in named
 
 
+@pytest.mark.slow
 def test_what_reversals_leave_of_another_form_is_no_delay() -> None:
     """The recording of the README: exponential Stribeck friction, sampled at 500 Hz."""
     found = diagnose(MODEL, [simulate(MODEL, 'stribeck_friction', seed=2).recording])
@@ -326,6 +332,7 @@ def test_what_reversals_leave_of_another_form_is_no_delay() -> None:
         ('stribeck_friction', ('slide_1',))]
 
 
+@pytest.mark.slow
 def test_wide_reversals_are_widths_and_no_further_friction() -> None:
     model, recording, truth = make_case(Case('effects', ('homing_error',), 5, 1.0, 0.9))
     found = diagnose(model, [recording])
@@ -397,6 +404,7 @@ def test_a_drive_that_was_never_measured_takes_no_part_behind_a_delay_either() -
     assert 'slide_3' not in {drive for one in found.effects for drive in one.drives}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('order', [1, 2])
 def test_a_filter_of_another_form_is_a_filter_and_a_delay_is_a_delay(order: int) -> None:
     """An RC's and Butterworth's at 20 Hz, of which neither is the catalogue's."""

@@ -27,7 +27,7 @@ PITCH = 2 * np.pi / GEAR
 @pytest.fixture(scope='module')
 def arm(tmp_path_factory):
     return made_up_arm.real_arm(tmp_path_factory.mktemp('arm'), **{
-        'arm.gear_ratio': (1.0, GEAR, 1.0)})
+        'robot.gear_ratio': (1.0, GEAR, 1.0)})
 
 
 def with_effect(arm, name, **values):

@@ -12,9 +12,9 @@ import pytest
 from model_recordings import record, with_effects
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.app.fleet.manifest import ManifestEntry
+from pprs_dynamics.app.fleet.recordings import SurveyedRecording
 from pprs_dynamics.app.fleet.store import AUTO
-from pprs_dynamics.app.fleet.survey import SurveyJob, examine, identify
+from pprs_dynamics.app.fleet.survey import SurveyJob, examine
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
@@ -24,7 +24,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveEffect
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.paired_errors import rms
+from pprs_dynamics.inference.residuals.residuals import rms
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -118,8 +118,9 @@ def test_what_lies_within_its_uncertainty_is_no_finding_and_beyond_it_is_one() -
     assert verdict(None) == 'effect'
 
 
-@pytest.mark.parametrize('true', [STRIBECK, {'payload_mass': {'mass': 0.3}},
-                                  {'time_delay': {'lift_1.delay': 0.006}}], ids=list)
+@pytest.mark.parametrize('true', [
+    {'payload_mass': {'mass': 0.3}}, pytest.param(STRIBECK, marks=pytest.mark.slow),
+    pytest.param({'time_delay': {'lift_1.delay': 0.006}}, marks=pytest.mark.slow)], ids=list)
 def test_what_adopt_wrote_holds_on_the_same_and_on_other_recordings(
     true: Effects, tmp_path: Path,
 ) -> None:
@@ -202,9 +203,10 @@ def test_a_survey_follows_what_the_model_has(options: str, tmp_path: Path) -> No
     true = {**STRIBECK, 'payload_mass': {'mass': 0.22}}
     path = tmp_path / 'run.csv'
     write_recording(path, record(with_effects(MODEL, true), NOISE))
-    job = SurveyJob(ManifestEntry(str(path), 'robot'), model.values, model.fingerprint, options)
+    write_model(tmp_path / 'model.yaml', model.values, None)
+    job = SurveyJob(SurveyedRecording(str(path), 'robot'), str(tmp_path / 'model.yaml'), options)
     found = {(row['drive'], row['effect'], row['parameter']): row
-             for row in examine(job, identify(str(path))).rows if row.get('effect')}
+             for row in examine(job) if row.get('effect')}
     mass = found[None, 'payload_mass', 'mass']
     assert abs(mass['value'] - 0.22) < 4 * mass['std'] < 0.02
     assert found['lift_1', 'stribeck_friction', 'force']['value'] == pytest.approx(0.6, abs=0.1)

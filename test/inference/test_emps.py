@@ -14,27 +14,25 @@ import numpy as np
 import pytest
 from pprs_command import pprs
 
+from benchmarks import ROOT
+from benchmarks.real import emps as real_drive
+from benchmarks.real import emps_files as emps
+from benchmarks.real.recorded_data import find_data, missing
 from pprs_dynamics.inference.adoption.loop import adopt_all
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.physics.model.model_file import load_model
 
-DOCS = Path(__file__).parents[2] / 'docs'
-sys.path.insert(0, str(DOCS))
-
-import emps  # noqa: E402
-import real_drive  # noqa: E402
-from recorded_data import find_data, missing  # noqa: E402
-
 DATA = find_data('emps', emps.IDENTIFICATION)
 pytestmark = pytest.mark.skipif(DATA is None, reason=missing('emps'))
-MODEL = DOCS.parent / 'config' / 'single_axis.yaml'
+MODEL = ROOT / 'config' / 'single_axis.yaml'
 
 
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with both runs as CSV, written by the script."""
     folder = tmp_path_factory.mktemp('emps')
-    subprocess.run([sys.executable, DOCS / 'emps.py', str(DATA), folder], check=True, timeout=60)
+    subprocess.run([sys.executable, '-m', 'benchmarks.real.emps_files', str(DATA), folder],
+                   check=True, timeout=60, cwd=ROOT)
     return folder
 
 

@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 from made_up_arm import JOINTS, motion, real_arm, record, write_arm
 
-from pprs_dynamics import MechanismModel, compare, diagnose, fit
+from pprs_dynamics import MechanismModel, build_model, compare, diagnose, fit
+from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, first_step
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.explained_effort import explained_shares, little_explained
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.model.reference_keys import ReferenceFile, with_reference
 
 UNRELATED = 12.0  # [N m] of an effort that is no force of this machine
 
@@ -104,3 +106,13 @@ def test_a_drive_that_stands_or_whose_effort_is_noise_has_nothing_to_explain(
     assert little_explained(model, still) == {}
     moving = replace(residuals, measured=still.measured)
     assert set(little_explained(model, moving)) == {'turn'}
+
+
+def test_after_a_fit_the_next_step_is_not_the_fit_again(tmp_path: Path) -> None:
+    bare = MechanismModel.load(write_arm(tmp_path))
+    assert first_step(bare, GivenFiles())[1].startswith('pprs fit')
+    fitted = build_model(with_reference(bare.values, [ReferenceFile(tmp_path / 'run.csv', 'x')]),
+                         bare.source)
+    words, command = first_step(fitted, GivenFiles())
+    assert 'the model was fitted' in words
+    assert command.startswith('pprs info')

@@ -15,6 +15,8 @@ from pprs_dynamics import JointMotion
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import Recording
 
+pytestmark = pytest.mark.slow
+
 SWING, RATE, SECONDS = 1, 100.0, 90.0
 # Speeds of the same strokes, for 15 s each.
 VARIED, EVEN = (1.0, 0.15, 1.0, 0.15, 1.0, 0.4), (0.6,) * 6

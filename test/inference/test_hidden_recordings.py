@@ -24,6 +24,8 @@ from pprs_dynamics.simulation.hidden_effect import DriveMoment
 from pprs_dynamics.simulation.hidden_effects import draw_effect
 from pprs_dynamics.simulation.sensors import EffortNoise
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope='module', autouse=True)
 def short() -> Iterator[None]:

@@ -3,10 +3,13 @@
 
 """Measured efforts against the model sample by sample, without ROS."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 
 from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.residuals.live import LiveComparison
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
@@ -95,3 +98,38 @@ def test_static_friction_of_a_drive_that_stands_is_no_unexplained_effort():
     # What holds the weight is known at rest, too.
     zero, _ = compared_with(change=lambda effort, forces: 0 * effort, rest=True)
     assert {'lift_1', 'lift_2', 'lift_3'} <= set(zero.unexplained())
+
+
+@pytest.mark.parametrize('rate', [10, 20, 50, 200])
+@pytest.mark.parametrize('jitter', [0.0, 0.01, 0.05])
+def test_an_exact_model_has_no_error_at_any_rate_and_with_any_jitter(rate, jitter):
+    """Samples at their stamps, whose steps are uneven by a share of them."""
+    model, span = DriveModel.load(), 10.0
+    rng = np.random.default_rng(0)
+    time = np.arange(1, span * rate - 1)
+    time = (time + jitter * rng.uniform(-1, 1, len(time))) / rate
+    forces = model.drive_forces(Excitation(span, seed=3).motion(time))
+    comparison, residual = LiveComparison(model), []
+    for row in range(len(time)):
+        comparison.push(time[row], forces.mechanism.position[row], forces.total[row])
+        if row % 2 and (found := comparison.evaluate()) is not None:
+            residual.append(found.residual)
+    residual = np.concatenate(residual)
+    assert len(residual) > 0.8 * len(time) - 12
+    # At 10 Hz a window lasts a second, in which the motion is not quite a polynomial.
+    assert np.sqrt(np.mean(residual ** 2)) < 0.02  # [N] of 10
+
+
+def test_no_stream_of_stamps_raises():
+    model = DriveModel.load()
+    rng = np.random.default_rng(4)
+    position = model.drive_forces(Excitation(4.0, seed=3).motion([1.0])).mechanism.position[0]
+    for _ in range(200):
+        steps = rng.choice([1e-9, 1e-4, 0.01, 0.05, 1.0, -0.5, 0.0], 60,
+                           p=rng.dirichlet(np.full(7, 0.3)))
+        comparison = LiveComparison(model)
+        for row, time in enumerate(np.cumsum(steps)):
+            comparison.push(time, position * (1 + 1e-6 * rng.normal(size=6)), np.zeros(6))
+            if row % 5 == 0:
+                with suppress(PprsError):  # noise over a nanosecond is any velocity
+                    comparison.evaluate()

@@ -149,7 +149,7 @@ def test_bursts_of_an_encoder_do_not_choose_the_window(tmp_path: Path) -> None:
     assert found < 0.2 * before
 
 
-@pytest.mark.parametrize('size', [0.008, 0.03])
+@pytest.mark.parametrize('size', [0.008, pytest.param(0.03, marks=pytest.mark.slow)])
 def test_play_at_reversals_is_lost_motion(tmp_path: Path, size: float) -> None:
     model = made_up_arm.real_arm(tmp_path)
     found, named = found_on(model, with_play(model, size))

@@ -205,7 +205,7 @@ def test_effort_kind_says_that_efforts_are_commands(tmp_path: Path) -> None:
 
 def test_effort_kind_says_that_efforts_are_currents(tmp_path: Path) -> None:
     run = arm_run(tmp_path)
-    values = {**run.model.values, 'arm.gain': (2.0, 3.0, 4.0), 'effort_kind': 'current'}
+    values = {**run.model.values, 'robot.gain': (2.0, 3.0, 4.0), 'effort_kind': 'current'}
     model = build_model(values, run.model.source)
     write_recording(tmp_path / 'run.csv', run.of(run.total))
     read = [read_recording(tmp_path / 'run.csv', one.recorded) for one in (run.model, model)]

@@ -25,6 +25,8 @@ from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_file import build_model
 
+pytestmark = pytest.mark.slow
+
 NOISE = 0.1  # [N m, N]
 FILES = GivenFiles(('run.csv',), model='robot.yaml')
 DRIVE = {'pendulum': 'j1', 'planar arm': 'j2', 'spatial arm': 'swing', '3-PPRS': 'lift_2'}

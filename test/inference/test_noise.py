@@ -319,3 +319,33 @@ def test_the_covariance_at_lag_0_is_the_variance_of_the_samples() -> None:
     for period in (PERIOD, 4 * PERIOD):
         assert noise.covariance(5, period)[0] == pytest.approx(noise.rms_at(period) ** 2)
         assert abs(noise.rms_at(period) - 1) > 0.1
+
+
+def test_a_drive_that_drifts_does_not_hide_an_offset_on_another() -> None:
+    """The noise of a constant on a white drive, beside five white peers and with one drifting."""
+    random = np.random.default_rng(1)
+    powers: dict[bool, list[float]] = {False: [], True: []}
+    for _ in range(12):
+        errors = random.normal(size=(2000, 6))
+        for drifts, found in powers.items():
+            if drifts:
+                errors[:, 5] = 0.1 * np.cumsum(errors[:, 5])
+            found.append(float(fitted(errors)[1].spectra[0, 0]))
+    with_white, with_drifting = map(np.median, powers.values())
+    assert with_white < 2
+    assert with_drifting < 1.3 * with_white
+
+
+def test_the_noise_of_a_constant_is_that_of_its_own_drive() -> None:
+    """White peers do not make offsets of the slow noise of one drive."""
+    random = np.random.default_rng(5)
+    beyond = 0
+    for _ in range(40):
+        slow = lfilter([np.sqrt(1 - 0.998 ** 2)], [1, -0.998], random.normal(size=10000))[-2000:]
+        errors = np.column_stack([slow, *random.normal(size=(5, 2000))])
+        regression = Regression(Residuals(
+            tuple('abcdef'), 0.02 * np.arange(2000), np.zeros(2000, int), errors,
+            np.zeros_like(errors)))
+        fit = regression.fit(())
+        beyond += int(fit.squares[0, 0] > 9 * fit.spectra[0, 0])
+    assert beyond <= 1

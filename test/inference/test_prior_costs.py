@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import ast
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -27,27 +26,35 @@ SIGNED = [effect for effect in CATALOGUE.values() if effect.unphysical_below]
 SIZE = (Parameter('size', 's', 'N', 'size', -1e3, 1e3),)
 
 
+def test_the_penalty_of_a_sign_is_the_integral_over_its_prior() -> None:
+    """By quadrature: prior density 2 (1 - e) of a wide Gaussian on one side, 2 e on the other."""
+    e, std = DECISIONS.wrong_sign_odds, 0.7
+    points = np.linspace(-40, 40, 800001)
+    for deviations in (-4.0, -1.0, -0.001, 0.0, 0.001, 1.0, 4.0):
+        posterior = np.exp(-(points / std - deviations) ** 2 / 2) / (std * np.sqrt(2 * np.pi))
+        factor = np.where(points > 0, 2 * (1 - e), np.where(points < 0, 2 * e, 1.0))
+        integral = np.trapezoid(posterior * factor, points)
+        assert COSTS.of_sign(deviations) == pytest.approx(-2 * np.log(integral), abs=1e-6)
+
+
+def test_the_penalty_of_a_sign_has_no_step() -> None:
+    steps = np.diff([COSTS.of_sign(z) for z in np.linspace(-6, 6, 1201)])
+    assert np.all(steps < 0)
+    assert np.all(steps > -0.05)
+
+
+def test_only_a_wrong_sign_in_doubt_is_cheap() -> None:
+    """Far on one side the penalty is that of the prior probability of that side."""
+    odds = [np.exp(-COSTS.of_sign(z) / 2) / 2 for z in (40.0, -40.0)]
+    assert odds[1] == pytest.approx(DECISIONS.wrong_sign_odds)
+    assert sum(odds) == pytest.approx(1.0)
+
+
 @pytest.mark.parametrize('effect', SIGNED, ids=lambda one: one.name)
-def test_the_odds_of_all_signs_add_up_to_one(effect: type[CatalogueEffect]) -> None:
+def test_signed_parameters_are_coefficients(effect: type[CatalogueEffect]) -> None:
     names = tuple(c.name for c in effect.coefficients)
     component = Component(effect, 0 if issubclass(effect, DriveEffect) else None, names)
     assert set(component.signed) == set(effect.unphysical_below)
-    assert set(effect.unphysical_below.values()) == {0.0}
-    odds = []
-    for signs in product((1.0, -1.0), repeat=len(component.signed)):
-        values = dict(zip(component.signed, signs, strict=True))
-        prior_cost = COSTS.of_right_signs(component) + COSTS.of_wrong_signs(component, values)
-        # A symmetric prior gives each choice of signs as much.
-        odds.append(np.exp(-prior_cost / 2) / 2 ** len(signs))
-    assert sum(odds) == pytest.approx(1.0)
-    assert sum(odds[1:]) == pytest.approx(DECISIONS.wrong_sign_odds)
-    assert max(odds) == odds[0]
-
-
-def test_an_effect_without_a_sign_pays_none() -> None:
-    component = Component(CATALOGUE['effort_offset'], 0, ('force',))
-    assert COSTS.of_right_signs(component) == 0
-    assert COSTS.of_wrong_signs(component, {'force': -1.0}) == 0
 
 
 def test_names_are_those_that_the_robot_can_have(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,7 +25,7 @@ from pprs_dynamics.inference.fit.reference_runs import read_reference
 from pprs_dynamics.inference.regression.carried_over import CarriedOver
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
+from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
 from pprs_dynamics.physics.model.ledger import read_steps
@@ -291,6 +291,7 @@ def test_a_model_file_that_keeps_the_residual_stands_alone(
     assert np.all(np.nanstd(left, axis=0) < 0.35 * np.nanstd(error, axis=0))
 
 
+@pytest.mark.slow
 def test_dry_friction_of_passive_joints_is_carried_over_and_no_change() -> None:
     model = load_model(Path(__file__).parents[2] / 'config' / 'delta.yaml')
     assert isinstance(model, MechanismModel)
@@ -324,6 +325,7 @@ def test_what_is_no_reference_is_refused(machine: tuple[MechanismModel, Referenc
         build_model({**model.values, 'reference': ['free.csv']}, model.source)
 
 
+@pytest.mark.slow
 def test_what_has_changed_is_added_since_the_reference(
         machine: tuple[MechanismModel, Reference], tmp_path: Path) -> None:
     model, _ = machine

@@ -5,10 +5,8 @@
 
 from __future__ import annotations
 
-import ast
 from dataclasses import replace
 from itertools import chain, combinations, repeat
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +16,6 @@ from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.regression import design as design_module
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search import relinearisation
-from pprs_dynamics.inference.search import search as search_module
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.fitted_model import (
@@ -158,6 +155,7 @@ def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects
     assert squared(last, found, exact - linear_prediction(last, found)) < 50
 
 
+@pytest.mark.slow
 def test_without_an_effect_that_bent_the_columns_the_search_begins_again() -> None:
     """What else was found may only have made good what that one did."""
     delayed = {drive: {'delay': 0.01} for drive in DRIVES}
@@ -282,6 +280,7 @@ def test_a_wrench_on_guides_that_feel_it_hides_no_effect_and_makes_none() -> Non
     assert wrench_on_guides(True, 3) == ['external_wrench']
 
 
+@pytest.mark.slow
 def test_a_wrench_on_preloaded_guides_is_mostly_told_alone() -> None:
     """Friction as if the wrench did not load the guides: a preload is all they feel.
 
@@ -339,21 +338,3 @@ def test_every_decision_has_a_unit_and_a_reason() -> None:
         assert len(reason) > 5 or reason == '95 %' or reason == 'the same', name
     assert {name: value for name, value, *_ in table if name in vars(Decisions())} == vars(
         Decisions())
-
-
-def test_no_number_decides_outside_the_table() -> None:
-    page = (Path(__file__).parents[2] / 'docs' / 'decisions.md').read_text()
-    told = {name for name, *_ in DECISIONS.table()}
-    bounds = page.partition('## Bounds of the effort and of the accuracy')[2].partition('##')[0]
-    inference = Path(search_module.__file__).parents[1]
-    found = set()
-    for room in ('regression', 'search', 'diagnosis'):
-        for file in sorted((inference / room).glob('*.py')):
-            for node in ast.parse(file.read_text()).body:
-                if isinstance(node, ast.Assign) and any(
-                        isinstance(part, ast.Constant) and type(part.value) in (int, float)
-                        for part in ast.walk(node.value)):
-                    found |= {part.id for target in node.targets for part in ast.walk(target)
-                              if isinstance(part, ast.Name)}
-    tables = {'UNITS', 'TURNING', 'READ_IN', 'FIXED'}  # of words and units
-    assert {name for name in found - told - tables if f'`{name}`' not in bounds} == set()

@@ -25,6 +25,8 @@ from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.robot_block import AXIS
 
+pytestmark = pytest.mark.slow
+
 # Powers of s and k by which base units scale.
 POWERS = {'1': (0.0, 0.0), 'rad': (0.0, 0.0), 'm': (1.0, 0.0), 's': (0.5, 0.0), 'N': (0.0, 1.0),
           'kg': (0.0, 1.0)}

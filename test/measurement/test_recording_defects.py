@@ -356,7 +356,7 @@ def test_numbers_that_nothing_can_have_measured_are_no_measurements(size: float)
     assert the_one(recording, 'impossible_effort').count == 10
     assert the_one(recording, 'impossible_velocity').count == 1
     dropped = the_one(recording, 'impossible_position')
-    assert 'which none can be, at 0.08 s; those samples are dropped' in dropped.text
+    assert 'far from all others, at 0.08 s; those samples are dropped' in dropped.text
     assert np.isnan(recording.effort).sum() == 10
     assert len(recording.time) == len(arrays['time']) - 1
     assert np.nanmax(np.abs(recording.effort)) < 1e3
@@ -491,3 +491,31 @@ def test_every_defect_of_the_policy_is_planted_in_a_test() -> None:
                if re.search(rf"(the|the_one)\([^'\n]*'{kind}'\)|'{kind}' in kinds", text)}
     planted |= {f'constant_{quantity}' for quantity in QUANTITIES} | {'short_segment'}
     assert planted == set(POLICY)
+
+
+@pytest.mark.parametrize(('rows', 'value'), [
+    (slice(0, 10), 253.0), (slice(3000, 3002), -253.0), ([1000, 4000], 1e282), ([5999], 253.0)])
+def test_a_few_damaged_rows_are_discarded_and_counted(rows: Any, value: float) -> None:
+    time = np.arange(6000) * 0.008
+    position = np.column_stack([np.sin(time), np.cos(1.3 * time)])
+    effort = 4.0 * np.gradient(position, time, axis=0)
+    damaged = position.copy(), effort.copy()
+    for values in damaged:
+        values[rows] = value
+    recording = Recording.from_arrays('log', time, damaged[0], effort=damaged[1],
+                                      drives=('a', 'b'))
+    kept = np.ones(len(time), dtype=bool)
+    kept[rows] = False
+    np.testing.assert_array_equal(recording.position, position[kept])
+    np.testing.assert_array_equal(recording.effort, effort[kept])
+    found = {one.kind: one for one in recording.findings}
+    assert found['impossible_position'].count == (~kept).sum()
+    assert f'{abs(value):.3g}' in found['impossible_position'].text
+
+
+def test_a_short_motion_is_not_far_from_the_rest() -> None:
+    time = np.arange(6000) * 0.008
+    position = np.random.default_rng(0).normal(size=(6000, 1)) * 1e-6
+    position[3000:3025, 0] += np.sin(np.arange(25) * np.pi / 25)
+    recording = Recording.from_arrays('log', time, position, drives=('a',))
+    assert not [one for one in recording.findings if one.kind == 'impossible_position']

@@ -12,11 +12,9 @@ from __future__ import annotations
 import copy
 import os
 import pickle
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -120,8 +118,7 @@ def test_the_drives_motion_that_comes_with_the_forces_is_the_mechanisms(plainly,
 def test_forces_are_copied_and_pickled_with_their_mechanism():
     model, motion = paper_model(), random_motion(np.random.default_rng(7), 3)
     forces = model.drive_forces(motion)
-    for same in (copy.deepcopy(forces), pickle.loads(pickle.dumps(forces)),
-                 replace(forces, total=forces.total)):
+    for same in copy.deepcopy(forces), pickle.loads(pickle.dumps(forces)):
         assert_array_equal(sum(same.parts.values()), forces.total)
         assert_array_equal(same.mechanism.position, forces.mechanism.position)
     assert model.drive_forces(motion).mechanism.motion is motion
@@ -295,27 +292,55 @@ def test_without_a_place_to_keep_compiled_code_nothing_is_compiled(monkeypatch):
     assert compilation.compiler() is None
 
 
-def test_compiled_code_of_other_sources_is_another(tmp_path, monkeypatch):
-    compilation._digest.cache_clear()
-    before = compilation._digest()
-    copy = tmp_path / 'physics'
-    shutil.copytree(compilation.PHYSICS, copy, ignore=shutil.ignore_patterns('__pycache__'))
-    monkeypatch.setattr(compilation, 'PHYSICS', copy)
+SOURCE = '''
+from typing import NamedTuple
+WIDTH = 0.5
+class Pair(NamedTuple):
+    first: float
+    second: float
+def callee(x):
+    'Return something.'
+    return WIDTH * x
+def three(function):
+    def each(x):
+        return function(0, x), function(1, x)
+    return each
+@three
+def chains(i, x):
+    return [i * each for each in (x, 2.0)]
+def kernel(p, s, table):
+    return callee(Pair(table[s, 0], p).first), chains(p)
+'''
 
-    def digest() -> str:
-        compilation._digest.cache_clear()
-        return compilation._digest()
 
-    try:
-        assert digest() == before
-        seen = {before}
-        for place in ('model/limits.py', 'three_pprs/closure.py', 'effects/effect.py'):
-            with (copy / place).open('a') as file:
-                file.write('# changed\n')
-            assert digest() not in seen, place
-            seen.add(digest())
-    finally:
-        compilation._digest.cache_clear()
+def fingerprint(old='', new=''):
+    assert old in SOURCE
+    namespace = {'__name__': 'pprs_dynamics.some_kernel'}
+    exec(SOURCE.replace(old, new), namespace)
+    return compilation._fingerprint(namespace['kernel'])
+
+
+@pytest.mark.parametrize(('old', 'new'), [
+    ('0.5', '0.25'), ('WIDTH * x', 'WIDTH / x'), ('function(1, x)', 'function(2, x)'),
+    ('(x, 2.0)', '(x, 3.0)'), ('first: float\n    second', 'second: float\n    first')])
+def test_compiled_code_of_other_sources_is_another(old, new):
+    assert fingerprint(old, new) != fingerprint()
+
+
+@pytest.mark.parametrize(('old', 'new'), [
+    ('Return something', 'Return another thing'), ('WIDTH = 0.5', '# a remark\nWIDTH = 0.5')])
+def test_a_comment_leaves_compiled_code_as_it_is(old, new):
+    assert fingerprint(old, new) == fingerprint()
+
+
+def test_another_process_finds_the_same_compiled_code():
+    code = ('from pprs_dynamics.physics.mechanism.compilation import _fingerprint; '
+            'from pprs_dynamics.physics.model.one_pass import forces_kernel; '
+            'from pprs_dynamics.physics.mechanism.tree_evaluation import _evaluate; '
+            'print(_fingerprint(forces_kernel), _fingerprint(_evaluate))')
+    found = {subprocess.run([sys.executable, '-c', code], check=True, capture_output=True).stdout
+             for _ in range(2)}
+    assert len(found) == 1
 
 
 def test_compiled_code_that_differs_in_a_name_alone_is_another():
@@ -326,7 +351,7 @@ def test_compiled_code_that_differs_in_a_name_alone_is_another():
         return m.w
 
     assert velocity.__code__.co_code == rate.__code__.co_code
-    assert compilation._code_digest(velocity) != compilation._code_digest(rate)
+    assert compilation._fingerprint(velocity) != compilation._fingerprint(rate)
 
 
 def test_importing_and_loading_a_model_imports_no_compiler():

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import JointMotion, MechanismModel, load_model
+from pprs_dynamics.app.api.first_model import first_model
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.effects.catalogue import find_effect
 
@@ -105,23 +106,50 @@ def test_a_rotor_without_mass_on_a_gear_has_its_inertia(tmp_path: Path) -> None:
     assert efforts(model, q, v, a)[0, 0] == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize(('more', 'limit', 'kind', 'at'), [
-    ('<mimic joint="leader" multiplier="-1" offset="1.2"/>', LIMIT, 'revolute', 1.2),
-    ('<mimic joint="leader" multiplier="-1" offset="0.2"/>', LIMIT, 'prismatic', 0.2),
-    ('', '<limit lower="0.5" upper="0.9" effort="1" velocity="1"/>', 'prismatic', 0.5),
-    ('', '<limit lower="-0.9" upper="-0.5" effort="1" velocity="1"/>', 'revolute', -0.5),
-    ('', LIMIT, 'revolute', 0.0)])
-def test_a_locked_joint_has_a_position_that_the_description_allows(
-    tmp_path: Path, more: str, limit: str, kind: str, at: float,
+@pytest.mark.parametrize(('more', 'kind', 'own', 'at'), [
+    ('<mimic joint="leader" multiplier="-1" offset="1.2"/>', 'revolute', '', 1.0),
+    ('<mimic joint="leader" multiplier="-1" offset="0.2"/>', 'prismatic', '', 0.0),
+    ('', 'prismatic', ', locked: 0.5', 0.5), ('', 'revolute', ', locked: -0.5', -0.5),
+    ('', 'revolute', '', 0.0)])
+def test_a_locked_joint_is_where_the_file_says_and_its_followers_with_it(
+    tmp_path: Path, more: str, kind: str, own: str, at: float,
 ) -> None:
     model = load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1') + link('l1')
                  + joint('leader', 'l1', 'l2', '1 0 1') + link('l2')
-                 + joint('locked', 'l2', 'l3', '0 1 1', kind, more, limit) + link('l3'),
-                 'arm: {base: base, tool: l3, joints: [j1]}')
+                 + joint('locked', 'l2', 'l3', '0 1 1', kind, more) + link('l3'),
+                 f'robot: {{base: base, tool: l3, drives: [j1], locked: {{leader: 0.2{own}}}}}')
     q, v, a = random_motion(1)
-    expected = rnea(tmp_path, [q[0], 0, at], [v[0], 0, 0], [a[0], 0, 0])
+    expected = rnea(tmp_path, [q[0], 0.2, at], [v[0], 0, 0], [a[0], 0, 0])
     assert efforts(model, q, v, a)[0, 0] == pytest.approx(expected[0], rel=1e-9)
-    assert model.robot.structure.locked == {'leader': 0.0, 'locked': at}
+    assert model.robot.structure.locked == pytest.approx({'leader': 0.2, 'locked': at})
+
+
+@pytest.mark.parametrize(('lower', 'upper', 'at'), [
+    (0.5, 0.9, 0.5), (-0.9, -0.5, -0.5), (-3.0, 3.0, 0.0)])
+def test_without_loops_a_joint_without_a_drive_is_locked_within_its_limits(
+    tmp_path: Path, lower: float, upper: float, at: float,
+) -> None:
+    limit = f'<limit lower="{lower}" upper="{upper}" effort="1" velocity="1"/>'
+    model = load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1') + link('l1')
+                 + joint('slide', 'l1', 'l2', '1 0 1', 'prismatic', '', limit) + link('l2'),
+                 'robot: {base: base, tool: l2, drives: [j1]}')
+    q, v, a = random_motion(1)
+    expected = rnea(tmp_path, [q[0], at], [v[0], 0], [a[0], 0])
+    assert efforts(model, q, v, a)[0, 0] == pytest.approx(expected[0], rel=1e-9)
+    assert model.robot.structure.locked == {'slide': at}
+
+
+@pytest.mark.parametrize(('locked', 'words'), [
+    ('{leader: 9.0}', r'robot\.locked\.leader is 9\.0, must be within its limits, -3 to 3'),
+    ('{leeder: 0.0}', r'unknown joint leeder'),
+    ('{j1: 0.0}', r'robot\.drives has j1 as well')])
+def test_a_lock_that_cannot_be_is_refused(
+    tmp_path: Path, locked: str, words: str,
+) -> None:
+    with pytest.raises(PprsError, match=words):
+        load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1') + link('l1')
+             + joint('leader', 'l1', 'l2', '1 0 1') + link('l2'),
+             f'robot: {{base: base, tool: l2, drives: [j1], locked: {locked}}}')
 
 
 @pytest.mark.parametrize('base', ['world', 'plate'])
@@ -131,7 +159,8 @@ def test_gravity_is_in_the_frame_of_the_root(tmp_path: Path, base: str, angle: s
         tmp_path, '<link name="world"/><link name="plate"/><joint name="mount" type="fixed">'
         '<parent link="world"/><child link="plate"/>'
         f'<origin xyz="0 0 2" rpy="{angle}"/></joint>'
-        + joint('j1', 'plate', 'l1') + link('l1'), f'arm: {{base: {base}, tool: l1, joints: [j1]}}')
+        + joint('j1', 'plate', 'l1') + link('l1'),
+        f'robot: {{base: {base}, tool: l1, drives: [j1]}}')
     q, v, a = random_motion(1)
     assert efforts(model, q, v, a)[0] == pytest.approx(rnea(tmp_path, q, v, a), rel=1e-9)
 
@@ -139,7 +168,7 @@ def test_gravity_is_in_the_frame_of_the_root(tmp_path: Path, base: str, angle: s
 def test_a_continuous_joint_can_be_a_drive(tmp_path: Path) -> None:
     model = load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1', kind='continuous',
                                                          limit='<limit effort="39" velocity="2"/>')
-                 + link('l1'), 'arm: {base: base, tool: l1, joints: [j1]}')
+                 + link('l1'), 'robot: {base: base, tool: l1, drives: [j1]}')
     q, v, a = random_motion(1)
     expected = rnea(tmp_path, [np.cos(q[0]), np.sin(q[0])], v, a)
     assert efforts(model, q, v, a)[0] == pytest.approx(expected, rel=1e-9)
@@ -151,7 +180,7 @@ def test_a_continuous_joint_can_be_a_drive(tmp_path: Path) -> None:
 
 def test_the_base_may_be_a_world_that_is_no_link(tmp_path: Path) -> None:
     model = load(tmp_path, joint('j1', 'world', 'l1') + link('l1'),
-                 'arm: {base: world, tool: l1, joints: [j1]}')
+                 'robot: {base: world, tool: l1, drives: [j1]}')
     q, v, a = random_motion(1)
     urdf = (tmp_path / 'robot.urdf').read_text()
     (tmp_path / 'robot.urdf').write_text(urdf.replace('<joint', '<link name="world"/><joint', 1))
@@ -163,7 +192,14 @@ def test_masses_that_no_robot_has_are_refused(tmp_path: Path, mass: str) -> None
     with pytest.raises(PprsError, match='link l1: its mass is '):
         load(tmp_path, '<link name="base"/>' + joint('j1', 'base', 'l1')
              + link('l1').replace('mass value="1.0"', f'mass value="{mass}"'),
-             'arm: {base: base, tool: l1, joints: [j1]}')
+             'robot: {base: base, tool: l1, drives: [j1]}')
+
+
+def test_a_recording_in_place_of_a_robot_is_no_xacro(tmp_path: Path) -> None:
+    path = tmp_path / 'run.mcap'
+    path.write_bytes(b'\x89MCAP0\r\n <xacro:include a="${b}"/>')
+    with pytest.raises(PprsError, match='no URDF or MJCF, it is not XML'):
+        first_model(path, [], output=tmp_path / 'model.yaml')
 
 
 THREE = (f'<worldbody><body name="t0"><joint name="a" axis="0 1 0"/>{BODY}'

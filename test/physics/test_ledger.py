@@ -148,8 +148,6 @@ def test_the_command_shows_draws_and_takes_back(
         ('coulomb_friction', 0.2, 0.1), ('base_tilt', 0.2, 0.1)]
     assert steps[1]['drives'] is None
     assert 'coulomb_friction' in (tmp_path / 'page.html').read_text()
-    done = pprs('history', str(old), '--picture', str(tmp_path / 'fall.png'))
-    assert (tmp_path / 'fall.png').read_bytes().startswith(b'\x89PNG')
     done = pprs('history', str(old), '--undo', '--output', str(new))
     assert done.returncode == 0, done.stderr
     assert model_values(read_parameters(new)) == stages[1]

@@ -120,7 +120,7 @@ def test_joints_in_another_order_permute_the_torques(tmp_path: Path) -> None:
         model.drive_forces(motion).total[:, order], abs=1e-12)
 
 
-def test_joints_that_are_left_out_stand_at_zero(tmp_path: Path) -> None:
+def test_locked_joints_are_as_those_that_rest(tmp_path: Path) -> None:
     motion = states()
     held = JointMotion(*(values * [1, 0, 1] for values in (
         motion.position, motion.velocity, motion.acceleration)))
@@ -133,7 +133,7 @@ def test_joints_that_are_left_out_stand_at_zero(tmp_path: Path) -> None:
 
 def test_friction_armature_and_offset_add_up(tmp_path: Path) -> None:
     model = MechanismModel.load(arm.write_arm(tmp_path))
-    real = arm.real_arm(tmp_path, **{'arm.armature': (1.0, 2.0, 3.0)})
+    real = arm.real_arm(tmp_path, **{'robot.armature': (1.0, 2.0, 3.0)})
     motion = states()
     v = motion.velocity
     expected = (np.array([1, 2, 3]) * motion.acceleration
@@ -178,15 +178,15 @@ def test_joints_that_share_a_transmission_need_the_turns_of_its_motors(tmp_path:
 
 @pytest.mark.parametrize(('old', 'new', 'words'), [
     ('tool: flange', 'tool: flansch', 'flansch.*be a link of the URDF'),
-    ('tool: flange', 'tool: stand', 'that arm.joints move'),
-    ('base: stand', 'base: beam', 'that none of arm.joints moves'),
+    ('tool: flange', 'tool: stand', 'that robot.drives move'),
+    ('base: stand', 'base: beam', r'that no joint moves, but swing \(revolute\) does'),
     ('swing', 'sving', 'turn, swing, reach'),
     ('urdf: made_up.urdf', 'urdf: none.urdf', 'none.urdf'),
     ('urdf: made_up.urdf', 'urdf: arm.yaml', 'XML'),
-    ('joints: [turn, swing, reach]', 'joints: []', 'at least one joint'),
-    ('joints: [turn, swing, reach]', 'joints: [turn, turn]', 'once'),
+    ('drives: [turn, swing, reach]', 'drives: []', 'at least one joint'),
+    ('drives: [turn, swing, reach]', 'drives: [turn, turn]', 'once'),
     ('base: stand', 'base: stand\n      gain: [1.0, 2.0]', 'list of 3 numbers'),
-    ('base: stand', 'base: stand\n      gane: [1.0, 2.0, 3.0]', 'did you mean arm.gain'),
+    ('base: stand', 'base: stand\n      gane: [1.0, 2.0, 3.0]', 'did you mean robot.gain'),
 ])
 def test_a_mistake_in_the_file_is_one_sentence(tmp_path: Path, old: str, new: str,
                                                words: str) -> None:
@@ -203,7 +203,7 @@ def test_effects_say_where_they_act(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match='acts in a serial arm'):
         load_model(path)
     path.write_text(text + '      rod_mass: {mass: 0.1}\n')
-    with pytest.raises(ModelError, match=r'unknown effect rod_mass \(use link_mass\)'):
+    with pytest.raises(ModelError, match='unknown effect rod_mass'):
         load_model(path)
     with pytest.raises(ModelError, match='acts in a 3-PPRS'):
         build_model({**DriveModel.load().values, 'effects.coupled_drives.wrist.coulomb': 0.1})
@@ -218,7 +218,7 @@ def test_a_file_keeps_its_urdf_wherever_it_is_written(tmp_path: Path) -> None:
     real = arm.real_arm(tmp_path)
     write_model(written, real.values, path)
     block = yaml.safe_load(written.read_text())['/**']['ros__parameters']
-    assert block['arm']['urdf'] == os.path.join('..', 'made_up.urdf')
+    assert block['robot']['urdf'] == os.path.join('..', 'made_up.urdf')
     assert block['friction']['coulomb'] == list(arm.FRICTION['friction.coulomb'])
     again = load_model(written)
     assert dict(again.values) == dict(real.values)

@@ -113,7 +113,6 @@ WRONG = [
     ('geometry.rod_length', 10 ** 400, 'be finite'),
     ('geometry.rod_length', 0.01, 'greater than 0.05 m, for the platform to stand'),
     ('limits', 5, 'must be a mapping, of names to what they hold'),
-    ('effects.active', ['payload_moment'], r'use payload_mass with the centre x, y, z'),
     ('bogus', None, 'unknown key bogus'),
     ('effects.effort_offset.lift_9.force', 1.0, r'unknown drive lift_9 \(known: slide_1, '
      r'slide_2, slide_3, lift_1'),

@@ -5,14 +5,12 @@
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ros_processes import executable
 
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, PprsError, simulate
 from pprs_dynamics.simulation.hidden_effects import draw_effects
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
@@ -21,16 +19,12 @@ from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
     ('viscous_friction', 1e6), ('effort_offset', 1e4), ('drive_spring', 1e6),
     ('payload_mass', 1e6), ('tool_drag', 1e6), ('link_mass', 1e6)])
 def test_what_the_engine_does_not_solve_is_no_recording(
-    tmp_path: Path, name: str, scale: float,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, scale: float,
 ) -> None:
-    done = subprocess.run(
-        [executable('pprs'), 'simulate', '--output', 'run.csv', '--duration', '3', '--effect',
-         name, '--scale', f'{scale:g}'], cwd=tmp_path, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1
-    assert done.stderr.startswith('pprs simulate: the simulated robot: at ')
-    # Neither a recording nor the engine's own log.
-    assert list(tmp_path.iterdir()) == []
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(PprsError, match=r'^the simulated robot: at '):
+        simulate(DriveModel.load(), name, scale=scale, duration=3.0)
+    assert list(tmp_path.iterdir()) == []  # no log of the engine
 
 
 def test_a_robot_that_the_engine_does_not_solve_stops_and_says_so() -> None:

@@ -202,7 +202,7 @@ from pprs_dynamics.physics.model.model_file import build_model
 given = DriveModel.load(sys.argv[1])
 true = build_model({**given.values, 'effects.active': ['sensor_dead_band'],
                     **{f'effects.sensor_dead_band.{d}.width': 0.5 for d in DRIVES}})
-time = np.arange(5000) * 0.002
+time = np.arange(1600) * 0.005
 forces = true.drive_forces(Excitation().motion(time).with_time(time))
 effort = true.measured(forces).total
 effort = effort + 0.05 * np.random.default_rng(0).normal(size=effort.shape)

@@ -54,7 +54,7 @@ def parameters(file: Path, **more: Any) -> dict[str, Any]:
     """Return the file's parameters as a bench takes them."""
     values = read_parameters(file)
     return {**{name.replace('.', '__'): value for name, value in values.items()},
-            'arm__urdf': str(file.parent / values['arm.urdf']), **more}
+            'robot__urdf': str(file.parent / values['robot.urdf']), **more}
 
 
 def motion(points: int = 3, seed: int = 0) -> JointMotion:
@@ -170,8 +170,8 @@ def test_parameters_change_between_messages_and_what_is_no_arm_is_refused(
     np.testing.assert_allclose(node.answer(message_of(moved)),
                                loaded.drive_forces(moved).total[0], rtol=0, atol=EQUAL)
     for name, value, said in (('friction.viscous', [1.0, 2.0], 'friction.viscous'),
-                              ('arm.urdf', '/nowhere.urdf', '/nowhere.urdf'),
-                              ('arm.joints', ['swing', 'turn', 'reach'], 'when the node started'),
+                              ('robot.urdf', '/nowhere.urdf', '/nowhere.urdf'),
+                              ('robot.drives', ['swing', 'turn', 'reach'], 'when the node started'),
                               ('geometry.rod_length', 0.3, 'geometry.rod_length')):
         result, = node.node.set_parameters([Parameter(name, value=value)])
         assert not result.successful
@@ -216,7 +216,7 @@ def test_currents_have_a_topic_of_their_own_and_efforts_stay_efforts(
     gain, moved = np.array([10.0, 5.0, 40.0]), motion(2, 4)
     effort = model.drive_forces(moved).total
     with feedforward_bench(JointTrajectory, **parameters(
-            file, arm__gain=gain.tolist(), arm__effort_unit='A', command_timeout=TIMEOUT,
+            file, robot__gain=gain.tolist(), robot__effort_unit='A', command_timeout=TIMEOUT,
             timeout_action='zero')) as node:
         currents = node.bench.listen(Float64MultiArray, '/feedforward/current', 1000)
         assert node.bench.connected()
@@ -285,9 +285,9 @@ def test_the_executable_takes_an_arms_file_and_finds_the_urdf_beside_it(
 
 
 @pytest.mark.parametrize(('parameter', 'said'), [
-    ('arm.tool:=flansch', "arm.tool is 'flansch', must be a link of the URDF"),
+    ('robot.tool:=flansch', "robot.tool is 'flansch', must be a link of the URDF"),
     ('effort_limits:=[1.0,2.0]', 'effort_limits is [1.0, 2.0], must be empty, or be a list of 3'),
-    ('arm.urdf:=missing.urdf', 'missing.urdf'),
+    ('robot.urdf:=missing.urdf', 'missing.urdf'),
 ])
 def test_a_mistake_is_one_sentence_and_status_2(
     ros_domain: int, file: Path, parameter: str, said: str,
@@ -304,7 +304,7 @@ def test_the_monitor_tells_what_the_model_of_an_arm_lacks(
     running: Bench, file: Path, model: MechanismModel,
 ) -> None:
     gain = np.array([10.0, 5.0, 40.0])
-    values = parameters(file, arm__gain=gain.tolist(), arm__effort_unit='A', error_span=1.0)
+    values = parameters(file, robot__gain=gain.tolist(), robot__effort_unit='A', error_span=1.0)
     node = running.add(MonitorNode, parameter_overrides=overrides(**values))
     residual = running.listen(JointState, '/monitor/residual', 1000)
     error = running.listen(Float64MultiArray, '/monitor/error', 1000)

@@ -47,10 +47,10 @@ class Cell:
         return said
 
 
-def state(position: Any, joints: tuple[str, ...], efforts: bool) -> Any:
+def state(position: Any, joints: tuple[str, ...], efforts: bool, velocity: Any = ()) -> Any:
     return SimpleNamespace(
         joint_names=list(joints),
-        reference=SimpleNamespace(positions=list(position)),
+        reference=SimpleNamespace(positions=list(position), velocities=list(velocity)),
         output=SimpleNamespace(effort=[0.0] * len(joints) if efforts else []))
 
 
@@ -101,16 +101,32 @@ def test_a_stream_that_stands_says_nothing_of_the_controller() -> None:
     assert set(cell.run(4.0, lambda t: [0.2, 0.1])) == {''}
 
 
-def test_the_reference_is_told_when_a_controller_appears_and_only_then() -> None:
+@pytest.mark.parametrize('step', [0.02, 1.1])
+def test_a_controller_appears_once_however_seldom_its_states_come(step: float) -> None:
     cell = Cell()
-    found = []
-    for k in range(300):
+    appeared = []
+    for k in range(30):
+        cell.now += step * (10 if k == 20 else 1) + (1.0 if k == 20 else 0.0)
+        appeared.append(cell.watch.heard(state([0.3, 0.4], JOINTS, True)))
+    assert appeared[0]
+    assert appeared[20]
+    # Of a state every second the first step is not known yet.
+    assert sum(appeared) <= 3
+
+
+def test_a_reference_is_at_rest_where_two_states_agree_and_have_no_velocity() -> None:
+    cell = Cell()
+
+    def heard(*position: float, velocity: float) -> Any:
         cell.now += 0.02
-        if not 100 <= k < 200:  # silent for two seconds in between
-            found.append(cell.watch.heard(state([0.3, 0.4], JOINTS, True)))
-    told = [k for k, each in enumerate(found) if each is not None]
-    assert told == [0, 100]
-    assert found[0].tolist() == [0.3, 0.4]
+        cell.watch.heard(state(position, JOINTS, True, [velocity, 0.0]))
+        return cell.watch.at_rest
+
+    assert heard(0.3, 0.4, velocity=0.0) is None  # one state alone
+    assert heard(0.3, 0.4, velocity=0.0).tolist() == [0.3, 0.4]
+    assert heard(0.3, 0.4, velocity=0.1) is None
+    assert heard(0.31, 0.4, velocity=0.0) is None
+    assert heard(0.31, 0.4, velocity=0.0) is not None
 
 
 @pytest.mark.parametrize(('scale', 'is_told'), [(1.1, False), (1.6, True)])

@@ -251,7 +251,7 @@ class TestTrajectoryProxy:
 
     @pytest.mark.nodes
     @pytest.mark.parametrize('ending', ['abort', 'succeed'])
-    def test_after_activation_and_an_aborted_goal_the_pose_is_held_with_gravity(
+    def test_after_an_aborted_goal_the_pose_is_held_with_gravity(
         self, action: Any, ending: str,
     ) -> None:
         pose = HelicalPath().motion([1.0]).held()
@@ -260,10 +260,10 @@ class TestTrajectoryProxy:
             held = bench.listen(JointTrajectory, '/arm/joint_trajectory')
             states = JointStates(bench, expected.mechanism.position[0])
             assert bench.connected()
-            assert bench.spin_until(lambda: held)
+            assert held == []  # it has commanded nothing
             answered(bench, client, resting_goal(action))
             bench.spin_for(0.5)
-            assert len(held) == (2 if ending == 'abort' else 1)
+            assert len(held) == (1 if ending == 'abort' else 0)
             for message in held:
                 given, = message.points
                 np.testing.assert_allclose(given.effort, expected.total[0], atol=1e-6)
@@ -278,7 +278,7 @@ class TestFeedforwardOfAController:
     """Where control_msgs is installed."""
 
     @pytest.mark.nodes
-    def test_a_controller_that_drops_all_is_told_and_one_that_starts_is_held(self) -> None:
+    def test_a_controller_that_drops_all_is_told(self) -> None:
         pytest.importorskip('control_msgs.msg', reason='control_msgs comes with a ROS 2 '
                             'installation only')
         from feedforward_bench import feedforward_bench, message_of
@@ -288,9 +288,6 @@ class TestFeedforwardOfAController:
         # Its joint_trajectory is feedforward's own, where the bench listens.
         with feedforward_bench() as node:
             states = JointStates(node.bench, here.mechanism.position[0], '/feedforward')
-            assert node.bench.spin_until(lambda: node.joint_trajectory)
-            given, = node.joint_trajectory[-1].points
-            np.testing.assert_allclose(given.effort, here.total[0], atol=1e-6)
             for k in range(400):
                 node.publisher.publish(message_of(path.motion(
                     [0.5 + 0.01 * k, 0.51 + 0.01 * k])))
@@ -311,6 +308,7 @@ class JointStates:
 
         message = JointTrajectoryControllerState(joint_names=list(DRIVES))
         message.reference.positions = list(position)
+        message.reference.velocities = [0.0] * len(DRIVES)
         message.output.effort = [0.0] * len(DRIVES)
         publisher = bench.probe.create_publisher(
             type(message), f'{controller}/controller_state', 10)

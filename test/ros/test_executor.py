@@ -8,7 +8,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import nullcontext
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,7 +18,6 @@ from rclpy.context import Context
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from pprs_dynamics.ros.node import executor as executors
 from pprs_dynamics.ros.node import rclpy_internals
 from pprs_dynamics.ros.node.executor import PromptExecutor, StoppableExecutor
 
@@ -28,46 +26,13 @@ pytestmark = pytest.mark.nodes
 PATIENCE = 10.0  # [s]
 
 
-class Raising:
-    """A subscription whose call has the old name and raises rclpy's own error."""
-
-    raw, msg_type = True, None
-
-    @property
-    def handle(self) -> Any:
-        return self
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, *error: object) -> None:
-        return None
-
-    def take_message(self, kind: Any, raw: bool) -> None:
-        raise rclpy_internals.rclpy_implementation.RCLError('taken in another way')
-
-
-@pytest.fixture(params=['as known', 'names missing', 'WaitSet changed', 'Subscription changed',
-                        'Timer changed', 'take raises', 'wait raises', 'timers never due'])
+@pytest.fixture(params=['known', 'names missing', 'wait raises'])
 def spun(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch,
 ) -> Iterator[tuple[Node, PromptExecutor]]:
-    """A node and its executor, with the rclpy that is known and with ones that are not."""
+    """A node and its executor, with the known rclpy and with two releases that differ."""
     if request.param == 'names missing':
         monkeypatch.setitem(rclpy_internals.NAMES, 'WaitSet', ('renamed',))
-    elif request.param == 'WaitSet changed':
-        known = rclpy_internals.rclpy_implementation
-        monkeypatch.setattr(rclpy_internals, 'rclpy_implementation', SimpleNamespace(
-            **{**vars(known), 'WaitSet': type('WaitSet', (known.WaitSet,), {
-                'wait': lambda self, timeout, more: None})}))
-    elif request.param == 'Subscription changed':
-        monkeypatch.setattr(executors, 'take', lambda _: rclpy_internals.take(
-            SimpleNamespace(handle=nullcontext())))
-    elif request.param == 'Timer changed':
-        monkeypatch.setattr(executors, 'call_if_due', lambda _: rclpy_internals.call_if_due(
-            SimpleNamespace(handle=nullcontext())))
-    elif request.param == 'take raises':
-        monkeypatch.setattr(executors, 'take', lambda _: rclpy_internals.take(Raising()))
     elif request.param == 'wait raises':
         known = rclpy_internals.rclpy_implementation
 
@@ -75,9 +40,6 @@ def spun(
             raise known.RCLError('wait set is of another release')
         monkeypatch.setattr(rclpy_internals, 'rclpy_implementation', SimpleNamespace(
             **{**vars(known), 'WaitSet': type('WaitSet', (known.WaitSet,), {'wait': fail})}))
-    elif request.param == 'timers never due':
-        monkeypatch.setattr(rclpy_internals, 'call_if_due', lambda _: False)
-        monkeypatch.setattr(executors, 'call_if_due', lambda _: False)
     context = Context()
     rclpy.init(context=context)
     node, executor = Node('spun', context=context), PromptExecutor(context=context)

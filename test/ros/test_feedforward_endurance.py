@@ -22,6 +22,7 @@ def test_no_storm_of_parameters_brings_a_model_into_force_that_is_none(ros_domai
     assert parameter_storm.passed(found), found
 
 
+@pytest.mark.slow
 def test_a_steady_stream_is_answered_message_by_message(ros_domain: int) -> None:
     found = soak.run(0.1, rate=200.0, domain=ros_domain)
     # A busy machine may hold up node and client, and the stream with them.

@@ -5,6 +5,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from controller_rules import WAY, ControllerSettings, objection
@@ -407,19 +410,43 @@ def test_a_second_node_of_its_name_is_told() -> None:
         assert node.bench.spin_until(lambda: node.bench.status[-1]['code'] != 'CONFLICT', 25)
 
 
-def test_a_controller_of_trajectories_is_brought_to_rest_where_its_trajectory_ends() -> None:
-    long = message_of(MOTION)
-    long.points[-1].time_from_start.sec = 2
+def controller_state(position: np.ndarray, velocity: np.ndarray) -> Any:
+    """Return what joint_trajectory_controller publishes; control_msgs has no wheel."""
+    return SimpleNamespace(
+        joint_names=list(DRIVES), output=SimpleNamespace(effort=[0.0] * 6),
+        reference=SimpleNamespace(positions=position.tolist(), velocities=velocity.tolist()))
+
+
+def test_a_node_that_has_commanded_nothing_stops_no_controller() -> None:
+    position, velocity, _ = FORCES.drive_motion
+    still = np.zeros(6)
     with feedforward_bench() as node:
-        node.answer(long)
-        node.node.trigger_deactivate()
+        for speed in (velocity[0], still):
+            for _ in range(3):
+                node.node._on_controller(controller_state(position[0], speed))
+                node.bench.spin_for(0.05)
+        assert not node.joint_trajectory
+        assert not node.commands
+
+
+@pytest.mark.parametrize('moves', [True, False], ids=['moves', 'stands'])
+def test_a_controller_that_comes_back_is_held_only_where_it_stands(moves: bool) -> None:
+    position, velocity, _ = FORCES.drive_motion
+    with feedforward_bench(command_timeout=TIMEOUT) as node:
+        node.node._on_controller(controller_state(position[0], velocity[0]))
+        node.answer(message_of(MOTION))
+        node.wait_for_status(code='STALE')
         assert node.bench.spin_until(lambda: len(node.joint_trajectory) == 2)
-        point, = node.joint_trajectory[-1].points
-        left = point.time_from_start.sec + point.time_from_start.nanosec / 1e9
-        # Not a jump to a pose that is two seconds away.
-        assert 0.5 < left < 2.1
-        np.testing.assert_allclose(point.positions, FORCES.mechanism.position[-1], atol=EQUAL)
-        assert not any(point.velocities)
+        node.bench.spin_for(1.2)
+        for k in (0, 1) if moves else (0, 0, 0):
+            node.node._on_controller(controller_state(
+                position[k], velocity[0] if moves else np.zeros(6)))
+        node.bench.spin_for(0.3)
+        assert len(node.joint_trajectory) == (2 if moves else 3)
+        if not moves:
+            point, = node.joint_trajectory[-1].points
+            np.testing.assert_allclose(point.positions, position[0], atol=1e-8)
+            assert not any(point.velocities)
 
 
 def test_a_stream_ends_at_rest_by_itself_where_that_is_asked_for() -> None:

@@ -186,3 +186,16 @@ def test_drives_are_held_where_they_are_with_their_gravity(moment: float) -> Non
     found = Feedforward(MODEL, OWN).hold_at(pose.mechanism.position[0])
     np.testing.assert_allclose(found.effort[0], pose.total[0], atol=1e-8)
     np.testing.assert_allclose(found.forces.mechanism.position, pose.mechanism.position, atol=1e-9)
+
+
+def test_a_clock_that_is_set_back_multiplies_no_effect() -> None:
+    """Friction that fades with time would grow without bound before its start."""
+    node = Feedforward(REMEMBERS, OWN)
+    for start in (5_000, 5_600, 4_400, 10):
+        at = start * 1_000_000_000
+        found = [node.answer(TrajectoryRequest(request(1.0 + 0.01 * k).motion, at + k * STEP,
+                                               np.array([0]))).effort[0] for k in range(3)]
+        if start < 5_000:
+            fresh = Feedforward(REMEMBERS, OWN).answer(TrajectoryRequest(
+                request(1.0).motion, at, np.array([0])))
+            np.testing.assert_allclose(found[0], fresh.effort[0], atol=1e-9)

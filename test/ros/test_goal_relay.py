@@ -135,7 +135,9 @@ def test_a_goal_is_cancelled_at_the_controller(relayed: Relayed) -> None:
     assert 2 < sequence[0] < 1000
 
 
-@pytest.mark.parametrize('how', [signal.SIGKILL, signal.SIGSTOP, signal.SIGINT])
+@pytest.mark.parametrize('how', [
+    signal.SIGSTOP, pytest.param(signal.SIGKILL, marks=pytest.mark.slow),
+    pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
 def test_a_controller_that_goes_in_the_middle_ends_the_goal(
     relayed: Relayed, how: signal.Signals,
 ) -> None:

@@ -26,6 +26,7 @@ OFFSET, NOISE = 1.0, 0.05  # [N]
 PATIENCE = 180.0  # [s] for a diagnosis on a busy machine
 
 
+@pytest.mark.slow
 def test_a_change_is_told_within_two_windows() -> None:
     model = DriveModel.load()
     motion = Excitation(5 * SPAN, seed=4).motion(np.arange(0, 5 * SPAN, 1 / RATE))

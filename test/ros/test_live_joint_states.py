@@ -85,7 +85,7 @@ def test_joint_states_are_heard_whatever_their_publisher_offers(
             MODEL, 'joint_states', 'monitor', 'feedforward', **options))
         publisher = early or publish()
         assert running.spin_until(publisher.get_subscription_count)
-        assert running.spin_until(lambda: publisher.publish(message) or node._counters['received'])
+        assert running.spin_until(lambda: publisher.publish(message) or node.to_dict()['received'])
 
 
 HEAVIER = build_model({
@@ -269,7 +269,7 @@ def test_what_is_drawn_stays_bounded_where_a_bag_is_played_in_a_loop(
     forces = MODEL.drive_forces(motion)
     for _ in range(2):
         for row in range(len(motion)):
-            node._on_state(bytes(serialize_message(conversions.joint_state(
+            node.stream._on_state(bytes(serialize_message(conversions.joint_state(
                 row * STEP, forces.total[row], forces.mechanism.position[row],
                 forces.mechanism.velocity[row]))))
             if row % 50 == 0:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,12 +15,16 @@ from lifecycle_msgs.msg import Transition
 from monitor_bench import RATE, START, MonitorBench
 from node_bench import bench
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
+from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from supervisor import Supervisor
 
+from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.node.qos import LATCHED
 
@@ -222,3 +227,48 @@ def test_a_supervisor_leads_it_through_its_states() -> None:
                 lambda: not monitor.publisher.get_subscription_count())
         assert supervisor.change(Transition.TRANSITION_UNCONFIGURED_SHUTDOWN)
         assert running.spin_until(lambda: running.status[-1]['code'] == 'FINALIZED')
+
+
+@pytest.mark.parametrize(('reliability', 'stamped', 'code'), [
+    (ReliabilityPolicy.BEST_EFFORT, True, 'OK'), (ReliabilityPolicy.RELIABLE, True, 'OK'),
+    (ReliabilityPolicy.RELIABLE, False, 'TIME')], ids=['best effort', 'reliable', 'stamp of 0'])
+def test_a_process_compares_or_warns_with_the_reason(
+    ros_domain: int, tmp_path: Path, reliability: ReliabilityPolicy, stamped: bool, code: str,
+) -> None:
+    motion = Excitation(20.0, seed=3).motion(np.arange(0, 20.0, 0.02))
+    forces = DriveModel.load().drive_forces(motion)
+    with bench() as running:
+        running.follow_status('/monitor/status')
+        publisher = running.probe.create_publisher(
+            JointState, '/joint_states', QoSProfile(depth=10, reliability=reliability))
+        command = [executable('monitor'), '--ros-args', '-p', 'demo:=true']
+        with node_process(command, ros_domain, tmp_path / 'log') as process:
+            assert running.spin_until(publisher.get_subscription_count, 20)
+            for row in range(len(motion)):
+                publisher.publish(conversions.joint_state(
+                    START + row * 20_000_000 if stamped else 0, forces.total[row],
+                    forces.mechanism.position[row], forces.mechanism.velocity[row]))
+                running.spin_for(0.02)
+                if row > 50 and running.status[-1]['code'] == code:
+                    break
+            status = running.status[-1]
+            assert process.poll() is None
+        assert status['code'] == code
+        assert status['level'] == ('OK' if stamped else 'WARN')
+        if stamped:
+            assert status['counters']['compared'] > 0
+        else:
+            assert 'header.stamp of /joint_states stays at 0 s' in status['message']
+
+
+def test_a_monitor_that_hears_nothing_or_no_efforts_warns(monitor: MonitorBench) -> None:
+    assert monitor.bench.spin_until(lambda: monitor.bench.status[-1]['level'] == 'WARN', 5.0)
+    assert 'no joint states on /joint_states' in monitor.bench.status[-1]['message']
+    assert 'publishers: /probe' in monitor.bench.status[-1]['message']
+    monitor.send(300)
+    assert monitor.bench.status[-1]['code'] == 'OK'
+    monitor.effort[:] = np.nan
+    for _ in range(24):
+        monitor.send(100)
+    assert monitor.bench.status[-1]['level'] == 'WARN'
+    assert 'efforts are not measured' in monitor.bench.status[-1]['message']

@@ -10,7 +10,6 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -35,8 +34,6 @@ ONE = random_motion(np.random.default_rng(11), 1)
 # What an rclpy of another release may lack, and a node that must do without it.
 WITHOUT = {
     'nothing': '',
-    'wait sets': "internals.NAMES['WaitSet'] = ('renamed',)",
-    'timers': "internals.NAMES['Timer'] = ('renamed',)",
     'the implementation': 'internals.rclpy_implementation = None',
     'overrides': "internals.OVERRIDES = '_renamed'",
 }
@@ -100,7 +97,7 @@ def test_the_node_answers_takes_parameters_and_has_its_last_word(
 
 
 @pytest.mark.nodes
-@pytest.mark.parametrize('node', ['feedforward', 'monitor', 'simulated_robot', 'play_trajectory'])
+@pytest.mark.parametrize('node', ['feedforward', 'play_trajectory'])
 def test_without_overrides_a_name_that_is_none_is_still_refused(
     ros_domain: int, tmp_path: Path, node: str,
 ) -> None:
@@ -139,19 +136,6 @@ def test_names_given_are_those_of_files_and_command_line(tmp_path: Path) -> None
     assert names_given(['feedforward', '--ros-args', '--params-file', str(file), '-p', 'seed:=3',
                         '--param', 'monitor:window:=0.1', '-r', '__node:=one']) == [
         'masses.payload', 'rate', 'gravity', 'seed', 'window']
-
-
-@pytest.mark.parametrize('absent', [
-    *rclpy_internals.NAMES, *(f'{kind}.{name}' for kind, names in rclpy_internals.NAMES.items()
-                              for name in names)])
-def test_each_name_is_missed_where_it_is_absent(
-    monkeypatch: pytest.MonkeyPatch, absent: str,
-) -> None:
-    assert rclpy_internals.missing() == []
-    monkeypatch.setattr(rclpy_internals, 'rclpy_implementation', SimpleNamespace(**{
-        kind: SimpleNamespace(**{name: None for name in names if f'{kind}.{name}' != absent})
-        for kind, names in rclpy_internals.NAMES.items() if kind != absent}))
-    assert rclpy_internals.missing() == [absent]
 
 
 def private_names(file: Path) -> list[str]:

@@ -18,6 +18,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
 from ros_processes import executable, node_process
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
@@ -268,6 +269,7 @@ def tracking(ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> dict[
             for case in cases}
 
 
+@pytest.mark.slow
 def test_each_step_of_feedforward_lowers_the_tracking_error(
     tracking: dict[str, Tracking],
 ) -> None:
@@ -278,6 +280,26 @@ def test_each_step_of_feedforward_lowers_the_tracking_error(
     assert 1e-4 < rigid < 1e-3
 
 
+@pytest.mark.slow
 def test_a_hidden_effect_costs_what_feedforward_gained(tracking: dict[str, Tracking]) -> None:
     friction = tracking[CASES[2].name].position_rms
     assert tracking['hidden'].position_rms > 1.5 * friction
+
+
+def test_a_clock_that_is_set_back_does_not_stop_the_robot() -> None:
+    with bench() as running:
+        clock = running.probe.create_publisher(Clock, '/clock', 10)
+        robot = RobotBench(running, use_sim_time=True)
+        assert running.spin_until(clock.get_subscription_count)
+
+        def run(first: float, last: float) -> list[int]:
+            before = len(robot.states)
+            for moment in np.arange(first, last, 0.02):
+                clock.publish(Clock(clock=conversions.time(round(moment * 1e9))))
+                running.spin_for(0.01)
+            return [conversions.nanoseconds(each.header.stamp) for each in robot.states[before:]]
+
+        run(500.0, 501.0)
+        stamps = run(3.0, 5.0)
+        assert len(stamps) > 200
+        assert max(stamps[-100:]) < 5.1e9

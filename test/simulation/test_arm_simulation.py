@@ -34,7 +34,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> MechanismModel:
         **described.values, 'links.mass': tuple(mass[:, 0]),
         'links.moment': tuple(mass[:, 1:4].ravel()),
         'links.inertia': tuple(mass[:, 4:][:, [0, 2, 5, 1, 3, 4]].ravel()),
-        'arm.armature': (0.4, 0.2, 1.0)}, described.source)
+        'robot.armature': (0.4, 0.2, 1.0)}, described.source)
     assert isinstance(found, MechanismModel)
     return found
 
@@ -44,7 +44,7 @@ def test_the_engine_moves_the_bodies_of_the_model(model: MechanismModel) -> None
     engine = ArmEngine(model)
     assert engine.torques(motion) == pytest.approx(
         model.drive_forces(motion).parts['rigid_body']
-        - np.array(model.values['arm.armature']) * motion.acceleration, abs=1e-8)
+        - np.array(model.values['robot.armature']) * motion.acceleration, abs=1e-8)
 
 
 def test_the_engine_moves_an_arm_whose_last_joint_stands(tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_a_wrench_at_the_tool_is_that_of_the_engine(model: MechanismModel, of: s
     before = engine.torques(motion)
     engine.wrench = np.array([30.0, -20.0, 500.0, 1.0, 2.0, -3.0])
     state = robot.mechanism(motion)
-    loaded = state.loaded(robot.robot, StructureLoad(np.tile(engine.wrench, (len(motion), 1))))
+    loaded = state.with_load(robot.robot, StructureLoad(np.tile(engine.wrench, (len(motion), 1))))
     assert engine.torques(motion) - before == pytest.approx(
         loaded.rigid_force - state.rigid_force, abs=1e-8)
 
@@ -170,8 +170,8 @@ def test_the_command_writes_recording_and_truth(tmp_path: Path,
     assert main(['simulate', '--model', path, '--output', output, '--effect', 'payload_mass',
                  '--duration', '5', '--json', str(truth)]) == 0
     assert json.loads(truth.read_text())['effects'][0]['parameters']['mass'] > 0
-    assert main(['simulate', '--model', path, '--output', output, '--overwrite', '--effect',
-                 'rod_mass']) == 2
+    assert main(['simulate', '--model', path, '--output', output + '2.csv', '--effect',
+                 'tool_drag']) == 2
     assert 'no hidden effect of such a robot' in capsys.readouterr().err
 
 

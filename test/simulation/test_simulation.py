@@ -796,8 +796,8 @@ def test_stops_end_the_strokes() -> None:
 # What a true motion, or a load, is handed over in, and names; an arm's come from its model, and so
 # do the numbers that MuJoCo takes.
 CONTAINERS = (
-    'pprs_dynamics.drives', 'pprs_dynamics.physics.effects.former_names',
-    'pprs_dynamics.physics.mechanism.motion', 'pprs_dynamics.physics.mechanism.joint_motion',
+    'pprs_dynamics.drives', 'pprs_dynamics.physics.mechanism.motion',
+    'pprs_dynamics.physics.mechanism.joint_motion',
     'pprs_dynamics.physics.mechanism.structure_load',
     'pprs_dynamics.physics.mechanism.joint_series', 'pprs_dynamics.physics.model.mechanism_model',
     'pprs_dynamics.physics.model.limits')
@@ -805,8 +805,9 @@ CONTAINERS = (
 # numbers, friction's among them. Kinematics, loops, reactions and friction are the engine's, or
 # forms of their own; `test_engine_loops.py` holds them against the model.
 DESCRIPTION = tuple(f'pprs_dynamics.physics.mechanism.{name}' for name in (
-    'description', 'urdf', 'structure', 'mechanism', 'tree_equations', 'passive_joints'))
-OF_ARMS = {**dict.fromkeys(('engine_state.py', 'engine_loops.py', 'arm_engine.py'), DESCRIPTION),
+    'description', 'urdf', 'mjcf', 'structure', 'mechanism', 'tree_equations', 'passive_joints'))
+OF_ARMS = {**dict.fromkeys(('engine_state.py', 'engine_loops.py'), DESCRIPTION),
+           'arm_engine.py': (*DESCRIPTION, 'pprs_dynamics.physics.model.robot_block'),
            **dict.fromkeys(('arm_run.py', 'mechanism_plant.py'), (
                *DESCRIPTION, 'pprs_dynamics.physics.effects.laws.joint_friction'))}
 # Of the equations, which are compiled functions over tables, names and kinds of rows alone.

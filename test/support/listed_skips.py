@@ -1,7 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""`--listed-skips`: a test that is skipped without an entry of test/skips.toml fails the run."""
+"""`--listed-skips`: a test that is skipped without an entry of test/skips.toml fails the run.
+
+The hooks of pytest for this option and for `--file-budget`.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import file_budget
 import pytest
 
 LIST = Path(__file__).parents[1] / 'skips.toml'
@@ -17,19 +21,21 @@ HEADING = 'skipped, and not in test/skips.toml'
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option."""
+    """Add the options."""
+    file_budget.add_option(parser)
     parser.addoption('--listed-skips', action='store_true',
                      help='fail where a test is skipped without an entry of test/skips.toml')
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """Fail a run that passed but for such skips; workers leave it to who started them."""
-    if unlisted(_skips(session.config)):
+    if unlisted(_skips(session.config)) or file_budget.over_budget(session.config):
         session.exitstatus = session.exitstatus or pytest.ExitCode.TESTS_FAILED
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """Say which they are."""
+    """Print which they are, and the dearest files."""
+    file_budget.report(terminalreporter, config)
     if left := unlisted(_skips(config)):
         terminalreporter.section(HEADING, red=True)
         for place, reason in left:

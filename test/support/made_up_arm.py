@@ -53,9 +53,11 @@ def write_arm(folder: Path, text: str = '', joints: tuple[str, ...] = JOINTS,
     (folder / 'made_up.urdf').write_text(text or urdf())
     blocks = ''.join(f'    {key.replace("__", ".")}: {value}\n' for key, value in values.items())
     path = folder / 'arm.yaml'
-    path.write_text('/**:\n  ros__parameters:\n    arm:\n      urdf: made_up.urdf\n'
+    locked = ', '.join(f'{name}: 0.0' for name in JOINTS if name not in joints)
+    path.write_text('/**:\n  ros__parameters:\n    robot:\n      urdf: made_up.urdf\n'
                     '      base: stand\n      tool: flange\n'
-                    f'      joints: [{", ".join(joints)}]\n{blocks}')
+                    f'      drives: [{", ".join(joints)}]\n'
+                    + (f'      locked: {{{locked}}}\n' if locked else '') + blocks)
     return path
 
 

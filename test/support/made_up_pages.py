@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,8 @@ from made_up_diagnosis import (
     ranked_sets,
 )
 
-from pprs_dynamics import DriveModel, __version__
-from pprs_dynamics.app.fleet.store import Store, key_of
+from pprs_dynamics import DriveModel
+from pprs_dynamics.app.fleet.store import write_rows
 from pprs_dynamics.app.fleet.trend import fleet_trends
 from pprs_dynamics.app.report.adoption_report import adoption_page
 from pprs_dynamics.app.report.comparison_report import comparison_page
@@ -45,7 +46,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.ledger import Step
 
-DAY = 86400 * 10 ** 6  # [us]
+DAY = 86400  # [s]
 
 
 def made_up_pages(folder: Path) -> dict[str, Page]:
@@ -95,19 +96,17 @@ def _experiment() -> Page:
         (Accuracy('masses.payload', 'kg', 0.02, 0.01, 0.002),), 120.0, (),
         {f'velocity of {name}': 0.1 * k + 0.3 for k, name in enumerate(DRIVES)}, 4.0, path.motion,
         lambda time: model.drive_forces(path.motion(time)), model)
-    return experiment_page(experiment, path.motion(np.arange(0.0, 4.0, 0.01)),
-                           'ros2 run pprs_dynamics play_trajectory')
+    return experiment_page(experiment, path.motion(np.arange(0.0, 4.0, 0.01)))
 
 
 def _fleet(folder: Path) -> Page:
-    store, rng = Store(str(folder)), np.random.default_rng(7)
+    rng = np.random.default_rng(7)
     for robot in ('a robot with a long name', 'b'):
         for day in range(30):
-            row = {'recording': f'{day}.csv', 'path': f'/{robot}/{day}.csv',
-                   'sha256': f'{robot} {day}', 'time': (20_000 + day) * DAY, 'model': 'm',
-                   'options': 'auto', 'version': __version__, 'drive': 'slide_2',
-                   'effect': 'coulomb_friction', 'parameter': 'force',
-                   'value': 0.05 * max(day - 10, 0) * (robot == 'b') + 0.05 * rng.normal(),
-                   'std': 0.1, 'unit': 'N', 'conditions': [('temperature', 20.0)]}
-            store.write(robot, key_of(f'{robot} {day}', 'm', 'auto', __version__), [row])
-    return fleet_page(fleet_trends(store), 'temperature')
+            write_rows(folder, f'{robot} {day}', [{
+                'recording': f'{day}.csv', 'path': f'/{robot}/{day}.csv', 'robot': robot,
+                'sha256': f'{robot} {day}', 'model': 'm', 'options': 'auto', 'version': '1',
+                'time': datetime.fromtimestamp((20_000 + day) * DAY, UTC), 'drive': 'slide_2',
+                'effect': 'coulomb_friction', 'parameter': 'force', 'std': 0.1, 'unit': 'N',
+                'value': (day > 10) * (robot == 'b') + 0.05 * rng.normal()}])
+    return fleet_page(fleet_trends(str(folder)))

@@ -26,7 +26,7 @@ def planar_arm(folder: Path, joints: int) -> ForceModel:
     listed = ', '.join(f'j{k}' for k in range(1, joints + 1))
     (folder / 'arm.yaml').write_text(f'''/**:
   ros__parameters:
-    arm: {{urdf: arm.urdf, base: base, tool: {names[-1]}, joints: [{listed}]}}
+    robot: {{urdf: arm.urdf, base: base, tool: {names[-1]}, drives: [{listed}]}}
     friction:
       viscous: [{", ".join(["0.1"] * joints)}]
       coulomb: [{", ".join(["0.3"] * joints)}]

@@ -22,7 +22,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.noise import NoiseShapes
 from pprs_dynamics.inference.search import fitted_sets, ranking, relinearisation, search
-from pprs_dynamics.inference.search.candidates import DURING, SINCE, Component, Course, PriorCosts
+from pprs_dynamics.inference.search.candidates import DURING, SINCE, Course, PriorCosts
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -83,11 +83,7 @@ class BayesianInformation(PriorCosts):
         """Return 0: patterns are effects like others."""
         return CostTerms()
 
-    def of_right_signs(self, component: Component) -> float:
-        """Return 0."""
-        return 0.0
-
-    def of_wrong_signs(self, component: Component, values: Any) -> float:
+    def of_sign(self, deviations: float) -> float:
         """Return 0."""
         return 0.0
 

@@ -21,7 +21,7 @@ from pprs_dynamics.inference.adoption.loop import REFUSED, AdoptionRun
 from pprs_dynamics.inference.adoption.loop import adopt_all as adopt_effects
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.inference.fit.base_fit import Refit, refit_base, require_open_numbers
-from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
+from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.model_writer import write_model

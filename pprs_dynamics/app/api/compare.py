@@ -21,11 +21,9 @@ from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.readings.findings import effort_looks_like, no_measurements
 from pprs_dynamics.inference.residuals.comparison_bag import write_comparison
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.paired_errors import rms, rms_by_drive
-from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.inference.search.noise_floors import measure_columns, noise_floors
-from pprs_dynamics.measurement.files.recording import read_recording
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
@@ -49,7 +47,7 @@ class ComparisonResult(Result):
     notes : tuple of str
         How it was computed.
     beside : Beside, optional
-        Another model on the same recordings, or this one on another recording.
+        Errors of another model on the same recordings.
     """
 
     inputs: Inputs
@@ -175,8 +173,7 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
     topic : str, optional
         Of sensor_msgs/JointState, where a bag holds several.
     beside : path, optional
-        A model file (.yaml), to be held against the same recordings; or another recording, to be
-        held against the same model: before and after side by side.
+        Another model file, compared with the same recordings.
     progress : callable, optional
         Called with what is being done and the share of it that is done.
     as_it_is : bool
@@ -208,18 +205,14 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
         little_explained(inputs.model, residuals))
     return ComparisonResult(
         inputs, residuals, comparison, tuple(notes),
-        None if beside is None else _beside(inputs, Path(beside), topic))
+        None if beside is None else _beside(inputs, Path(beside)))
 
 
-def _beside(inputs: Inputs, path: Path, topic: str | None) -> Beside:
-    """Return the errors of another model on the recordings, or of the model on another one."""
-    if path.suffix in ('.yaml', '.yml'):
-        other = load_model(path)
-        if other.drives != inputs.model.drives:
-            raise ModelError('--beside', displayed(path), 'have the drives of the model: '
-                             f'{", ".join(inputs.model.drives)}')
-        residuals, _ = measure_residuals(other, inputs.fitted)
-    else:
-        residuals, _ = measure_residuals(inputs.model, [
-            read_recording(path, inputs.model.recorded, topic)])
+def _beside(inputs: Inputs, path: Path) -> Beside:
+    """Return the errors of another model on the same recordings."""
+    other = load_model(path)
+    if other.drives != inputs.model.drives:
+        raise ModelError('--beside', displayed(path), 'have the drives of the model: '
+                         f'{", ".join(inputs.model.drives)}')
+    residuals, _ = measure_residuals(other, inputs.fitted)
     return Beside(displayed(path.name), rms_by_drive(residuals), rms(residuals), residuals.unit)

@@ -24,9 +24,8 @@ from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
-from pprs_dynamics.inference.diagnosis.what_if import what_if
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
+from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.physics.model.force_model import ForceModel
 
 if TYPE_CHECKING:
@@ -80,7 +79,7 @@ class DiagnosisResult(Result):
         after, _ = measure_residuals(self.fitted, self.inputs.fitted)
         return diagnosis_page(
             self.diagnosis, self._words, after, [one.name for one in self.inputs.fitted],
-            [one.name for one in self.inputs.held_out], self._rivals, what_if(self.diagnosis))
+            [one.name for one in self.inputs.held_out], self._rivals)
 
     def table(self) -> DataFrame:
         """Return a row per parameter of each missing effect: its value, std, unit, evidence."""

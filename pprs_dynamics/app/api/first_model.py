@@ -369,7 +369,7 @@ def _names(contents: Contents, joints: Sequence[str]) -> Names:
 
 
 def _by_numbers(contents: Contents, drives: Sequence[str]) -> Names:
-    """Match joints by the numbers in their names, or refuse."""
+    """Match as many joints by the numbers in their names, or refuse."""
     known = sorted({name for of in contents.joints.values() for name in of})
 
     def numbered(names: Sequence[str]) -> dict[int, str]:
@@ -380,7 +380,7 @@ def _by_numbers(contents: Contents, drives: Sequence[str]) -> Names:
     start = min(theirs, default=0) - min(ours, default=0)
     found = {joint: theirs[number + start] for number, joint in ours.items()
              if number + start in theirs}
-    if len(found) < len(drives):
+    if len(found) < len(drives) or len(known) != len(drives):
         close = meant(drives[0], known)
         raise FirstModelError(
             f'joints of the recording ({", ".join(known[:12])}) are none of the description '
@@ -506,19 +506,17 @@ def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, ba
     place = os.path.relpath(robot.resolve(), output.resolve().parent)
     slides = all(description.joints[name].kind == PRISMATIC for name in drives)
     gain = ', '.join(['1.0'] * len(drives))
-    # Of an arm, joints that are not driven stand.
-    block, listed = (('robot', 'drives') if is_mjcf or description.loops else ('arm', 'joints'))
     lines = [
         f'# Model of {robot.name}'
         + (f', read beside {", ".join(recordings[:3])}' if recordings else '')
         + '. Lines with "guessed" or "not known" are to be checked.',
         '/**:',
         '  ros__parameters:',
-        f'    {block}:',
+        '    robot:',
         f'      {"mjcf" if is_mjcf else "urdf"}: {scalar(place)}  # from the folder of this file',
         f'      base: {scalar(base)}  # the link that stands',
         f'      tool: {scalar(branch.tool)}  # the link that carries the load',
-        f'      {listed}: [{", ".join(scalar(name) for name in drives)}]  # driven, in the order '
+        f'      drives: [{", ".join(scalar(name) for name in drives)}]  # driven, in the order '
         'of all results',
         f'      effort_unit: {"N" if slides else "N m"}  # not known from the files; A where '
         'recorded efforts are currents',

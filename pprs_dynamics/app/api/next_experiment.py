@@ -84,13 +84,13 @@ class ExperimentResult(Result):
             return excitation_view(self.design)
         return experiment_view(self.design)
 
-    def page(self, command: str = '') -> Page:
-        """Return the page of `pprs next-experiment --report`, with the command that plays it."""
+    def page(self) -> Page:
+        """Return a page: what the motion would tell, its curves and its use of the limits."""
         from pprs_dynamics.app.report.experiment_report import excitation_page, experiment_page
 
         if isinstance(self.design, ArmExcitation):
             return excitation_page(self.design)
-        return experiment_page(self.design, self.motion, command)
+        return experiment_page(self.design, self.motion)
 
     def table(self) -> DataFrame:
         """Return a row per pair of effects: what a diagnosis would say if the first were true."""

@@ -86,10 +86,10 @@ class SimulationResult(Result):
         return simulation_view(len(self.recording.time), self.rate, len(self.effects), self.notes)
 
     def page(self) -> Page:
-        """Return the page of `pprs simulate --report`: the moving robot."""
-        from pprs_dynamics.app.report.robot_figure import robot_page
+        """Return a page: positions and efforts of every drive over time."""
+        from pprs_dynamics.app.report.tables import recording_page
 
-        return robot_page(self.model, self.motion, 'The simulated motion')
+        return recording_page(self.recording, self.model.units)
 
     def table(self) -> DataFrame:
         """Return a row per drive: range of position, velocity and effort."""

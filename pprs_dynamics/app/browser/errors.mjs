@@ -39,7 +39,7 @@ export const showErrors = (root, state) => {
     const [before, now, noise] = [one.before, one.now, one.noise].map(amount);
     const unit = unitOf(state, name);
     root.children[k].querySelector('.fall').textContent = change(one.before, one.now);
-    figures.replaceChildren(`${before} → `, make('span', now, 'now'), ` → noise ${noise} ${unit}`);
+    figures.replaceChildren(`${before} → `, make('span', now, 'now'), one.noise === null ? ` ${unit}` : ` → noise ${noise} ${unit}`);
     bars(canvas, one, most);
     canvas.setAttribute('role', 'img');
     canvas.setAttribute('aria-label',

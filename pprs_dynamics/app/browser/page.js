@@ -11,39 +11,37 @@
   const menus = [...document.querySelectorAll('select[data-menu]')];
   const drawn = new Set();
   let span = null;
-  const libraries = {};
+  let library = null;
 
-  // A library unpacks itself when it is first asked for.
-  window.library = (name) => {
-    libraries[name] ??= (async () => {
-      const letters = document.getElementById(name).textContent;
-      const packed = await fetch(`data:application/octet-stream;base64,${letters}`);
-      const unpacked = packed.body.pipeThrough(new DecompressionStream('gzip'));
-      const script = document.createElement('script');
-      script.textContent = await new Response(unpacked).text();
-      document.head.append(script);
-    })();
-    return libraries[name];
-  };
+  // The library is unpacked when a figure is first drawn.
+  async function unpack() {
+    const letters = document.getElementById('plotly').textContent;
+    const packed = await fetch(`data:application/octet-stream;base64,${letters}`);
+    const unpacked = packed.body.pipeThrough(new DecompressionStream('gzip'));
+    const script = document.createElement('script');
+    script.textContent = await new Response(unpacked).text();
+    document.head.append(script);
+  }
 
   async function plotly() {
-    await window.library('plotly');
+    library ??= unpack();
+    await library;
     return window.Plotly;
   }
 
   function contentOf(plot) {
-    const content = window.themed(document.getElementById(`${plot.id}-data`).textContent);
+    const content = themed(document.getElementById(`${plot.id}-data`).textContent);
     if (span && plot.dataset.time !== undefined) content.layout.xaxis.range = span;
     show(content.data);
     return content;
   }
 
   // What Plotly draws of a figure in JSON, in the colours of the page.
-  window.themed = (text) => {
+  function themed(text) {
     if (dark.matches) {
       for (const [from, to] of Object.entries(ON_BLACK)) text = text.replaceAll(from, to);
     }
-    const {data, layout, frames} = JSON.parse(text);
+    const {data, layout} = JSON.parse(text);
     const ink = dark.matches ? '#ececec' : '#1a1a1a';
     const grid = dark.matches ? '#3d4248' : '#e2e2e2';
     const paper = dark.matches ? '#16181b' : '#ffffff';
@@ -56,18 +54,8 @@
     Object.assign(layout, {paper_bgcolor: paper, plot_bgcolor: paper});
     layout.font = {size: 13, color: ink, family: 'system-ui, sans-serif', ...layout.font};
     layout.hoverlabel = {font: {size: 13}, ...layout.hoverlabel};
-    // The button that is active is nearly white in Plotly, whatever the page is.
-    for (const menu of layout.updatemenus ?? []) {
-      Object.assign(menu, {bgcolor: dark.matches ? '#b9bdc2' : '#ffffff', font: {color: '#1a1a1a'}});
-    }
-    if (layout.scene) {
-      for (const name of ['xaxis', 'yaxis', 'zaxis']) {
-        layout.scene[name] = {gridcolor: grid, color: ink, backgroundcolor: paper,
-                              ...layout.scene[name]};
-      }
-    }
-    return {data, layout, frames};
-  };
+    return {data, layout};
+  }
 
   // Traces of a drive are shown where the menus stand on it.
   function show(data) {
@@ -81,9 +69,8 @@
     if (drawn.has(plot)) return;
     drawn.add(plot);
     const Plotly = await plotly();
-    const {data, layout, frames} = contentOf(plot);
+    const {data, layout} = contentOf(plot);
     await Plotly.newPlot(plot, data, layout, {displayModeBar: false, responsive: true});
-    if (frames?.length) await Plotly.addFrames(plot, frames);
     if (plot.dataset.time !== undefined) link(Plotly, plot);
     plot.dataset.drawn = Math.round(performance.now());
   }

@@ -44,7 +44,7 @@ export const showVerdict = (state) => {
   if (state.little) line.append(make('b', `${state.little} · `));
   const since = reference ? `since ${reference.recordings.join(', ')} ` : '';
   line.append(`error ${since}`, make('b', fall(before, now, state)), ` · noise ${amount(noise)} ${
-    state.unit}${state.noise_is_guess ? ' (first guess)' : ''}`);
+    noise === null ? '' : state.unit}`);
   if (state.verdict) {
     line.append(` · diagnosis: ${(reference ? CHANGES : VERDICTS)[state.verdict]}`);
   }
@@ -148,16 +148,12 @@ export const showExperiment = (state) => {
 export const showFiles = async (server) => {
   if (!server.state?.has_folders) return;
   $('folders').hidden = false;
-  const {files, surveyed} = await server.ask('files');
-  const offered = [
-    ...surveyed.map((one) => [one.name, `robot ${one.robot} · ${one.recording} · ${one.time} · ${
-      one.verdict}`]),
-    ...files.map((name) => [name, name.slice(name.indexOf('/') + 1)])];
-  $('files').replaceChildren(...offered.map(([name, label]) => {
+  const {files} = await server.ask('files');
+  $('files').replaceChildren(...files.map((name) => {
     const item = make('li', '', 'bar');
     const judge = button('Judge on it', () => server.run('open', {name, is_held_out: true}));
     judge.disabled = Boolean(server.state.is_empty);
-    item.append(make('span', label), button('Open', () => server.run('open', {name})), judge);
+    item.append(make('span', name.slice(name.indexOf('/') + 1)), button('Open', () => server.run('open', {name})), judge);
     return item;
   }));
 };

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs adopt: add a physical effect to the model, fitted and checked on held-out data.
+"""`pprs adopt`: add an effect to the model after a check on held-out data.
 
 Writes a new model file with its entry in the ledger, or refuses with the figures (status 1).
 """
@@ -36,7 +36,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_model_output(parser, 'model file to write')
     parser.add_argument('--force', action='store_true',
                         help='adopt it in spite of objections, which the ledger then holds')
-    arguments.add_details(parser)
     arguments.add_report(parser)
 
 

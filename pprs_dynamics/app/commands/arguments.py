@@ -23,10 +23,9 @@ RECORDING = (*FILES_OF_RECORDINGS, '')  # without an ending: a rosbag2 folder
 LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
-OUTPUTS = ('output', 'json', 'report', 'mcap', 'picture')
-INPUTS = ('model', 'recordings', 'before', 'after', 'validate', 'reference', 'beside', 'refit',
-          'file',
-          'manifest', 'store', 'path')
+OUTPUTS = ('output', 'json', 'report', 'mcap')
+INPUTS = ('model', 'recordings', 'validate', 'reference', 'beside', 'refit', 'file', 'manifest',
+          'store', 'path')
 
 DEFAULT_MODEL = 'config/paper.yaml'
 
@@ -35,9 +34,9 @@ class UsageError(PprsError, ValueError):
     """Arguments that do not go together, or that what was read does not have."""
 
 
-def add_details(parser: argparse.ArgumentParser, what: str = 'print all there is to say') -> None:
+def add_details(parser: argparse.ArgumentParser) -> None:
     """Declare --details."""
-    parser.add_argument('--details', action='store_true', help=what)
+    parser.add_argument('--details', action='store_true', help='print everything')
 
 
 def add_report(parser: argparse.ArgumentParser, what: str = 'write a page with all figures',
@@ -46,23 +45,20 @@ def add_report(parser: argparse.ArgumentParser, what: str = 'write a page with a
     parser.add_argument('--report', metavar='FILE.html', type=output_file(*PAGE), help=what)
 
 
-def add_picture(parser: argparse.ArgumentParser, what: str) -> None:
-    """Declare --picture."""
-    parser.add_argument('--picture', metavar='FILE.png', type=output_file('.png'), help=what)
-
-
 def add_topic(parser: argparse.ArgumentParser) -> None:
     """Declare --topic."""
     parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
                         'holds several')
 
 
-def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> None:
+def add_recordings(parser: argparse.ArgumentParser, required: bool = True,
+                   with_topic: bool = True) -> None:
     """Declare RECORDING… and --topic."""
     parser.add_argument('recordings', metavar='RECORDING', nargs='+' if required else '*',
                         help='bag (rosbag2 folder, .mcap, .db3, ROS 1) or table (.csv, .csv.gz, '
                         '.parquet, .mat, .npz)')
-    add_topic(parser)
+    if with_topic:
+        add_topic(parser)
 
 
 def add_as_it_is(parser: argparse.ArgumentParser) -> None:
@@ -89,12 +85,6 @@ def add_model_output(parser: argparse.ArgumentParser, what: str, required: bool 
     """Declare --output of a model file."""
     parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
                         required=required, help=what)
-
-
-def add_overwrite(parser: argparse.ArgumentParser) -> None:
-    """Declare --overwrite, of commands that write a recording or poses; see `check_files`."""
-    parser.add_argument('--overwrite', action='store_true', help='replace a recording or poses '
-                        'that exist already under that name')
 
 
 def number(lower: float, upper: float, unit: str = '', above: bool = False,
@@ -170,7 +160,7 @@ def output_folder(text: str) -> str:
 def check_files(options: argparse.Namespace) -> None:
     """Refuse outputs that are an input, or each other, through links too, before anything runs.
 
-    Recordings and poses that exist are replaced with --overwrite alone: a measurement is lost then.
+    Recordings and poses that exist are never replaced.
 
     Raises
     ------
@@ -188,10 +178,9 @@ def check_files(options: argparse.Namespace) -> None:
                 raise UnreadableFileError(
                     name, f'it is --{option} and {same} at once, must be another file')
             seen.append((f'--{option}', Path(name)))
-            if (Path(name).suffix in FILES_OF_RECORDINGS and os.path.lexists(name)
-                    and not getattr(options, 'overwrite', False)):
+            if Path(name).suffix in FILES_OF_RECORDINGS and os.path.lexists(name):
                 raise UnreadableFileError(name, 'it exists already, must be another name for '
-                                          f'--{option}, or be given with --overwrite')
+                                          f'--{option}: recordings are never replaced')
 
 
 def _said(option: str) -> str:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs compare: model against measurement, and where it fails."""
+"""`pprs compare`: show where model and measurement differ."""
 
 from __future__ import annotations
 
@@ -23,9 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--mcap', metavar='FILE.mcap', type=arguments.output_file('.mcap'),
                         help='write measured effort, model, parts and residual as joint states, '
                         'with layouts for PlotJuggler and Foxglove beside it')
-    arguments.add_overwrite(parser)
-    parser.add_argument('--beside', metavar='FILE', help='another model file on the same '
-                        'recordings, or another recording: its errors stand beside')
+    parser.add_argument('--beside', metavar='FILE.yaml', help='another model file: its '
+                        'errors on the same recordings')
     arguments.add_report(parser)
 
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs diagnose: which physical effect is missing in the model, and how sure that is."""
+"""`pprs diagnose`: find the physical effect that the model lacks."""
 
 from __future__ import annotations
 
@@ -27,7 +27,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_reference(parser)
     arguments.add_details(parser)
     arguments.add_report(parser)
-    arguments.add_picture(parser, 'draw the error of every drive, before and with what was found')
     parser.add_argument('--adopt-all', action='store_true',
                         help='add what is found until nothing more can be told')
     parser.add_argument('--refit', metavar='RECORDING', nargs='*',
@@ -47,10 +46,6 @@ def run(options: argparse.Namespace) -> int:
         result = diagnose(inputs.model, inputs, progress=progress, reference=options.reference)
     tell(result, options, screen,
          view=result.view(options.details, next_step=not options.adopt_all))
-    if options.picture:
-        from pprs_dynamics.app.report.pictures import save
-
-        screen.print(f'picture: {shown(save(result.plot(), options.picture))}')
     return _adopt_all(result, options, screen) if options.adopt_all else 0
 
 

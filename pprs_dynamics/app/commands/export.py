@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs export: the model as a simulator's file, and what that cannot hold.
+"""`pprs export`: write the model as URDF or MJCF.
 
 The file is replayed in MuJoCo by inverse dynamics, against the model's own forces.
 """
@@ -11,17 +11,13 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from pprs_dynamics.app.commands.arguments import add_topic, output_file
-from pprs_dynamics.app.commands.input_output import read_inputs, write_json
-from pprs_dynamics.app.report.terminal import console, shown, staged_bar, text_table
+from pprs_dynamics.app.commands.arguments import output_file
+from pprs_dynamics.app.commands.input_output import write_json
+from pprs_dynamics.app.report.terminal import console, shown, text_table
+from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.simulation.export.exported_robot import export_robot
 from pprs_dynamics.simulation.export.expressed import FORMATS, express
-from pprs_dynamics.simulation.export.replay import (
-    Replay,
-    Replayed,
-    replay_excitation,
-    replay_recordings,
-)
+from pprs_dynamics.simulation.export.replay import Replay, Replayed, replay_excitation
 from pprs_dynamics.simulation.export.writers import written
 from pprs_dynamics.system.output_files import write_text
 
@@ -37,31 +33,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--to', choices=FORMATS, required=True, help='format of the file')
     parser.add_argument('--output', metavar='FILE', type=output_file(*ENDINGS), required=True,
                         help='.urdf, or .xml and .mjcf')
-    parser.add_argument('--recording', dest='recordings', metavar='RECORDING', action='append',
-                        default=[], help='its motion is replayed (default: a short excitation); '
-                        'may be repeated')
-    add_topic(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    options.model = options.file
-    inputs = read_inputs(options, screen, whole=True)
-    model, recordings = inputs.model, inputs.fitted
+    model = load_model(options.file)
     expressed = express(model, options.to)
     robot = export_robot(expressed, options.to)
     text = written(robot, options.to)
-    replay = Replay(expressed, robot, text, options.to)
-    with staged_bar(screen) as progress:
-        found = (replay_recordings(model, replay, recordings, lambda done, total: progress(
-            'replaying', done / total if total else 0.0)) if recordings
-                 else replay_excitation(model, replay))
+    found = replay_excitation(model, Replay(expressed, robot, text, options.to))
     write_text(options.output, text)
     if options.json:
         write_json(options.json, {'format': options.to, 'output': options.output,
                                   'not_expressed': list(expressed.not_expressed),
-                                  'replayed': [recording.name for recording in recordings],
                                   **found.to_dict()})
     _say(screen, found, expressed.not_expressed)
     screen.print(f'{options.to}: {shown(options.output)}')
@@ -76,8 +61,5 @@ def _say(screen: Any, found: Replayed, left: tuple[str, ...]) -> None:
                                          found.expected, strict=True)],
         title='Replayed in MuJoCo: the model\'s efforts less those of the file, rms',
         title_justify='left'))
-    if found.recorded is not None:
-        by_file, by_model = found.recorded
-        screen.print(f'measured less the file {by_file:.4g}, less the model {by_model:.4g}, rms')
     more = f' and {len(left) - FEW} more' if len(left) > FEW else ''
     screen.print(f'not expressed: {shown(", ".join(left[:FEW]) or "nothing")}{more}')

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs fit: the base model that recordings of free motion call for."""
+"""`pprs fit`: fit the base model to recordings of free motion."""
 
 from __future__ import annotations
 
@@ -24,7 +24,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--keep-residual', action='store_true', help='keep in the model file what '
                         'it leaves of these runs, as a reference that needs no files')
     arguments.add_report(parser)
-    arguments.add_details(parser, 'print every fitted number of the drives')
 
 
 def run(options: argparse.Namespace) -> int:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs history: the ledger of a model file, and how the error fell with each effect."""
+"""`pprs history`: show what was added to a model, or undo the last step."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from pprs_dynamics.app.commands.arguments import add_model_output, add_picture, add_report
+from pprs_dynamics.app.commands.arguments import add_model_output, add_report
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.drives import common_effort
@@ -28,7 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--undo', action='store_true', help='take the last step back')
     add_model_output(parser, 'model file that --undo writes', required=False)
     add_report(parser, 'draw the falling error as a page')
-    add_picture(parser, 'draw the falling error as a picture')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -37,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
         raise ModelError('--output', options.output, 'be given with --undo, and only then')
     screen = console()
     # Here, as --help draws nothing.
-    from pprs_dynamics.app.report.history_report import draw_history, history_page, history_view
+    from pprs_dynamics.app.report.history_report import history_page, history_view
 
     base = find_file(options.file)
     model = load_model(base)
@@ -49,8 +48,6 @@ def run(options: argparse.Namespace) -> int:
     screen.print(history_view(steps, unit))
     if options.json:
         write_json(options.json, {'steps': [step.to_dict() for step in steps]})
-    if options.picture:
-        screen.print(f'picture: {shown(draw_history(options.picture, steps, unit))}')
     if options.report:
         page = history_page(Path(options.file).name, steps, unit)
         screen.print(f'page: {shown(page.write(options.report))}')

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs info: what is in a recording, and what is wrong with it; what a robot with loops is."""
+"""`pprs info`: show what a recording holds, and what is wrong with it."""
 
 from __future__ import annotations
 

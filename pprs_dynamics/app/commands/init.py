@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""`pprs init`: a model file from a URDF or MJCF, and from what a recording calls its joints."""
+"""`pprs init`: write a model file from a URDF or MJCF."""
 
 from __future__ import annotations
 

@@ -39,7 +39,8 @@ def read_inputs(options: argparse.Namespace, screen: Any, whole: bool = False) -
 
     with staged_bar(screen) as progress:
         inputs = Inputs.of(options.model, options.recordings, getattr(options, 'validate', ()),
-                           options.topic, progress, whole, getattr(options, 'as_it_is', False))
+                           getattr(options, 'topic', None), progress, whole,
+                           getattr(options, 'as_it_is', False))
     for recording in (*inputs.fitted, *inputs.held_out):
         for finding in recording.findings:
             screen.print(f'[yellow]![/] {shown(recording.name)}: {shown(finding.text)}')
@@ -73,7 +74,7 @@ def tell(result: Result, options: argparse.Namespace, screen: Any,
     screen.print(view)
     if options.json:
         write_json(options.json, {**result.to_dict(), **beside})
-    if options.report:
+    if getattr(options, 'report', None):
         with staged_bar(screen) as progress:
             progress('page', 0.0)
             made = (page or result.page)()

@@ -24,17 +24,33 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from pprs_dynamics import __version__
-from pprs_dynamics.app.commands.arguments import DEFAULT_MODEL, JSON, check_files, output_file
+from pprs_dynamics.app.commands.arguments import (
+    DEFAULT_MODEL,
+    JSON,
+    UsageError,
+    check_files,
+    output_file,
+)
 from pprs_dynamics.app.commands.streams import lasting_output
 from pprs_dynamics.errors import MisreadError, PprsError, suggestion
 from pprs_dynamics.system.plain_text import displayed
 from pprs_dynamics.system.threads import use_one_thread
 
 # Each a module of this folder with a docstring, EXAMPLE, add_arguments and run.
-COMMANDS = ('adopt', 'changed', 'compare', 'diagnose', 'export', 'fit', 'history', 'info',
+COMMANDS = ('adopt', 'compare', 'diagnose', 'export', 'fit', 'history', 'info',
             'init', 'next-experiment', 'reproduce', 'simulate', 'survey', 'trend', 'workbench')
-# What all others take: models there are in the file or the store, and a session has no result.
-WITHOUT_MODEL, WITHOUT_JSON = ('history', 'init', 'trend'), ('workbench',)
+# Commands without --model (they name a model file or a store) and without --json.
+WITHOUT_MODEL, WITHOUT_JSON = ('export', 'history', 'init', 'trend'), ('workbench',)
+NO_MODEL = ('No --model is given: the model is that of the paper\'s robot (--demo). '
+            '`pprs init ROBOT.urdf RECORDING` writes the model of your robot.')
+EXAMPLES = """\
+examples:
+  pprs init ur10e.urdf run.csv --output robot.yaml
+  pprs fit free.csv --model robot.yaml --output base.yaml
+  pprs diagnose run.csv --model base.yaml --report why.html
+  pprs simulate --output run.mcap --effect stribeck_friction
+  pprs COMMAND --help
+"""
 # Characters of an error: ten lines of a terminal, more than any sentence with usual names has.
 LONGEST_SENTENCE = 800
 
@@ -78,22 +94,29 @@ def _cleaned_up() -> Iterator[None]:
 
 def _ended(given: Sequence[str]) -> int:
     """Run the command; what ends it early is one sentence."""
+    is_assumed = False
     try:
         # Importing a command takes long enough to be interrupted.
         parser = _parser(given)
         if not given:
             parser.print_help()
             return 0
-        options = parser.parse_args(given)
+        options = parser.parse_args(_with_demo_first(given))
         options.words = given  # for the record of a page
+        is_assumed = _choose_model(options)
         check_files(options)
         from pprs_dynamics.physics.mechanism.evaluation import postpone_compiling
 
         postpone_compiling()
         status: int = _module(options.command).run(options)
+        if is_assumed:
+            print(NO_MODEL)
     except PprsError as error:
         # What other packages and files say may hold what a terminal would obey.
-        _say(displayed(error), given)
+        text = displayed(error)
+        if is_assumed and '`pprs init ' in text:  # the recording is of another robot
+            text = f"no --model is given, must be one, or --demo for the paper's robot: {text}"
+        _say(text, given)
         return 1 if isinstance(error, MisreadError) else 2
     except KeyboardInterrupt:
         _say('interrupted', given)
@@ -107,6 +130,29 @@ def _ended(given: Sequence[str]) -> int:
         _say(f'{name}{error.strerror or str(error) or type(error).__name__}', given)
         return 2
     return status
+
+
+def _with_demo_first(given: Sequence[str]) -> list[str]:
+    """Return arguments with --demo, which may be anywhere, before the command."""
+    rest = [word for word in given if word != '--demo']
+    return [*['--demo'][:len(given) - len(rest)], *rest]
+
+
+def _choose_model(options: argparse.Namespace) -> bool:
+    """Take the paper's robot if no --model is given; return whether it is only assumed.
+
+    Raises
+    ------
+    UsageError
+        For --demo with --model.
+    """
+    if options.command in WITHOUT_MODEL or options.model is not None:
+        if options.demo:
+            raise UsageError('--demo is given with --model or to a command without a model, must '
+                             'be left out')
+        return False
+    options.model = DEFAULT_MODEL
+    return not options.demo and bool(getattr(options, 'recordings', False))
 
 
 def _say(sentence: str, given: Sequence[str]) -> None:
@@ -157,6 +203,10 @@ class OneLineParser(argparse.ArgumentParser):
         return super()._get_values(action, arg_strings)
 
 
+def _formatter(prog: str) -> argparse.HelpFormatter:
+    return argparse.RawDescriptionHelpFormatter(prog, max_help_position=21)
+
+
 def _module(command: str) -> ModuleType:
     return import_module(f'{__package__}.{command.replace("-", "_")}')
 
@@ -171,17 +221,19 @@ def _summary(command: str) -> str:
 def _parser(given: Sequence[str]) -> argparse.ArgumentParser:
     """Return the parser, with the arguments of the command that is called."""
     parser = OneLineParser(
-        prog='pprs', description='Dynamics with friction of a 3-PPRS, an arm, a robot with '
-        'loops or a single axis: what the model says, what was measured, and which physical '
-        'effect is missing.')
+        prog='pprs', description='Compare the dynamics of a robot with measurements, find the '
+        'physical effect\nthat the model lacks, add it, and see the error fall.', epilog=EXAMPLES,
+        formatter_class=_formatter)
+    parser.add_argument('--demo', action='store_true', help='the model is that of the paper\'s '
+                        f'robot, {DEFAULT_MODEL}')
     parser.add_argument('--version', action='version', version=f'%(prog)s {__version__}')
     commands = parser.add_subparsers(dest='command', required=True, metavar='COMMAND')
     for name in COMMANDS:
         summary = _summary(name)
-        command = commands.add_parser(name, help=summary, description=summary)
+        command = commands.add_parser(name, help=summary.rstrip('.'), description=summary)
         if name not in WITHOUT_MODEL:
-            command.add_argument('--model', metavar='FILE', default=DEFAULT_MODEL, help='model '
-                                 f'file (default: the paper\'s robot, {DEFAULT_MODEL})')
+            command.add_argument('--model', metavar='FILE', help='model file of your robot; pprs '
+                                 'init writes one')
         if name not in WITHOUT_JSON:
             command.add_argument('--json', metavar='FILE.json', type=output_file(*JSON),
                                  help='write the result as JSON too')

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs reproduce: the paper's simulation, figures 8 and 9, and its claims against what comes out.
+"""`pprs reproduce`: compute the paper's figures and check its claims.
 
 Writes figure_8.png, figure_9.png, forces.csv and claims.json into the output folder.
 """

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs simulate: a recording of the simulated robot, with hidden effects if wanted.
+"""`pprs simulate`: record the simulated robot with hidden effects.
 
 Runs the physics-engine robot without ROS, faster than real time, and writes what its sensors say.
 """
@@ -12,18 +12,10 @@ import argparse
 
 import numpy as np
 
-from pprs_dynamics.app.api.simulate import FEEDFORWARDS, NOISE, RATE, simulate
-from pprs_dynamics.app.commands.arguments import (
-    RECORDING,
-    add_overwrite,
-    add_report,
-    number,
-    output_file,
-    seed,
-)
+from pprs_dynamics.app.api.simulate import NOISE, RATE, simulate
+from pprs_dynamics.app.commands.arguments import RECORDING, number, output_file, seed
 from pprs_dynamics.app.commands.input_output import tell
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
-from pprs_dynamics.physics.effects.former_names import FORMER
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
@@ -42,14 +34,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--output', metavar='RECORDING', type=output_file(*RECORDING),
                         required=True,
                         help='.mcap, .csv, or the name of a rosbag2 folder to make')
-    add_overwrite(parser)
     parser.add_argument('--effect', metavar='NAME', action='append', default=[],
-                        choices=(*dict.fromkeys((*HIDDEN_EFFECTS, *ARM_EFFECTS)), RANDOM, *FORMER),
+                        choices=(*dict.fromkeys((*HIDDEN_EFFECTS, *ARM_EFFECTS)), RANDOM),
                         help='physics that the model does not know of, drawn from the seed; may '
                         f'be repeated: random, {", ".join(HIDDEN_EFFECTS)}; of an arm or a '
                         f'robot with loops {", ".join(ARM_EFFECTS)}')
-    parser.add_argument('--scale', type=number(0.0, 1e6), default=1.0,
-                        help='multiplies the strength of the effects (default 1)')
     parser.add_argument('--seed', type=seed, default=0, help='of noise and effects (default 0)')
     parser.add_argument('--path', default='excitation',
                         help='helix, excitation, or a CSV of poses (default excitation)')
@@ -59,15 +48,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--noise', type=number(0.0, 1e3, 'N'),
                         help=f'of the efforts, standard deviation [N] (default {NOISE:g}; of an '
                         'arm [N m, N] half a percent of the largest)')
-    parser.add_argument('--feedforward', choices=FEEDFORWARDS, default='friction',
-                        help='what the robot is driven with (default friction)')
-    parser.add_argument('--thermometers', action='store_true',
-                        help='of an arm: record the temperatures of the drives, even where no '
-                        'effect follows them')
-    parser.add_argument('--link-encoders', action='store_true',
-                        help='of an arm: record the positions of its links behind the gears as '
-                        'well, even where no gear winds up')
-    add_report(parser, 'the robot moving, as a page')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -77,10 +57,8 @@ def run(options: argparse.Namespace) -> int:
     motion = None if model.moves_joints else _motion(options)
     with staged_bar(screen) as progress:
         result = simulate(
-            model, options.effect, seed=options.seed, scale=options.scale, motion=motion,
-            duration=options.duration, path_seed=options.path_seed, noise=options.noise,
-            feedforward=options.feedforward, thermometers=options.thermometers,
-            link_encoders=options.link_encoders, progress=progress)
+            model, options.effect, seed=options.seed, motion=motion, duration=options.duration,
+            path_seed=options.path_seed, noise=options.noise, progress=progress)
     result.save(options.output)
     tell(result, options, screen, recording=options.output)
     screen.print(f'recording: {shown(options.output)}')

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""pprs workbench: effects to tick on recordings, in the browser.
+"""`pprs workbench`: try effects on recordings in the browser.
 
 Serves one page on this machine; its first line on stdout is the address with a token.
 """
@@ -38,9 +38,8 @@ EXAMPLE = 'pprs workbench run.mcap --validate other.mcap'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('recordings', metavar='RECORDING', nargs='*',
-                        help='rosbag2 folder, .mcap, .db3 or .csv; or a folder of them, or a '
-                        'store of pprs survey, to choose from in the browser; or a saved '
-                        'session.json, alone')
+                        help='rosbag2 folder, .mcap, .db3 or .csv; or a folder of them to '
+                        'choose from in the browser; or a saved session.json, alone')
     add_validation(parser, 'adoptions are judged on it')
     add_reference(parser)
     add_topic(parser)
@@ -48,9 +47,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='listen to joint_states, and set effects on running nodes')
     parser.add_argument('--live-topic', metavar='NAME', type=_ros_name,
                         help='that --live listens to (default: that of --topic, else joint_states)')
-    for node in ('monitor', 'feedforward'):
-        parser.add_argument(f'--{node}', metavar='NODE', type=_ros_name, default=node,
-                            help=f'name of the node that --live speaks to (default {node})')
     parser.add_argument('--namespace', metavar='NAME', type=_ros_name, default='/',
                         help='in which --live looks for topic and nodes')
     parser.add_argument('--port', type=whole(0, 65535), default=0,
@@ -107,4 +103,4 @@ def _live(options: argparse.Namespace, model: ForceModel) -> LiveSource:
     except ImportError:
         raise MissingLibraryError('rclpy', 'live data', 'ros') from None
     return LiveNodes(model, options.live_topic or options.topic or 'joint_states',
-                     options.monitor, options.feedforward, options.namespace)
+                     'monitor', 'feedforward', options.namespace)

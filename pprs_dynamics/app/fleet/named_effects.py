@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.app.fleet.store import OWN
+from pprs_dynamics.app.fleet.store import MODEL
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.regression.base_columns import ModelNumber, PresentCoefficient
 from pprs_dynamics.inference.regression.design import Design
@@ -134,7 +134,7 @@ def _own_numbers(design: Design, fit: JointFit) -> Iterator[dict[str, Any]]:
         if isinstance(column, ModelNumber):
             number = column.number
             label = number.key if number.element is None else f'{number.key}[{number.element + 1}]'
-            yield {'effect': OWN, 'parameter': label,
+            yield {'effect': MODEL, 'parameter': label,
                    'value': column.value(float(fit.coefficients[k])),
                    'std': float(np.sqrt(fit.covariance[k, k])) * number.deviation,
                    'unit': number.unit}

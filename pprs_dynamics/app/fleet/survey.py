@@ -1,38 +1,31 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Survey of one recording: read, checked, compared, diagnosed or fitted; the rows of its results.
+"""Survey of one recording: read, checked, diagnosed or fitted; the rows of its results.
 
-`examine` is what workers run. It never raises for what is wrong with a recording: that becomes a
-row with the reason.
+Workers run `examine`. A recording that is refused is a row with the reason.
 """
 
 from __future__ import annotations
 
-import hashlib
-import tempfile
 from collections.abc import Container, Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
-from pathlib import Path, PurePosixPath
-from time import perf_counter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics import __version__
-from pprs_dynamics.app.fleet.manifest import ManifestEntry, filesystem, is_remote
 from pprs_dynamics.app.fleet.named_effects import fit_named_effects
-from pprs_dynamics.app.fleet.store import AUTO, OWN, key_of
+from pprs_dynamics.app.fleet.recordings import SurveyedRecording
+from pprs_dynamics.app.fleet.store import AUTO, MODEL, key_of
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.fit.reference import Reference
-from pprs_dynamics.inference.fit.reference_runs import read_reference
 from pprs_dynamics.inference.readings.check import find_mistakes
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import estimate_present
@@ -41,205 +34,90 @@ from pprs_dynamics.measurement.files.recording import Recording, describe, read_
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.system.plain_text import displayed
 from pprs_dynamics.system.threads import use_one_thread
 
-FITTED = 'fitted'  # the verdict where only named effects were fitted
-# Of the model's error over the changing effort on a drive, beyond which units, signs and order of
-# drives are looked at: wrong ones leave as much as the effort or more.
+FITTED, REFUSED = 'fitted', 'refused'  # verdicts: named effects were fitted; no result
+# Error over the changing effort of a drive, beyond which units, signs and the order of the drives
+# are checked. Wrong ones have an error as large as the effort.
 SUSPECT = 1.0
-MODELS_KEPT = 8  # built models that a worker remembers
+
+model_of = lru_cache(maxsize=8)(load_model)
 
 
 @dataclass(frozen=True)
 class SurveyJob:
-    """A recording, the model to judge it by, and how.
+    """A recording, its model file, and 'auto' or the effects to fit, divided by commas."""
 
-    Parameters
-    ----------
-    entry : ManifestEntry
-    values : mapping
-        Flat keys and values of the model.
-    model : str
-        Its fingerprint.
-    options : str
-        'auto', or effects as EFFECT or EFFECT:drive+drive, divided by commas.
-    topic : str, optional
-    reference : tuple of str, optional
-        Runs since which it is diagnosed what has changed; () for those of the model file.
-    source : str
-        The model's file.
-    """
-
-    entry: ManifestEntry
-    values: Mapping[str, Any]
+    entry: SurveyedRecording
     model: str
     options: str = AUTO
-    topic: str | None = None
-    reference: tuple[str, ...] | None = None
-    source: str = ''
 
     @property
-    def told_options(self) -> str:
-        """The options as a store tells them, reference runs among them."""
-        if self.reference is None:
-            return self.options
-        return f'{self.options} since {", ".join(self.reference) or "reference"}'
+    def common(self) -> dict[str, Any]:
+        """What all rows of the recording have; '' as hash of one that cannot be read."""
+        path = Path(self.entry.path)
+        try:
+            content = fingerprint(path)
+        except PprsError:
+            content = ''
+        return {'recording': displayed(path.name), 'path': displayed(path), 'sha256': content,
+                'robot': displayed(self.entry.robot), 'time': self.entry.time,
+                'model': model_of(self.model).fingerprint, 'options': self.options,
+                'version': __version__}
 
-    def key(self, content: str) -> str:
-        """Return the key of its rows; `content` is the recording's SHA-256."""
-        return key_of(content, self.model, self.told_options, __version__)
 
-
-@dataclass(frozen=True)
-class SurveyResult:
-    """Rows of a recording.
-
-    Parameters
-    ----------
-    key : str
-    rows : list of dict
-    failed : bool
-        True where another attempt may succeed.
-    """
-
-    key: str
-    rows: list[dict[str, Any]]
-    failed: bool = False
-
-    @property
-    def error(self) -> str | None:
-        """Why there is no result, if there is none."""
-        return self.rows[0].get('error')
+def key(common: Mapping[str, Any]) -> str:
+    """Return the name of a recording's file in a store."""
+    return key_of(*(common[name] for name in ('sha256', 'robot', 'model', 'options', 'version')))
 
 
 def requests_of(options: str, model: ForceModel) -> tuple[EffectRequest, ...]:
-    """Return the effects that options name; errors as `EffectRequest`."""
+    """Return the effects that options name, as EFFECT or EFFECT:drive+drive; errors as theirs."""
     return tuple(EffectRequest.of(text.strip().replace('+', ','), tuple(model.drives)).placed(model)
                  for text in options.split(',') if text.strip())
 
 
-def identify(path: str) -> str | None:
-    """Return the SHA-256 of a recording's content; None where it cannot be read."""
-    try:
-        if not is_remote(path):
-            return fingerprint(path)
-        system, within = filesystem(path)
-        if system.isdir(within):
-            with local_copy(path) as copy:
-                return fingerprint(copy)
-        with system.open(within, 'rb') as file:
-            return hashlib.file_digest(file, 'sha256').hexdigest()
-    except Exception:  # libraries of file systems raise what they like; examine tells the reason
-        return None
-
-
-@contextmanager
-def local_copy(path: str) -> Iterator[str]:
-    """Give a local path of a recording; of a remote one a copy that lasts as long as the block.
-
-    Raises
-    ------
-    UnreadableFileError
-        Where it cannot be fetched.
-    """
-    if not is_remote(path):
-        yield path
-        return
-    with tempfile.TemporaryDirectory(prefix='pprs-survey-') as folder:
-        system, within = filesystem(path)
-        target = Path(folder) / PurePosixPath(within).name
-        try:
-            system.get(within, str(target), recursive=bool(system.isdir(within)))
-        except Exception as error:
-            raise UnreadableFileError(path, f'cannot be fetched: {error}') from None
-        yield str(target)
-
-
-def examine(job: SurveyJob, content: str | None) -> SurveyResult:
-    """Return the rows of a recording.
-
-    Parameters
-    ----------
-    job : SurveyJob
-    content : str or None
-        The recording's SHA-256, of `identify`.
-    """
+def examine(job: SurveyJob) -> list[dict[str, Any]]:
+    """Return the rows of a recording."""
     use_one_thread()
-    began = perf_counter()
-    common = _common(job, content)
-    key, path = job.key(content or job.entry.path), job.entry.path
+    common, model = job.common, model_of(job.model)
     try:
-        with local_copy(job.entry.path) as path:
-            rows, failed = _examined(job, path, common), False
+        recording = read_recording(job.entry.path, model.recorded)
+        summary = describe(recording)
+        judge = _diagnosed if job.options == AUTO else _fitted
+        rows, drives, verdict = judge(model, recording, job)
     except PprsError as error:
-        # A copy's name says nothing to anybody.
-        text = displayed(str(error).replace(path, job.entry.path))
-        # What could not even be read may be there the next time.
-        rows, failed = [{**common, 'error': text}], content is None
-    except Exception as error:  # of the package itself, but no end of a survey
-        text = f'unexpected {type(error).__name__}: {error}'
-        rows, failed = [{**common, 'error': text}], True
-    seconds = perf_counter() - began
-    return SurveyResult(key, [{**row, 'seconds': seconds} for row in rows], failed)
-
-
-def lost(job: SurveyJob, content: str | None, reason: str) -> SurveyResult:
-    """Return the row of a recording whose worker did not come back."""
-    return SurveyResult(job.key(content or job.entry.path),
-                        [{**_common(job, content), 'error': reason}], failed=True)
-
-
-def _common(job: SurveyJob, content: str | None) -> dict[str, Any]:
-    entry = job.entry
-    return {'recording': displayed(PurePosixPath(entry.path.rstrip('/')).name),
-            'path': displayed(entry.path), 'sha256': content,
-            'time': None if entry.time is None else datetime.fromtimestamp(entry.time, UTC),
-            'model': job.model, 'options': job.told_options, 'version': __version__,
-            'conditions': list(entry.conditions.items())}
-
-
-@lru_cache(MODELS_KEPT)
-def _model(fingerprint: str, values: tuple[tuple[str, Any], ...], source: str = '') -> ForceModel:
-    return build_model(dict(values), source)
-
-
-@lru_cache(MODELS_KEPT)
-def _reference(fingerprint: str, values: tuple[tuple[str, Any], ...], source: str,
-               files: tuple[str, ...]) -> Reference:
-    return read_reference(_model(fingerprint, values, source), files)
-
-
-def _examined(job: SurveyJob, path: str, common: dict[str, Any]) -> list[dict[str, Any]]:
-    values = tuple((key, tuple(value) if isinstance(value, list) else value)  # as files have lists
-                   for key, value in job.values.items())
-    model = _model(job.model, values, job.source)
-    reference = None if job.reference is None else _reference(
-        job.model, values, job.source, job.reference)
-    recording = read_recording(path, model.recorded, job.topic)
-    summary = describe(recording)
-    if common['time'] is None:
-        common = {**common, 'time': datetime.fromtimestamp(recording.epoch + summary.start, UTC)}
-    rows, drives, verdict = _judged(model, recording, job, reference)
-    common = {**common, 'duration': summary.duration, 'verdict': verdict}
+        return [{**common, 'verdict': REFUSED, 'error': displayed(str(error))}]
+    time = common['time'] or datetime.fromtimestamp(recording.epoch + summary.start, UTC)
+    common |= {'time': time, 'duration': summary.duration, 'verdict': verdict}
     return [{**common, 'drive': drive, **numbers} for drive, numbers in drives.items()] + [
         {**common, **drives.get(row.get('drive') or '', {}), **row} for row in rows]
 
 
-Examined = tuple[list[dict[str, Any]], dict[str, dict[str, float]], str]
+Judged = tuple[list[dict[str, Any]], dict[str, dict[str, float]], str]
 """Rows of values, numbers by drive, and the verdict."""
 
 
-def _judged(model: ForceModel, recording: Recording, job: SurveyJob,
-            reference: Reference | None) -> Examined:
-    """Return what is found; a recording of other units, signs or drives is refused.
+def _diagnosed(model: ForceModel, recording: Recording, job: SurveyJob) -> Judged:
+    _refuse_mistakes(model, recording, job)
+    diagnosis = diagnose(model, [recording])
+    rows: list[dict[str, Any]] = []
+    for effect in diagnosis.effects:
+        for name, estimate in effect.parameters.items():
+            drive, parameter = effect.effect.place_and_parameter(name)
+            rows.append({'drive': drive or None, 'effect': effect.name, 'parameter': parameter,
+                         'value': estimate.value, 'std': estimate.std, 'unit': estimate.unit,
+                         'evidence': effect.evidence})
+    rows += _as_in_model(diagnosis, {(row['drive'], row['effect']) for row in rows})
+    rows += [{'effect': MODEL, 'parameter': number.label, 'value': number.after,
+              'std': number.std, 'unit': number.unit} for number in diagnosis.calibrated]
+    return rows, _drives(diagnosis.residuals, diagnosis.noise_floors), diagnosis.verdict
 
-    The search for these takes longer than a fit, so that there only what fits badly is searched.
-    """
-    if job.options == AUTO:
-        _refuse_mistakes(model, recording, job)
-        return _diagnosed(model, recording, reference)
+
+def _fitted(model: ForceModel, recording: Recording, job: SurveyJob) -> Judged:
+    # The check of units and signs takes longer than a fit: only a bad fit is checked.
     try:
         rows, residuals, noise = fit_named_effects(model, recording,
                                                    requests_of(job.options, model))
@@ -247,7 +125,7 @@ def _judged(model: ForceModel, recording: Recording, job: SurveyJob,
         _refuse_mistakes(model, recording, job)
         raise
     drives = _drives(residuals, noise)
-    if any(one['relative'] > SUSPECT for one in drives.values()):
+    if any(numbers['relative'] > SUSPECT for numbers in drives.values()):
         _refuse_mistakes(model, recording, job)
     return rows, drives, FITTED
 
@@ -258,7 +136,7 @@ def _refuse_mistakes(model: ForceModel, recording: Recording, job: SurveyJob) ->
 
 
 def _drives(residuals: Residuals, noise: Mapping[str, float]) -> dict[str, dict[str, float]]:
-    """Return rms, relative and noise of every drive that was measured."""
+    """Return rms, relative error and noise of every drive that was measured."""
     found = {}
     for d, drive in enumerate(residuals.drives):
         known = np.isfinite(residuals.measured[:, d])
@@ -270,32 +148,17 @@ def _drives(residuals: Residuals, noise: Mapping[str, float]) -> dict[str, dict[
     return found
 
 
-def _diagnosed(model: ForceModel, recording: Recording,
-               reference: Reference | None) -> Examined:
-    diagnosis = diagnose(model, [recording], reference=reference)
-    rows: list[dict[str, Any]] = []
-    for effect in diagnosis.effects:
-        for key, one in effect.parameters.items():
-            drive, parameter = effect.effect.place_and_parameter(key)
-            rows.append({'drive': drive or None, 'effect': effect.name, 'parameter': parameter,
-                         'value': one.value, 'std': one.std, 'unit': one.unit,
-                         'evidence': effect.evidence})
-    rows += _as_in_model(diagnosis, {(row['drive'], row['effect']) for row in rows})
-    rows += [{'effect': OWN, 'parameter': one.label, 'value': one.after, 'std': one.std,
-              'unit': one.unit} for one in diagnosis.calibrated]
-    return rows, _drives(diagnosis.residuals, diagnosis.noise_floors), diagnosis.verdict
-
-
-def _as_in_model(diagnosis: Diagnosis, told: Container[tuple[str | None, str]],
+def _as_in_model(diagnosis: Diagnosis, reported: Container[tuple[str | None, str]],
                  ) -> Iterator[dict[str, Any]]:
-    """Yield what the model's effects are, where a recording says nothing else of them."""
+    """Yield the effects of the model that the recording does not change."""
     selection = diagnosis.selection
     assert selection is not None
     for effect in diagnosis.model.effects:
         if not isinstance(effect, (DriveEffect, StructureEffect)):
             continue
-        for key, one in estimate_present(selection.last, selection.reported, effect).items():
-            drive, parameter = effect.place_and_parameter(key)
-            if (drive or None, effect.name) not in told:
+        estimates = estimate_present(selection.last, selection.reported, effect)
+        for name, estimate in estimates.items():
+            drive, parameter = effect.place_and_parameter(name)
+            if (drive or None, effect.name) not in reported:
                 yield {'drive': drive or None, 'effect': effect.name, 'parameter': parameter,
-                       'value': one.value, 'std': one.std, 'unit': one.unit}
+                       'value': estimate.value, 'std': estimate.std, 'unit': estimate.unit}

@@ -29,7 +29,7 @@ from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun
 from pprs_dynamics.inference.diagnosis.quantities import as_fitted, in_unit, plain, with_uncertainty
 from pprs_dynamics.inference.diagnosis.sentences import sure_moments
-from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
+from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.system.plain_text import counted

@@ -16,7 +16,6 @@ from typing import Any
 from pprs_dynamics.app.report import diagnosis_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import escape, stacked, text_table, verdict_panel
-from pprs_dynamics.app.report.what_if_part import add_what_if
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import RivalEffect
 from pprs_dynamics.inference.diagnosis.partial_errors import ErrorStep, error_steps
@@ -38,7 +37,6 @@ from pprs_dynamics.inference.diagnosis.sentences import (
     unexplained_groups,
     word_detectable,
 )
-from pprs_dynamics.inference.diagnosis.what_if import WhatIf
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
@@ -233,7 +231,6 @@ def _table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]],
 def diagnosis_page(
     diagnosis: Diagnosis, words: Sentences, after: Residuals, recordings: Sequence[str],
     validation: Sequence[str] = (), rivals: Sequence[RivalEffect] = (),
-    system: WhatIf | None = None,
 ) -> Page:
     """Return the page: an answer that fits one screen, the rest to be unfolded.
 
@@ -248,8 +245,6 @@ def diagnosis_page(
         Names of those fitted, and of those held out.
     rivals : sequence of RivalEffect
         As they were given to `word_diagnosis`.
-    system : WhatIf, optional
-        Of it; without it nothing can be ticked.
     """
     page = Page(f'Diagnosis: {diagnosis.verdict}')
     page.text(words.headline, 'lead')
@@ -263,8 +258,6 @@ def diagnosis_page(
     page.command(words.following, words.command)
     page.copy('Copy as Markdown', diagnosis_markdown(diagnosis, words))
     page.folded_list('Warnings', words.warnings, is_open=True)
-    if system is not None:
-        add_what_if(page, system, diagnosis.residuals)
     _findings(page, diagnosis, words, rivals)
     _sets(page, diagnosis)
     if rows := detectable_rows(diagnosis):

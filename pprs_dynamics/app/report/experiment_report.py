@@ -9,7 +9,6 @@ from typing import Any
 
 from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import Page
-from pprs_dynamics.app.report.robot_figure import animate_robot
 from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, titled_table
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_unit
@@ -17,7 +16,6 @@ from pprs_dynamics.inference.experiments.arm_motions import ArmExcitation
 from pprs_dynamics.inference.experiments.next_experiment import Experiment
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.model.drive_model import DriveModel
 
 Motion = PlatformMotion | JointMotion
 POINTS = 500  # pairs of extremes shown of a curve
@@ -58,7 +56,7 @@ def experiment_view(experiment: Experiment) -> Any:
         headings, rows = accuracies_table(experiment)
         parts.append(titled_table('Standard deviations', (headings, rows[:MOST_SHOWN]), right=()))
         if len(rows) > MOST_SHOWN:
-            parts.append(f'… and {len(rows) - MOST_SHOWN} more, in --json and --report')
+            parts.append(f'… and {len(rows) - MOST_SHOWN} more, in --json')
     used = [row for row in limit_rows(experiment) if float(row[1].rstrip(' %')) >= 100 * HIGH]
     parts.append('limits, of what their margin leaves: ' + ', '.join(
         f'{name} {share}' for name, share in used[:6]) + '; all others less')
@@ -71,7 +69,7 @@ def excitation_view(excitation: ArmExcitation) -> Any:
         f'{name} {share:.0%}' for name, share in excitation.limits.items()))
 
 
-def experiment_page(experiment: Experiment, motion: Motion, command: str) -> Page:
+def experiment_page(experiment: Experiment, motion: Motion) -> Page:
     """Return the page, most important first.
 
     Parameters
@@ -79,8 +77,6 @@ def experiment_page(experiment: Experiment, motion: Motion, command: str) -> Pag
     experiment : Experiment
     motion : PlatformMotion or JointMotion
         As it is written.
-    command : str
-        That plays it; empty where there is none.
     """
     page = Page('The next experiment')
     page.text(experiment.text, 'lead')
@@ -89,15 +85,9 @@ def experiment_page(experiment: Experiment, motion: Motion, command: str) -> Pag
                    caption='What it would tell. Evidence is by how much the rival costs more in a '
                    'diagnosis of all recordings; the chance is that of the rival falling so far '
                    'behind that it is told as a rival no more.')
-    if command:
-        page.command('Play it, and record', command)
     if isinstance(motion, PlatformMotion):
-        assert isinstance(experiment.model, DriveModel)
         page.figure(_platform(motion), 'The motion of the platform, from where it starts.',
                     over_time=True)
-        with page.fold('The robot in motion'):
-            page.figure(animate_robot(experiment.model, motion, 'The designed motion'),
-                        'The designed motion; it plays on request.')
     with page.fold('Every drive'):
         page.figure(_drives(experiment, motion),
                     'Position, velocity, acceleration and effort of every drive.', over_time=True)

@@ -8,13 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import cycle
 from math import inf
-from os import PathLike
-from pathlib import Path
 from typing import Any
 
 from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.pictures import BLUE, GREY, RED, finish, new_figure, save
 from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, text_table
 from pprs_dynamics.inference.diagnosis.quantities import change, in_unit, with_uncertainty
 from pprs_dynamics.physics.model.ledger import NOT_KNOWN, Step
@@ -153,19 +150,3 @@ def falling_error_by_drive(steps: Sequence[Step], unit: str) -> Any:
                                        hovertemplate=f'%{{y:.3f}} {unit}'))
     return charts.figure(traces, 360, yaxis={'title': f'error, rms [{unit}]',
                                              'rangemode': 'tozero'})
-
-
-def draw_history(path: str | PathLike[str], steps: Sequence[Step], unit: str = 'N') -> Path:
-    """Draw the falling error into a PNG file."""
-    figure = new_figure(8.0, 4.0)
-    axis = figure.subplots()
-    if steps:
-        labels, fitted, held, noise = _levels(steps)
-        places = range(len(labels))
-        axis.bar([place - 0.2 for place in places], fitted, 0.4, color=BLUE, label='recordings')
-        axis.bar([place + 0.2 for place in places], held, 0.4, color=RED, label='held out')
-        axis.axhline(noise, ls='--', color=GREY, label=f'noise {noise:.3g}')
-        axis.set_xticks(list(places), labels, rotation=20, ha='right')
-    axis.set(ylabel=f'error, rms [{unit}]', title='Error of the model as effects were added')
-    finish(axis)
-    return save(figure, path)

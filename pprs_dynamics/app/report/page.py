@@ -22,13 +22,10 @@ from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import PLAIN
 
 HEIGHT = 320  # [px], of figures that say none
-# Of plotly.js 4.1.1: lines, bars and markers. It starts four times as fast as the whole library,
-# which is in the page only where something is drawn in three dimensions.
+# plotly.js 4.1.1 with lines, bars and markers only: it starts four times as fast as the whole.
 BASIC = 'plotly-basic.min.js.gz'
-BASIC_TYPES = ('scatter', 'bar')
-# Of uPlot 1.6.32, for curves that change at once.
+# uPlot 1.6.32, for the workbench.
 CURVES, CURVES_STYLE = 'uplot.iife.min.js.gz', 'uplot.min.css'
-FOLDER = 'pprs/'  # of the package's modules in an import map
 
 
 @dataclass(frozen=True)
@@ -67,9 +64,6 @@ class Page:
         self._body: list[str] = []
         self._figures = 0
         self._menus = 0
-        self._types: set[str] = set()
-        self._has_board = False
-        self._modules: set[str] = set()
 
     def heading(self, text: str) -> None:
         """Start a section."""
@@ -199,43 +193,18 @@ class Page:
         self._body.append(f'<section class="card"><h3>{escape(title)}</h3><dl>{terms}</dl>'
                           f'<div class="columns">{drawn}</div></section>')
 
-    def interactive(self, elements: str, name: str, data: str, modules: Sequence[str],
-                    with_board: bool = False) -> None:
-        """Add a part that modules of the package fill.
-
-        Parameters
-        ----------
-        elements : str
-            HTML of the package, without text from files.
-        name : str
-            Id of the element that holds the data.
-        data : str
-            JSON; it may hold text from files.
-        modules : sequence of str
-            All that are needed; the last has a function `prepare`.
-        with_board : bool
-            It shows what the workbench does, with uPlot after `await library('uplot')`.
-        """
-        self._has_board |= with_board
-        self._modules |= {*modules}
-        self._body.append(
-            f'{elements}{_data(name, data)}<script type="module">'
-            f"import {{prepare}} from '{FOLDER}{modules[-1]}'; prepare();</script>")
-
     def _drawn(self, figure: Any, caption: str, over_time: bool) -> str:
         from plotly.utils import PlotlyJSONEncoder
 
         self._figures += 1
         name = f'figure-{self._figures}'
         content = figure.to_plotly_json()
-        self._types |= {trace.get('type', 'scatter') for trace in content['data']}
         layout = content['layout']
         layout.pop('template', None)  # the page's own colours are set in the browser
         height = layout.get('height') or HEIGHT
         title = layout.get('title')
         label = caption or str(title.get('text', '') if isinstance(title, dict) else title or '')
-        data = json.dumps({'data': content['data'], 'layout': layout,
-                           'frames': content.get('frames', [])}, cls=PlotlyJSONEncoder,
+        data = json.dumps({'data': content['data'], 'layout': layout}, cls=PlotlyJSONEncoder,
                           separators=(',', ':'))
         return (f'<figure><div class="plot" id="{name}" role="img" tabindex="0" '
                 f'aria-label="{escape(label or "Figure", quote=True)}" '
@@ -245,22 +214,13 @@ class Page:
 
     def html(self) -> str:
         """Return the page."""
-        libraries = {}
+        library = ''
         if self._figures:
-            libraries['plotly'] = (_packed(BASIC) if self._types <= set(BASIC_TYPES)
-                                   else _whole_plotly())
-        if self._has_board:
-            libraries['uplot'] = _packed(CURVES)
-        library = ''.join(f'<script type="text/plain" id="{name}">{packed}</script>'
-                          for name, packed in libraries.items())
-        where = (f'<script type="importmap">{_import_map(self._modules)}</script>'
-                 if self._modules else '')
-        styles = ['board.css', 'page.css'] if self._has_board else ['page.css']
-        style = ''.join(map(asset, styles)) + (vendored(CURVES_STYLE) if self._has_board else '')
+            library = f'<script type="text/plain" id="plotly">{_packed(BASIC)}</script>'
         return ('<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
                 '<meta name="viewport" content="width=device-width, initial-scale=1">'
-                f'<title>{escape(self._title)}</title><style>{style}</style>'
-                f'{where}</head><body><header><h1>{escape(self._title)}</h1></header>'
+                f'<title>{escape(self._title)}</title><style>{asset("page.css")}</style>'
+                f'</head><body><header><h1>{escape(self._title)}</h1></header>'
                 f'<main>{"".join(self._body)}</main>'
                 f'{library}<script>{asset("page.js")}</script></body></html>\n')
 
@@ -299,14 +259,6 @@ def _packed(name: str) -> str:
 
 
 @cache
-def _whole_plotly() -> str:
-    """Return plotly.js as it comes with plotly, compressed, in letters."""
-    from plotly.offline import get_plotlyjs
-
-    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
-
-
-@cache
 def assets() -> frozenset[str]:
     """Return the names of what `asset` has."""
     return frozenset(one.name for one in files('pprs_dynamics.app').joinpath('browser').iterdir())
@@ -323,14 +275,3 @@ def vendored(name: str) -> str:
     """Return a library's style or script."""
     content = files('pprs_dynamics.app.report').joinpath(name).read_bytes()
     return (gzip.decompress(content) if name.endswith('.gz') else content).decode()
-
-
-def _import_map(names: Iterable[str]) -> str:
-    """Return where modules are, for a page that no server stands behind: in the page itself.
-
-    A module in a `data:` address has no folder that `./` could count from, hence other names.
-    """
-    inside = {name: asset(name).replace("from './", f"from '{FOLDER}") for name in sorted(names)}
-    return json.dumps({'imports': {
-        FOLDER + name: f'data:text/javascript;base64,{base64.b64encode(text.encode()).decode()}'
-        for name, text in inside.items()}})

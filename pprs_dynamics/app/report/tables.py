@@ -8,13 +8,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from pprs_dynamics.app.report import charts
+from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.terminal import escape, stacked, text_table
-from pprs_dynamics.drives import CHANNELS
+from pprs_dynamics.drives import CHANNELS, common_unit
 from pprs_dynamics.system.plain_text import counted
 
 if TYPE_CHECKING:
     from pprs_dynamics.drives import DriveUnits
-    from pprs_dynamics.measurement.files.recording import Summary
+    from pprs_dynamics.measurement.files.recording import Recording, Summary
     from pprs_dynamics.physics.model.reproduction import Claim
     from pprs_dynamics.simulation.drive_control import Note
 
@@ -64,3 +66,18 @@ def simulation_view(samples: int, rate: float, hidden: int, notes: Iterable[Note
     told = [f'[yellow]{note.time:.2f} s {note.code}[/]: {escape(note.message)}' for note in notes]
     return stacked(*told, f'{samples} samples at {rate:g} Hz, {hidden} hidden effect'
                    f'{"s" * (hidden != 1)}')
+
+
+def recording_page(recording: Recording, units: Sequence[DriveUnits]) -> Page:
+    """Return a page with positions and efforts of every drive over time."""
+    page = Page(recording.name)
+    for what, unit, values in (('position', 'm', recording.position),
+                               ('effort', 'N', recording.effort)):
+        curves = []
+        for k, name in enumerate(recording.drives):
+            time, shown = charts.thinned(recording.time, values[:, k])
+            curves.append(charts.trace(time, shown, name, charts.LINES[k % len(charts.LINES)]))
+        figure = charts.figure(curves, 320, yaxis_title=f'{what} [{common_unit(units, unit)}]',
+                               xaxis_title='time [s]')
+        page.figure(figure, f'{what.capitalize()} of every drive.', over_time=True)
+    return page

@@ -6,9 +6,12 @@
 from __future__ import annotations
 
 import io
+import sys
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
+from threading import Event, Thread
+from time import monotonic
 from typing import Any
 
 from pprs_dynamics.errors import MissingLibraryError
@@ -16,6 +19,8 @@ from pprs_dynamics.system.plain_text import PLAIN, displayed
 
 # A notebook's output cell: what it shows has the width and the font of a terminal.
 HTML = '<pre style="line-height:1.2;white-space:pre;overflow-x:auto">{code}</pre>'
+
+LOGGED_EVERY = 10.0  # [s] between lines of progress in a log
 
 
 def console(**options: Any) -> Any:
@@ -135,23 +140,23 @@ def titled_table(title: str, table: PlainTable, right: Collection[int] | None = 
 
 @contextmanager
 def staged_bar(console: Any) -> Iterator[Callable[[str, float], None]]:
-    """Show a bar while the block lasts; call the given function with (stage, share done).
+    """Show progress while the block lasts; call the given function with (stage, share done).
 
-    Each stage has a bar of its own in place of the one before; none goes back.
+    In a terminal a bar for each stage, elsewhere a line on stderr every ten seconds.
     """
     from rich import progress
 
-    with _bar(console, progress.TextColumn('{task.percentage:3.0f} %'),
+    stage, furthest = 'starting', 0.0
+    with _bar(console, lambda: f'{stage} {furthest:.0%}', progress.TaskProgressColumn(),
               progress.TimeElapsedColumn()) as bar:
-        task, stage, furthest = None, '', 0.0
+        task = bar.add_task(stage, total=1.0, visible=False)
 
         def advance(what: str, share: float) -> None:
-            nonlocal task, stage, furthest
-            if task is None or what != stage:
-                if task is not None:
-                    bar.remove_task(task)
-                task, stage, furthest = bar.add_task(what, total=1.0), what, 0.0
-            furthest = max(furthest, share)
+            nonlocal stage, furthest
+            if what != stage:
+                bar.reset(task, description=what, visible=True)
+                stage, furthest = what, 0.0
+            furthest = max(furthest, share)  # a bar never goes back
             bar.update(task, completed=furthest)
 
         yield advance
@@ -159,24 +164,38 @@ def staged_bar(console: Any) -> Iterator[Callable[[str, float], None]]:
 
 @contextmanager
 def counting_bar(console: Any, what: str, total: int) -> Iterator[Callable[[], None]]:
-    """Show a bar with count, rate and remaining time; call the given function for each done."""
+    """Show count and remaining time as `staged_bar`; call the given function for each done."""
     from rich import progress
-    from rich.text import Text
 
-    class Rate(progress.ProgressColumn):
-        def render(self, task: progress.Task) -> Text:
-            return Text(f'{60 * task.speed:.0f}/min' if task.speed else '')
-
-    with _bar(console, progress.MofNCompleteColumn(), Rate(),
+    done = 0
+    with _bar(console, lambda: f'{done} of {total} {what}', progress.MofNCompleteColumn(),
               progress.TimeRemainingColumn()) as bar:
         task = bar.add_task(what, total=total)
-        yield lambda: bar.update(task, advance=1)
+
+        def advance() -> None:
+            nonlocal done
+            done += 1
+            bar.update(task, advance=1)
+
+        yield advance
 
 
-def _bar(console: Any, *columns: Any) -> Any:
-    """Return rich's progress with a bar, and further columns beside it."""
+@contextmanager
+def _bar(console: Any, state: Callable[[], str], *columns: Any) -> Iterator[Any]:
+    """Give rich's progress; without a terminal print the state on stderr every ten seconds."""
     from rich.progress import BarColumn, Progress, TextColumn
 
-    # In a file or a pipe it would leave an empty line.
-    return Progress(TextColumn('{task.description}', markup=False), BarColumn(), *columns,
-                    console=console, transient=True, disable=not console.is_terminal)
+    began, over = monotonic(), Event()
+
+    def log() -> None:
+        while not over.wait(LOGGED_EVERY):
+            print(f'{state()} after {monotonic() - began:.0f} s', file=sys.stderr, flush=True)
+
+    with Progress(TextColumn('{task.description}', markup=False), BarColumn(), *columns,
+                  console=console, transient=True, disable=not console.is_terminal) as bar:
+        if not console.is_terminal:
+            Thread(target=log, daemon=True).start()
+        try:
+            yield bar
+        finally:
+            over.set()

@@ -23,7 +23,7 @@ from pprs_dynamics.app.workbench.long_work import DesignedMotion, designed, diag
 from pprs_dynamics.app.workbench.masks import Mask, quantity, region_mask, shares_in, span_mask
 from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
 from pprs_dynamics.app.workbench.tick_fits import Place, Tick, TickFits
-from pprs_dynamics.app.workbench.view_state import DriveError, Share, ViewState
+from pprs_dynamics.app.workbench.view_state import NOT_KNOWN, DriveError, Share, ViewState
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt, original
@@ -313,10 +313,8 @@ class Session:
 
     @property
     def noise(self) -> dict[str, float]:
-        """The rms of every drive's noise [N]: the diagnosis', or a first guess before it."""
-        if self.noise_floors is not None:
-            return self.noise_floors
-        return self.fits.quiet_noise(self.view_state.free)
+        """The rms of every drive's noise [N] by the diagnosis; empty before it."""
+        return self.noise_floors or {}
 
     def errors(self) -> dict[str, DriveError]:
         """Return the error of every drive that was measured: before, now, and of the noise."""
@@ -327,7 +325,8 @@ class Session:
         """Return the error over all samples and drives."""
         return DriveError(root_mean_square(self.given_residual),
                           root_mean_square(self.current_residual),
-                          root_mean_square(list(self.noise.values())))
+                          root_mean_square(list(self.noise.values())) if self.noise
+                          else NOT_KNOWN)
 
     @property
     def steps(self) -> list[Step]:
@@ -678,7 +677,7 @@ class Session:
                 'revision': self.revision, 'fitted_since': self.fitted_since, 'stage': view.stage,
                 'is_settled': view.is_settled, 'is_approximate': view.is_approximate,
                 'departure': finite(view.departure), 'notice': view.notice,
-                'drives': list(self.drives), 'noise_is_guess': self.noise_floors is None,
+                'drives': list(self.drives),
                 'errors': {name: one.to_dict() for name, one in self.errors().items()},
                 'overall': self.overall().to_dict(), **view_state.units_to_dict(self.model),
                 'effects': [

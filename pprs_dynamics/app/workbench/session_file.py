@@ -109,7 +109,7 @@ class SavedSession:
         text = read_text(path)
         try:
             found = json.loads(text)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise UnreadableFileError(path, f'cannot be read as a session: {error}') from None
         if not isinstance(found, dict) or found.get('format') != FORMAT:
             raise UnreadableFileError(path, f'is no session, must have the format {FORMAT!r}, as '

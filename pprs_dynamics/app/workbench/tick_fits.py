@@ -28,7 +28,7 @@ from pprs_dynamics.inference.search.estimates import Estimate, estimate
 from pprs_dynamics.inference.search.fitted_model import exact_forces, fitted_model, linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.relinearisation import relinearised
-from pprs_dynamics.inference.search.scan import Scan, with_fast_noise
+from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -288,12 +288,3 @@ class TickFits:
             parameters = {c.name: estimate(fits, found, c, True).parameters for c in found.effects}
         model = fitted_model(fits, found)
         return Exact(model, self.measured - exact_forces(fits.design, model), parameters)
-
-    def quiet_noise(self, found: CandidateSet) -> dict[str, float]:
-        """Return a first guess of every drive's noise [N]: the fast part of what a fit calls noise.
-
-        The slow part may be what is missing.
-        """
-        regression = self.fits.regression
-        fast = with_fast_noise(regression, found.fit)
-        return {self.drives[d]: regression.noise_floor(fast, d) for d in regression.drives}

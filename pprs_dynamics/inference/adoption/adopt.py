@@ -31,11 +31,9 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.paired_errors import PairedGain, paired_gain, rms
-from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.residuals.residuals import Residuals, rms
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
-from pprs_dynamics.inference.search.fitted_model import linear_error
+from pprs_dynamics.inference.search.held_out import predictive_gain
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -117,9 +115,11 @@ def adopt(
         return case.without_model(f'{request.name} cannot act on what the recordings show')
     before, after = case.residuals(fitted.model)
     found = [*objections.of_other_effects(request, fitted, diagnosis),
-             *objections.of_identifiability(fitted), *objections.of_physics(fitted, after)]
+             *objections.of_constraints(fitted, after, diagnosis.decisions)]
     rivals = tuple(name for names in diagnosis.indistinguishable if request.name in names
                    for name in names if name != request.name)
+    if named is None and not rivals and objections.is_rival(request, fitted, diagnosis):
+        rivals = (diagnosis.effects[0].name,)
     remarks = [f'{", ".join(rivals)} would explain these recordings as well'] if rivals else []
     remarks += [f'{", ".join(fitted.at_bound)} stands at the edge of what was tried'
                 ] if fitted.at_bound else []
@@ -131,12 +131,17 @@ def adopt(
     if others and named:
         remarks.append(f'the recordings call for {", ".join(others)}, too')
     if validate:
-        held_out, gain = case.validated(fitted.plain, fitted.model, diagnosis.noise)
+        # What the model's own numbers gain by being fitted is not the effect's.
+        given, without, with_it = case.beyond(validate, model, fitted.plain, fitted.model)
+        held_out, gain = (rms(given), rms(with_it)), predictive_gain(without, with_it)
     else:
-        held_out, gain = (fitted.held_out_before, fitted.held_out_after), fitted.gain
-    promised = linear_error(fitted.fits, fitted.fitted)
-    found += [*objections.of_linearity(promised, rms(after), after.unit),
-              *objections.of_held_out_error(*held_out, gain, model, case.held_out)]
+        without, with_it = (one.residuals for one in fitted.held_out)
+        held_out = fitted.held_out[0].error, fitted.held_out[1].error
+        gain = fitted.held_out[0].gain(fitted.held_out[1])
+    # Columns of shapes hold near the model only: the fitted model itself must do better, too.
+    found += objections.of_prediction(
+        predictive_gain(before, after), before, after, model, 'the recordings'
+        ) or objections.of_prediction(gain, without, with_it, model, case.held_out)
     report(1.0)
     return case.answer(fitted.model, fitted.drives, found, [*remarks, *case.weakness(found)],
                        before, after, held_out, fitted.parameters, tuple(fitted.calibrated), rivals,
@@ -177,23 +182,16 @@ class _Case:
     def residuals(self, after: ForceModel) -> tuple[Residuals, Residuals]:
         """Return those of the model as given and of another on the recordings."""
         before = (self.diagnosis.residuals if self.start is self.model
-                  else self._beyond(self.recordings, self.model)[0])
-        return before, self._beyond(self.recordings, after)[0]
+                  else self.beyond(self.recordings, self.model)[0])
+        return before, self.beyond(self.recordings, after)[0]
 
-    def _beyond(self, recordings: Sequence[Recording], *models: ForceModel) -> list[Residuals]:
+    def beyond(self, recordings: Sequence[Recording], *models: ForceModel) -> list[Residuals]:
         """Return the residuals of models, less what the reference shows as well."""
         found = [measure_residuals(one, recordings)[0] for one in models]
         if self.reference is None:
             return found
         shown = self.reference.shown_by(recordings)
         return [replace(one, measured=one.measured - shown) for one in found]
-
-    def validated(self, plain: ForceModel, fitted: ForceModel, noises: dict[str, NoiseSpectrum],
-                  ) -> tuple[tuple[float, float], PairedGain]:
-        """Return errors on the validation recordings, and what the effect gains."""
-        given, before, after = self._beyond(self.validate, self.model, plain, fitted)
-        # What the model's own numbers gain by being fitted is not the effect's.
-        return (rms(given), rms(after)), paired_gain(before, after, noises)
 
     def weakness(self, objections: list[str]) -> list[str]:
         """Return what to say of the evidence for an effect that nothing speaks against."""
@@ -202,8 +200,8 @@ class _Case:
 
     def without_model(self, reason: str) -> Adoption:
         """Return the refusal of an effect whose fit gives no model."""
-        (before,) = self._beyond(self.recordings, self.model)
-        held_out = rms(self._beyond(self.validate, self.model)[0] if self.validate else before)
+        (before,) = self.beyond(self.recordings, self.model)
+        held_out = rms(self.beyond(self.validate, self.model)[0] if self.validate else before)
         refused = self.answer(self.model, self.request.drives, [reason], [], before, before,
                               (held_out, held_out), {})
         return replace(refused, adopted=False, forced=False,
@@ -250,8 +248,8 @@ def _adopt_curve(case: _Case, request: CurveRequest, report: Callable[[float], N
     against = [] if evidence > 0 else [
         f'no curve over {request.variable} is called for on {drive}: evidence {evidence:.3g}, '
         'where 0 is the threshold']
-    against += objections.of_held_out_error(
-        *held_out, paired_gain(given, found, {drive: noise}), model, case.held_out)
+    against += objections.of_prediction(
+        predictive_gain(given, found), given, found, model, case.held_out)
     remarks = [f'a measured curve, not a cause: {fitted.freedom:.0f} degrees of freedom over '
                f'{request.variable} from {fitted.curve.start:.4g} to {fitted.curve.end:.4g}; '
                'beyond, it goes on with its last value']

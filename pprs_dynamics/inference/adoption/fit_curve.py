@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A curve over one variable, fitted to what a model leaves of a drive's error.
+"""A curve over one variable, fitted to a drive's residual.
 
 The curve is a B-spline with a prior on its roughness (Eilers & Marx, Flexible smoothing with
 B-splines and penalties, Statistical Science 11, 1996). Number of knots and smoothness maximise the

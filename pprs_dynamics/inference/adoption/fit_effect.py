@@ -15,7 +15,6 @@ from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.carried_over import CarriedOver
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.residuals.paired_errors import PairedGain
 from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import (
@@ -27,7 +26,7 @@ from pprs_dynamics.inference.search.estimates import (
 )
 from pprs_dynamics.inference.search.fitted_model import fitted_model
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.held_out import hold_out
+from pprs_dynamics.inference.search.held_out import HeldOut, hold_out
 from pprs_dynamics.inference.search.relinearisation import SettledSet, relinearised
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths
 from pprs_dynamics.inference.search.search import Search
@@ -66,15 +65,11 @@ class EffectFit:
     calibrated : list of Calibration
     evidence : float
         By which the cost falls with the effect.
-    own_share : float
-        The least share of its force's square on a place that nothing else in the model explains.
     fits : FittedSets
         Around the model with the effect.
     fitted : CandidateSet
-    held_out_before, held_out_after : float
-        Over blocks, each predicted from the others [N].
-    gain : PairedGain
-        What the effect takes off the whitened squared error of held-out blocks.
+    held_out : tuple of HeldOut
+        Blocks of the recordings, each predicted from the others, without the effect and with it.
     nothing_left : tuple of str
         What keys of parameters begin with where the model had the effect and recordings leave
         nothing of it: a drive, a link, or nothing for all of it. `model` has it there no more.
@@ -90,12 +85,9 @@ class EffectFit:
     at_bound: tuple[str, ...]
     calibrated: list[Calibration]
     evidence: float
-    own_share: float
     fits: FittedSets
     fitted: CandidateSet
-    held_out_before: float
-    held_out_after: float
-    gain: PairedGain
+    held_out: tuple[HeldOut, HeldOut]
     nothing_left: tuple[str, ...] = ()
     moments: Mapping[str, Estimate] = field(default_factory=dict)
 
@@ -128,12 +120,9 @@ def fit_effect(
     report(0.6)
     if found is None:
         return None
-    share = min((fits.regression.own_share(without.fit, block, found.fit.of(block))
-                 for block in found.blocks.values() if block.mean is None), default=1.0)
-    before = hold_out(fits, without)
     # At the noise of the fit with the effect, so that losses of both are comparable.
     plain_set = replace(without, fit=fits.regression.at((), found.fit.amplitudes))
-    plain_held_out = hold_out(fits, plain_set)
+    before = hold_out(fits, plain_set)
     evidence = without.cost - found.cost
     last, found = relinearised(fits, found)
     report(0.8)
@@ -153,8 +142,7 @@ def fit_effect(
     report(1.0)
     return EffectFit(
         request, design.named(candidate.drives), final, fitted_model(fits, plain_set), parameters,
-        said.at_bound, moved, evidence, share, last, found, before.error, after.error,
-        plain_held_out.gain(after), nothing, said.moments)
+        said.at_bound, moved, evidence, last, found, (before, after), nothing, said.moments)
 
 
 def _numbers(design: Design, request: EffectRequest) -> tuple[int, ...] | None:

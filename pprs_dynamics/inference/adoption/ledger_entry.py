@@ -12,7 +12,7 @@ from os import PathLike
 
 from pprs_dynamics import __version__
 from pprs_dynamics.inference.adoption.adoption import Adoption
-from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
+from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The whole way: diagnose, adopt, diagnose again, until nothing more can be told."""
+"""The adoption loop: diagnose, adopt, diagnose again, until nothing is reported."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def adopt_all(
     progress: Callable[[str, float], None] | None = None, diagnosis: Diagnosis | None = None,
     reference: Reference | None = None,
 ) -> AdoptionRun:
-    """Adopt what recordings call for, until a diagnosis finds nothing, or cannot tell.
+    """Adopt the reported effects until a diagnosis reports nothing or is ambiguous.
 
     Of effects that explain the recordings alike, the best is adopted as the last: it lowers the
     error, and which of them it is another recording must show. What is refused is left out
@@ -127,7 +127,7 @@ def adopt_all(
         refused.clear()
         if step.rivals:
             reason = (f'{", ".join(step.rivals)} would explain these recordings as well as {name}: '
-                      'pprs next-experiment tells which motion separates them')
+                      'pprs next-experiment designs the motion that separates them')
             return AdoptionRun(tuple(steps), AMBIGUOUS, reason, model, diagnosis)
         diagnosis = None
 

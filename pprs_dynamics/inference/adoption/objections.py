@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.drives import common_effort
-from pprs_dynamics.inference.adoption.fit_effect import SURE, EffectFit
+from pprs_dynamics.inference.adoption.fit_effect import EffectFit
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.quantities import as_fitted, with_uncertainty
-from pprs_dynamics.inference.residuals.paired_errors import PairedGain
-from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.estimates import Estimate
+from pprs_dynamics.inference.diagnosis.quantities import change
+from pprs_dynamics.inference.residuals.residuals import Residuals, rms_by_drive
+from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.inference.search.held_out import PredictiveGain
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.force_model import (
@@ -26,176 +25,125 @@ from pprs_dynamics.physics.model.force_model import (
 )
 
 MOVING = 5.0  # widths in which friction turns over
-BENT = 1.5  # error of a fitted model over that of its linear fit
 PUSHES = 0.1  # of the moving time, in which a drive's friction may give power back
 # Standard errors by which the first effect, and further ones, must gain.
 FIRST_ERRORS, FURTHER_ERRORS = 1.0, 2.0
-OWN_SHARE = 1e-6  # of a column's whitened square, below which nothing tells its coefficient
 
 
 def of_other_effects(request: EffectRequest, fitted: EffectFit, diagnosis: Diagnosis) -> list[str]:
-    """Return whether the recordings call for another effect, or for none."""
+    """Return why the diagnosis does not report this effect where it was asked for.
+
+    A rival within the margin of the diagnosis is no reason: the recordings cannot separate it from
+    the reported effect.
+    """
     mine = next((one for one in diagnosis.effects if one.name == request.name), None)
     if mine is not None and mine.course is not None:
         return [f'it is there{mine.when}, and a model has it throughout: record the machine as it '
                 'is now']
-    if mine is not None:
-        missed = [drive for drive in fitted.drives or () if drive not in (mine.drives or ())]
-        if mine.drives and missed:
-            return [f'the recordings show {request.name} on {", ".join(mine.drives)}, not on '
-                    f'{", ".join(missed)}']
-        return _evidence(fitted, diagnosis)
-    if any(request.name in names for names in diagnosis.indistinguishable):
-        return _evidence(fitted, diagnosis)
-    if diagnosis.effects:
+    missed = [] if mine is None or not mine.drives else [
+        drive for drive in fitted.drives or () if drive not in mine.drives]
+    if mine is not None and missed:
+        return [f'the recordings show {request.name} on {", ".join(mine.drives or ())}, not on '
+                f'{", ".join(missed)}']
+    if fitted.evidence > 0 and (mine is not None or is_rival(request, fitted, diagnosis)):
+        return []
+    if diagnosis.effects and fitted.evidence <= 0 and diagnosis.effects[0] is not mine and mine:
+        return [f'it shows only beside {diagnosis.effects[0].name}: adopt that first (evidence '
+                f'{fitted.evidence:.3g} without it, where 0 is the threshold)']
+    if diagnosis.effects and mine is None:
         best = diagnosis.effects[0]
         on = f' on {", ".join(best.drives)}' if best.drives else ''
         return [f'{best.name}{on} explains these recordings better: evidence '
-                f'{best.evidence:.3g} against {fitted.evidence:.3g}']
-    if diagnosis.depends_on:
+                f'{_evidence_alone(best.name, diagnosis):.5g} against {fitted.evidence:.5g}']
+    if mine is None and diagnosis.depends_on:
         return [f'no effect of the catalogue has the form of the error: '
                 f'{diagnosis.depends_on[0].text}']
     if request.present(fitted.plain):
         return [f'{request.name} is in the model already, and these recordings call for no other '
                 f'numbers: evidence {fitted.evidence:.3g}, where 0 is the threshold']
-    suspect = any(one.name == request.name for one in diagnosis.suspects)
-    if fitted.evidence > 0 and not suspect:
-        return ['it does not predict parts of the recordings that it was not fitted to']
-    why = ': slow noise would explain it as well; repeat the recording' if suspect else ''
-    return [f'these recordings do not call for it: evidence {fitted.evidence:.3g}, where 0 is the '
-            f'threshold{why}']
+    return [f'these recordings do not call for {request.name}: evidence {fitted.evidence:.3g}, '
+            'where 0 is the threshold']
 
 
-def _evidence(fitted: EffectFit, diagnosis: Diagnosis) -> list[str]:
-    if fitted.evidence > 0:
-        return []
-    first = diagnosis.effects[0]
-    if first.name != fitted.request.name:
-        return [f'it shows only beside {first.name}: adopt that first (evidence '
-                f'{fitted.evidence:.3g} without it, where 0 is the threshold)']
-    return [f'on {", ".join(fitted.drives or ("the structure",))} the evidence is '
-            f'{fitted.evidence:.3g}, where 0 is the threshold']
+def is_rival(request: EffectRequest, fitted: EffectFit, diagnosis: Diagnosis) -> bool:
+    """Return whether an effect explains the recordings as well as the first reported one."""
+    if not diagnosis.effects:
+        return False
+    return any(request.name in names for names in diagnosis.indistinguishable) or (
+        fitted.evidence > _evidence_alone(diagnosis.effects[0].name, diagnosis)
+        - diagnosis.decisions.rival_margin)
 
 
-def of_held_out_error(before: float, after: float, gain: PairedGain, model: ForceModel,
-                      where: str) -> list[str]:
-    """Return whether the error on held-out data fails to fall beyond its uncertainty.
+def _evidence_alone(name: str, diagnosis: Diagnosis) -> float:
+    """Return the evidence for a reported effect as the only one."""
+    return next((one.evidence for one in diagnosis.candidates if one.name == name),
+                next(one.evidence for one in diagnosis.effects if one.name == name))
+
+
+def of_prediction(gain: PredictiveGain, before: Residuals, after: Residuals, model: ForceModel,
+                  where: str) -> list[str]:
+    """Return why an effect does not lower the error beyond its uncertainty; nothing if it does.
 
     Parameters
     ----------
-    before, after : float
-        [N]
-    gain : PairedGain
-        Of the fitted model.
+    gain : PredictiveGain
+        Of the model with the effect.
+    before, after : Residuals
+        Of the two models, for the sentence.
     model : ForceModel
         As given: more is asked where it has effects already.
     where : str
-        What was held out, for the sentence.
+        What was predicted, for the sentence.
     """
-    unit = common_effort(model.units)
-    sure = gain.certainty
     asked = FURTHER_ERRORS if any(
         isinstance(effect, CatalogueEffect) for effect in model.effects) else FIRST_ERRORS
-    if after < before and sure > asked:
+    if gain.confirms(asked):
         return []
-    if after >= before:
-        return [f'the error on {where} does not fall: {before:.4g} {unit} before, '
-                f'{after:.4g} {unit} after']
-    return [f'the error on {where} falls from {before:.4g} to {after:.4g} {unit}, which is '
-            f'{sure:.2g} standard errors, must be more than {asked:g}']
+    if gain.losing:
+        drive = min(gain.losing, key=lambda name: gain.by_drive[name])
+        return [f'{word_change(drive, where, before, after)}, and is predicted worse by '
+                f'{-gain.by_drive[drive]:.2g} standard errors']
+    drive = max(gain.by_drive, key=lambda name: gain.by_drive[name])
+    return [f'{word_change(drive, where, before, after)}; all drives are predicted better by '
+            f'{gain.certainty:.2g} standard errors, must be more than {asked:g}']
 
 
-def of_linearity(promised: float, found: float, unit: str) -> list[str]:
-    """Return whether a fitted model is far from the linear fit that it was made of.
-
-    Columns of shapes and of numbers that bend forces hold near the model only.
-
-    Parameters
-    ----------
-    promised, found : float
-        Error on the recordings, of the linear fit and of the model.
-    unit : str
-    """
-    if found <= BENT * promised:
-        return []
-    return [f'fitted with it, the model would leave {found:.4g} {unit} where the fit promises '
-            f'{promised:.4g} {unit}: its parameters are too far from where they started']
+def word_change(drive: str, where: str, before: Residuals, after: Residuals) -> str:
+    """Return 'the error of DRIVE on WHERE falls from A to B', or that it does not fall."""
+    given, found = (rms_by_drive(one)[drive] for one in (before, after))
+    return f'the error of {drive} on {where} {change(given, found, before.units_of(drive).effort)}'
 
 
-def of_identifiability(fitted: EffectFit) -> list[str]:
-    """Return whether the recordings tell the parameters at all."""
-    if fitted.own_share < OWN_SHARE:
-        return [f'these recordings cannot tell {fitted.request.name} from what the model has: of '
-                f'its square only {fitted.own_share:.1e} is its own']
+def of_constraints(fitted: EffectFit, after: Residuals, decisions: Decisions) -> list[str]:
+    """Return whether the recordings call for values that no machine has."""
     if fitted.nothing_left:
-        return []  # that is what they tell
-    effect = fitted.request.effect
-    angles = {p.name for p in fitted.request.effect.parameters if p.is_angle}
-
-    def is_angle(key: str) -> bool:
-        return effect.place_and_parameter(key)[1] in angles
-
-    told = {key: one for key, one in fitted.parameters.items()
-            if not is_angle(key) and one.value != 0.0}
-    vague = [key for key, one in told.items() if abs(one.value) < SURE * one.std]
-    linear = {p.name for p in fitted.request.effect.linear or fitted.request.effect.shape}
-    sizes = [key for key in told if effect.place_and_parameter(key)[1] in linear] or list(told)
-    if sizes and all(key in vague for key in sizes):
-        scales = {p.name: p.scale for p in effect.parameters}
-        shown = '; '.join(f'{key} = ' + as_fitted(
-            told[key].value, told[key].std, told[key].unit,
-            scales[effect.place_and_parameter(key)[1]]) for key in sizes[:3])
-        return [f'its parameters are not identifiable from these recordings: {shown}']
-    return []
-
-
-def of_physics(fitted: EffectFit, after: Residuals) -> list[str]:
-    """Return whether friction would push, or a stiffness or inertia be negative."""
-    bounds = {} if fitted.nothing_left else fitted.request.effect.unphysical_below
-    low = {}
-    for key, one in fitted.parameters.items():
-        bound = bounds.get(fitted.request.effect.place_and_parameter(key)[1])
-        if bound is not None and one.value + SURE * one.std < bound:
-            low[key] = one
-    if not low:
         return []
-    first = next(iter(low))
-    told = f'{first} would be {_with_interval(low[first])}'
+    cost = fitted.fitted.terms.feasibility
+    if cost > decisions.rival_margin:
+        return [f'the recordings call for values of {fitted.request.name} that no machine has: '
+                f'possible values cost {cost:.3g} more']
     if not fitted.request.effect.is_friction:
-        return [f'{told}, must not be negative']
-    pushing = _pushing_drives(fitted.model, after)
-    if fitted.drives is None:
-        shares = pushing.get('', 0.0)
-        return [] if shares < PUSHES else [
-            f'{told}: with all friction of the model, the joints would give power back in '
-            f'{shares:.0%} of the moving time']
-    worst = {drive: pushing[drive] for drive in fitted.drives
-             if pushing[drive] >= PUSHES and any(key.startswith(f'{drive}.') for key in low)}
-    if not worst:
         return []
-    drive = max(worst, key=lambda name: worst[name])
-    return [f'{told}: with all friction of the model, friction on {drive} would push along the '
-            f'motion in {worst[drive]:.0%} of the moving time']
+    shares = _pushing(fitted.model, after)
+    places = fitted.drives or ('',)
+    worst = max(places, key=lambda place: shares[place])
+    where = f'friction on {worst} would push along the motion' if worst else (
+        'the joints would give power back')
+    return [] if shares[worst] < PUSHES else [
+        f'with {fitted.request.name}, {where} in {shares[worst]:.0%} of the moving time']
 
 
-def _pushing_drives(model: ForceModel, residuals: Residuals) -> dict[str, float]:
+def _pushing(model: ForceModel, residuals: Residuals) -> dict[str, float]:
     """Return the share of the moving time with negative friction power, by drive; '' is all."""
-    own = np.zeros(residuals.model.shape)
-    passive = np.zeros(residuals.model.shape)
+    own, passive = np.zeros((2, *residuals.model.shape))
     for effect in model.effects:
-        part = residuals.parts.get(effect.name)
-        if part is None:
+        if effect.name not in residuals.parts:
             continue
-        if effect.name == ACTIVE_FRICTION:
-            own += part
-        elif effect.name == PASSIVE_FRICTION:
-            passive += part
-        elif (isinstance(effect, CatalogueEffect) and effect.unphysical_below
-              and effect.is_friction):
-            if isinstance(effect, DriveEffect):
-                own += part
-            else:
-                passive += part
+        is_friction = isinstance(effect, CatalogueEffect) and effect.is_friction
+        if effect.name == ACTIVE_FRICTION or (is_friction and isinstance(effect, DriveEffect)):
+            own += residuals.parts[effect.name]
+        elif effect.name == PASSIVE_FRICTION or is_friction:
+            passive += residuals.parts[effect.name]
     velocity = residuals.variables['velocity']
     moving = np.abs(velocity) > MOVING * np.asarray(model.reversal.velocity)
     shares = {drive: _share(own[:, d] * velocity[:, d] < 0, moving[:, d])
@@ -207,7 +155,3 @@ def _pushing_drives(model: ForceModel, residuals: Residuals) -> dict[str, float]
 def _share(true: Any, among: Any) -> float:
     count = int(among.sum())
     return float((true & among).sum()) / count if count else 0.0
-
-
-def _with_interval(one: Estimate) -> str:
-    return with_uncertainty(one.value, one.std, one.unit)

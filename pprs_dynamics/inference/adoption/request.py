@@ -11,14 +11,9 @@ from dataclasses import dataclass, replace
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import PprsError, suggestion
 from pprs_dynamics.inference.adoption.fit_curve import CurveRequest
-from pprs_dynamics.physics.effects.catalogue import (
-    REPLACED,
-    catalogue,
-    find_effect,
-)
+from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.effects.former_names import told_general_name
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
 from pprs_dynamics.physics.model.force_model import ForceModel
 
@@ -64,11 +59,8 @@ class EffectRequest:
         EffectRequestError
             For an effect or a drive that does not exist.
         """
-        effect = find_effect(told_general_name(name))
+        effect = find_effect(name)
         if effect is None:
-            if name in REPLACED:
-                raise EffectRequestError(f'unknown effect {name!r}, must be one of the catalogue: '
-                                         f'use {REPLACED[name]}')
             raise EffectRequestError(f'unknown effect {name!r}{suggestion(name, catalogue())}, '
                                      f'must be one of {", ".join(catalogue())}')
         if on is None:

@@ -30,7 +30,7 @@ from pprs_dynamics.inference.diagnosis.statements import (
 )
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.paired_errors import paired_gain, rms
+from pprs_dynamics.inference.residuals.residuals import rms
 from pprs_dynamics.inference.search.absorbed import Absorbed
 from pprs_dynamics.inference.search.candidates import (
     DURING,
@@ -39,6 +39,7 @@ from pprs_dynamics.inference.search.candidates import (
     CandidateSet,
     EffectCandidate,
 )
+from pprs_dynamics.inference.search.constraints import empty_totals
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.courses import changing_drives, with_courses
 from pprs_dynamics.inference.search.decisions import Decisions
@@ -58,9 +59,8 @@ from pprs_dynamics.inference.search.fitted_model import (
     parts_of,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.held_out import hold_out
+from pprs_dynamics.inference.search.held_out import hold_out, predictive_gain
 from pprs_dynamics.inference.search.noise_floors import noise_floors
-from pprs_dynamics.inference.search.possible_totals import left_at_nothing
 from pprs_dynamics.inference.search.possible_values import why_impossible
 from pprs_dynamics.inference.search.ranking import Ranking
 from pprs_dynamics.inference.search.relinearisation import settled
@@ -212,7 +212,7 @@ class Answer:
         return next((f'{self.drives[component.drive]} would have less than no {of} with what the '
                      'model has' for component in candidate.components
                      if component.drive is not None
-                     for of in left_at_nothing(self.design, self.reported, component)), '')
+                     for of in empty_totals(self.design, self.reported, component)), '')
 
     def _dated_effects(self) -> list[FoundEffect]:
         """Return the effects where some begin, end or grow within the recordings."""
@@ -311,9 +311,7 @@ class Answer:
             return hold_out(self.fits, at_noise).gain(hold_out(self.fits, self.reported)).certainty
         before, after = (measure_residuals(one, self.validate)[0] for one in (
             settled(self.fits, without).model, self.final.model))
-        noise = {self.drives[d]: spectrum for d, spectrum in self.fits.regression.noise(
-            self.reported.fit).items()}
-        return paired_gain(before, after, noise).certainty
+        return predictive_gain(before, after).certainty
 
     def _above_noise(self, floors: Mapping[str, float]) -> dict[str, float]:
         """Return the drives that keep more than noise and forms leave, as multiples of noise."""

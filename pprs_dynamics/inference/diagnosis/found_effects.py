@@ -103,7 +103,7 @@ class FoundEffect(FittedEffect):
         over drives, each as a multiple of its noise.
     certainty : float
         Standard errors by which all that was found predicts held-out data better than without it,
-        in units of the noise: see `PairedGain`. In their rms slow noise and the model's own
+        in units of the noise: see `PredictiveGain`. In their rms slow noise and the model's own
         numbers have a share.
     objection : str
         Why it is no finding whatever the error does, as a clause; '' where nothing speaks against.

@@ -32,8 +32,7 @@ from pprs_dynamics.inference.diagnosis.quantities import (
 )
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.paired_errors import paired_gain, sample_gains
+from pprs_dynamics.inference.search.held_out import predictive_gain, sample_gains
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -127,8 +126,6 @@ class Window:
         The model with what was found, and its numbers as the fit moves them.
     plain : ForceModel
         The same without what was found.
-    noise : mapping of str to NoiseSpectrum
-        By drive.
     """
 
     recording: Recording
@@ -137,7 +134,6 @@ class Window:
     diagnosis: Mapping[str, Any]
     adopted: ForceModel
     plain: ForceModel
-    noise: Mapping[str, NoiseSpectrum]
 
 
 @dataclass(frozen=True)
@@ -225,11 +221,10 @@ class LiveDiagnosis:
         if share_in_motion(recording.time, recording.position, live.moving) < live.least_motion:
             return replace(self, withdrawn=(), note='the robot stands: nothing is fitted')
         answer = diagnose(self.model, [recording], reference=self.reference)
-        noise = answer.noise
         window = Window(recording, start, start + float(recording.time[-1] - recording.time[0]),
                         answer.to_dict(), answer.adopted,
-                        without_found(self.model, answer), noise)
-        holds = self._holds(recording, noise, live.certainty)
+                        without_found(self.model, answer))
+        holds = self._holds(recording, live.certainty)
         beginning = cache(lambda: self._beginning(window))
         effects = []
         for found in answer.effects:
@@ -249,8 +244,7 @@ class LiveDiagnosis:
                        recent=(*self.recent, (recording, start))[-live.recent:],
                        withdrawn=() if holds else tuple(missed))
 
-    def _holds(self, recording: Recording, noise: Mapping[str, NoiseSpectrum], least: float,
-               ) -> bool:
+    def _holds(self, recording: Recording, least: float) -> bool:
         """Return whether what the last window found predicts a recording better than without it.
 
         By more than some standard errors. Numbers known to a tolerance move with the fit: what
@@ -261,7 +255,7 @@ class LiveDiagnosis:
             return False
         after, _ = measure_residuals(self.last.adopted, [recording])
         return all(
-            paired_gain(measure_residuals(model, [recording])[0], after, noise).certainty > least
+            predictive_gain(measure_residuals(model, [recording])[0], after).confirms(least)
             for model in (self.model, self.last.plain))
 
     def _beginning(self, window: Window) -> float | None:
@@ -270,7 +264,7 @@ class LiveDiagnosis:
         for each, start in (*self.recent, (window.recording, window.start)):
             before, _ = measure_residuals(window.plain, [each])
             after, _ = measure_residuals(window.adopted, [each])
-            gains.append(sample_gains(before, after, window.noise)[0])
+            gains.append(sample_gains(before, after)[0].sum(axis=1))
             times.append(start + before.time - before.time[0])
         return change_point(np.concatenate(times), np.concatenate(gains))
 

@@ -16,6 +16,7 @@ import numpy as np
 from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN, MeasuredCurve
+from pprs_dynamics.physics.model.reference_keys import reference_files
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
     from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
@@ -93,17 +94,26 @@ def first_step(model: ForceModel, files: GivenFiles) -> tuple[str, str]:
     A description alone, without friction and with the maker's masses, is fitted first.
     """
     if model.is_described:
-        words = ('The model has no friction yet: fit inertia and friction first'
+        if _is_fitted(model):
+            return ('Check columns, units, signs and zeros, and that the file describes this '
+                    'machine: the model was fitted, and still explains little',
+                    files.command('info'))
+        words = ('The model has no friction yet. Fit inertia and friction first'
                  if _has_no_friction(model) else
-                 'Check units, signs and zeros, and that this is the model of this machine as it '
-                 'was recorded; then fit it')
+                 'Check units, signs and zeros, and that the file describes this machine. Then '
+                 'fit the model')
         return words, files.command('fit', '--output', files.output('base.yaml'))
-    return ('Check units, signs and zeros, and that this is the model of this machine as it was '
-            'recorded', files.command('info'))
+    return ('Check units, signs and zeros, and that the file describes this machine',
+            files.command('info'))
+
+
+def _is_fitted(model: ForceModel) -> bool:
+    return bool(reference_files(model.values, model.source))
 
 
 def _has_no_friction(model: ForceModel) -> bool:
-    return model.is_described and not any(np.any(model.values[key]) for key in OWN_FRICTION)
+    return model.is_described and not _is_fitted(model) and not any(
+        np.any(model.values[key]) for key in OWN_FRICTION)
 
 
 def measure_first(findings: Sequence[NoMeasurement], files: GivenFiles) -> tuple[str, str]:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isnan
 
 from pprs_dynamics.arrays import root_mean_square
@@ -473,15 +473,18 @@ def _fitted(diagnosis: Diagnosis, effect: FittedEffect) -> list[FittedValue]:
 
 def sure_moments(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
                  moments: Mapping[str, Estimate]) -> list[Parameter]:
-    """Return the first moments of bodies that are sure where the mass is not."""
+    """Return first moments, and combinations with the mass, that are sure where a mass is not."""
 
     def is_vague(estimate: Estimate) -> bool:
         return INTERVAL * estimate.std > VAGUE * abs(estimate.value)
 
     known = {coefficient.name: coefficient for coefficient in effect.coefficients}
-    masses = {key: parameters.get(f'{key.rpartition("moment_")[0]}mass') for key in moments}
-    return [known[key] for key, mass in masses.items()
-            if mass is not None and is_vague(mass) and not is_vague(moments[key])]
+    found = []
+    for key, moment in moments.items():
+        name = 'mass' if key not in known else f'{key.rpartition("moment_")[0]}mass'
+        if name in parameters and is_vague(parameters[name]) and not is_vague(moment):
+            found.append(known.get(key) or replace(known[name], name=key))
+    return found
 
 
 def _why(diagnosis: Diagnosis, effect: FoundEffect, is_first: bool) -> str:

@@ -5,7 +5,7 @@
 
 Each joint moves from rest to rest, from the middle of its range, within the limits of the URDF;
 whether links touch each other is not looked at. To excite inertia and friction that one of many
-series is taken which tells most of what `pprs fit` determines, by the determinant of the
+series is taken which determines most of what `pprs fit` estimates, by the determinant of the
 information (D-optimal).
 
 References
@@ -24,6 +24,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
+from pprs_dynamics.inference.experiments.climbing import climb
 from pprs_dynamics.inference.fit.bodies import Bodies
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
@@ -31,10 +32,9 @@ from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 HARMONICS = 8  # of the duration
 WIDEST = np.pi  # [rad, m]: a joint is not moved further from the middle, whatever its range
-LOOKED_AT = 150  # samples of a motion, for its efforts and for what it tells
+LOOKED_AT = 150  # samples of a motion, for its efforts and its information
 CHECKED = 2000  # samples at which limits are checked
-DRAWN, CLIMBED = 40, 160  # motions drawn at random, and steps from the best of them
-STEP = 0.3  # of a coefficient of unit size, at the first step; it shrinks to a tenth
+DRAWN = 40  # motions drawn at random
 SHRINKS, SHRINK = 40, 0.93  # until a motion keeps the limits
 TINY = 1e-12
 NOISE = 0.01  # of a joint's largest effort, standard deviation where the model knows no other
@@ -42,7 +42,7 @@ NOISE = 0.01  # of a joint's largest effort, standard deviation where the model 
 
 @dataclass(frozen=True)
 class ArmLimits:
-    """Limits of a motion beside those of the URDF.
+    """Limits of a motion in addition to those of the URDF.
 
     Parameters
     ----------
@@ -121,48 +121,47 @@ class ArmMotions:
             ('effort', efforts, np.maximum(self.effort, TINY)))}
 
 
-def best_motion(
-    motions: ArmMotions, value: Callable[[JointSeries], float], seed: int,
-    highest: Sequence[int] = (HARMONICS,), smallest: float = 1.0,
-    progress: Callable[[float], None] | None = None,
-) -> JointSeries:
-    """Return the motion of the largest value: the best of many drawn, and steps from there.
+@dataclass(frozen=True)
+class ArmDrawing:
+    """How motions of an arm are drawn at random, and changed.
 
     Parameters
     ----------
     motions : ArmMotions
-    value : callable
-    seed : int
     highest : sequence of int
         Highest harmonics that are drawn.
     smallest : float
         Share of the largest motion of a joint; from there to 1 is drawn, evenly in its logarithm.
-    progress : callable, optional
-        Called with the share that is done.
     """
-    random = np.random.default_rng(seed)
-    count = len(motions.middle)
-    best, most, best_share = None, -np.inf, np.ones(count)
-    for k in range(DRAWN + CLIMBED):
-        if progress is not None:
-            progress(k / (DRAWN + CLIMBED))
-        if best is None or k < DRAWN:
-            harmonics = int(random.choice(highest))
-            drawn = random.normal(size=(count, JointSeries.size(harmonics)))
-            share = np.exp(random.uniform(np.log(smallest), 0.0, count))
-        else:
-            step = STEP * (1 - 0.9 * (k - DRAWN) / CLIMBED)
-            harmonics, shape = best.harmonics, best.coefficients
-            drawn = (shape / np.abs(shape).max(axis=1, keepdims=True)
-                     + step * random.normal(size=shape.shape))
-            share = np.minimum(best_share * np.exp(
-                -step * np.log(smallest) * random.normal(size=count)), 1.0)
-        tried = motions.within_limits(drawn, harmonics, share)
-        told = value(tried)
-        if told > most:
-            best, most, best_share = tried, told, share
-    assert best is not None
-    return best
+
+    motions: ArmMotions
+    highest: Sequence[int] = (HARMONICS,)
+    smallest: float = 1.0
+
+    def best(self, value: Callable[[JointSeries], float], seed: int,
+             progress: Callable[[float], None] = lambda share: None) -> JointSeries:
+        """Return the motion of the largest value: the best of many drawn, and steps from there."""
+        random = np.random.default_rng(seed)
+        first = max((self.draw(random) for _ in range(DRAWN)), key=lambda one: value(one[0]))
+        return climb(first, self.beside, lambda one: value(one[0]), random, progress)[0]
+
+    def draw(self, random: np.random.Generator) -> tuple[JointSeries, Array]:
+        """Return a random motion, and the share of the largest one that each joint makes."""
+        count, harmonics = len(self.motions.middle), int(random.choice(self.highest))
+        share = np.exp(random.uniform(np.log(self.smallest), 0.0, count))
+        drawn = random.normal(size=(count, JointSeries.size(harmonics)))
+        return self.motions.within_limits(drawn, harmonics, share), share
+
+    def beside(self, best: tuple[JointSeries, Array], step: float, random: np.random.Generator,
+               ) -> tuple[JointSeries, Array]:
+        """Return a motion that differs by a step from another one."""
+        series, share = best
+        shape = series.coefficients
+        drawn = (shape / np.abs(shape).max(axis=1, keepdims=True)
+                 + step * random.normal(size=shape.shape))
+        share = np.minimum(share * np.exp(
+            -step * np.log(self.smallest) * random.normal(size=len(share))), 1.0)
+        return self.motions.within_limits(drawn, series.harmonics, share), share
 
 
 @dataclass(frozen=True)
@@ -174,7 +173,8 @@ class ArmExcitation:
     model : MechanismModel
     series : JointSeries
     determined, total : int
-        Numbers of links, rotors and friction that it tells better than the description, and all.
+        Combinations of parameters of links, rotors and friction that it determines better than the
+        description, and all.
     limits : dict of str to float
         Use of each limit, its margin taken off: at most 1.
     """
@@ -205,7 +205,7 @@ class ArmExcitation:
 
 def excite_arm(model: MechanismModel, limits: ArmLimits, duration: float, seed: int,
                progress: Callable[[float], None] | None = None) -> ArmExcitation:
-    """Return a motion that tells most of an arm's numbers.
+    """Return the most informative motion about an arm's parameters.
 
     Parameters
     ----------
@@ -218,14 +218,15 @@ def excite_arm(model: MechanismModel, limits: ArmLimits, duration: float, seed: 
     """
     motions = ArmMotions(model, limits, duration)
     known = _Information(motions)
-    best = best_motion(motions, lambda one: float(np.sum(np.log1p(np.maximum(known.of(one), 0.0)))),
-                       seed, progress=progress)
+    best = ArmDrawing(motions).best(
+        lambda one: float(np.sum(np.log1p(np.maximum(known.of(one), 0.0)))), seed,
+        progress or (lambda share: None))
     told = known.of(best)
     return ArmExcitation(model, best, int(np.sum(told > 1)), len(told), motions.uses(best))
 
 
 class _Information:
-    """What motions tell of an arm's numbers.
+    """Information of motions about an arm's parameters.
 
     Parameters
     ----------
@@ -244,7 +245,7 @@ class _Information:
             for unit in np.eye(self.count)])
 
     def of(self, found: JointSeries) -> Array:
-        """Return by how much each combination is told better than by the description, squared."""
+        """Return the squared gain in precision of each combination over the description."""
         motion = found.motion(np.linspace(0, self.duration, LOOKED_AT))
         count = len(self.effort)
         rows = self.model.robot.regressor(motion.position, motion.velocity, motion.acceleration)

@@ -4,7 +4,7 @@
 """Columns of the regression on a motion that nobody has made yet.
 
 They are those of `regression.design`, in the same order and scale, so that what a new motion
-would tell adds to what the recordings have told.
+adds is added to the information of the recordings.
 """
 
 from __future__ import annotations

@@ -44,14 +44,14 @@ class Information:
     ----------
     plan : ColumnPlan
     noise : mapping of drive to NoiseSpectrum
-        Other drives tell nothing.
+        Other drives give no information.
     """
 
     plan: ColumnPlan
     noise: Mapping[int, NoiseSpectrum]
 
     def of_recordings(self, design: Design, regression: Regression, fit: JointFit) -> Array:
-        """Return what recordings tell, and what is known of the base columns beforehand."""
+        """Return the information of recordings and the prior of the base columns."""
         white = {}
         for d, (index, rows) in self.plan.on_recordings(design).items():
             if d in self.noise:
@@ -67,7 +67,7 @@ class Information:
         return np.diag(known)
 
     def of_motion(self, columns: Columns, duration: float) -> Array:
-        """Return what a motion of some duration [s] would tell, however densely it is sampled."""
+        """Return the information of a motion of some duration [s], at any sampling rate."""
         return self._gram({d: (index, whitened(rows, self.noise[d], duration))
                            for d, (index, rows) in columns.items() if d in self.noise})
 
@@ -155,7 +155,7 @@ class Contest:
         return force
 
     def misfit(self, gram: Array) -> float:
-        """Return the squared error, whitened, that the refitted rival leaves."""
+        """Return the whitened squared residual of the refitted rival."""
         return misfits_of((self,), gram)[0]
 
     def evidence(self, known: Array, after: Array) -> float:
@@ -229,7 +229,7 @@ class Precision:
         return float(np.sum(np.log1p(np.maximum(found, 0.0))))
 
     def deviations(self, gram: Array) -> Array:
-        """Return standard deviations of the coefficients, (k,); infinite where nothing tells."""
+        """Return standard deviations of the coefficients, (k,); infinite without information."""
         values, axes = np.linalg.eigh(self.own(gram))
         unseen = values <= UNSEEN
         variances = axes[:, ~unseen] ** 2 @ (1 / values[~unseen])

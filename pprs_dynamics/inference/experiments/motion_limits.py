@@ -12,14 +12,15 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import Forces
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.passive_friction import IndependentChainsFriction
 
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """Limits of a motion beside those of the model file.
+    """Limits of a motion in addition to those of the model file.
 
     Parameters
     ----------
@@ -50,13 +51,13 @@ class MotionLimits:
         if not 0 <= self.margin <= 0.9:
             raise ModelError('margin', self.margin, 'lie between 0 and 0.9')
 
-    def uses(self, model: DriveModel, forces: DriveForces, samples: int) -> Array:
+    def uses(self, model: DriveModel, forces: Forces, samples: int) -> Array:
         """Return how much of each limit, its margin taken off, motions use: 1 is all of it.
 
         Parameters
         ----------
         model : DriveModel
-        forces : DriveForces
+        forces : Forces
             Of M motions one after the other.
         samples : int
             Of each motion.

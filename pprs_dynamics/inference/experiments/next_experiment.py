@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The next experiment: the whole way from recordings to the motion that would tell most."""
+"""The next experiment: from recordings to the most informative motion."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ class Experiment:
 
     @property
     def separates(self) -> tuple[tuple[str, str], ...]:
-        """Pairs that it tells apart whichever of the two is true."""
+        """Pairs that it separates, whichever of the two is true."""
         return tuple(pair for pair in self.pairs if all(
             one.probability >= SURE for one in self.contests if {one.truth, one.rival} == {*pair}))
 
@@ -161,7 +161,7 @@ class Experiment:
 
     @property
     def told_by_load(self) -> tuple[tuple[str, str], ...]:
-        """Pairs that no motion tells for sure, but the same motion with another load."""
+        """Pairs that no motion separates, but the same motion with another load does."""
         return tuple(pair for pair in self.fails if frozenset(pair) in TOLD_BY_LOAD)
 
     @property
@@ -177,11 +177,11 @@ class Experiment:
         if self.kind == 'separate':
             found = []
             if self.separates:
-                found.append(f'This motion tells {_listed(self.separates)}: evidence of '
+                found.append(f'This motion separates {_listed(self.separates)}: evidence of '
                              f'{self.expected_evidence:.0f} is expected.')
             if self.fails:
-                found.append(f'It will hardly tell {_listed(self.fails)}: no motion within these '
-                             'limits that was tried does so for sure.')
+                found.append(f'It will hardly separate {_listed(self.fails)}: no motion that was '
+                             'tried within these limits does so for sure.')
             if self.load:
                 found.append(f'For {_listed(self.told_by_load)} record the same motion once more '
                              f'with {self.load:g} kg more at the tool, and diagnose that recording '
@@ -192,7 +192,7 @@ class Experiment:
         return {
             'estimate': f'One explanation is left: {", ".join(self.subjects)}. This motion '
                         'measures its parameters best.',
-            'excite': 'Nothing is missing as far as the recordings tell. This motion shows what '
+            'excite': 'Nothing is missing as far as the recordings show. This motion shows what '
                       f'they hardly excite: {", ".join(self.subjects)}.' if self.subjects else
                       'Nothing is missing, and all is excited. This motion measures the model\'s '
                       'own numbers best.',
@@ -225,7 +225,7 @@ def next_experiment(
     noise: float = 0.05, progress: Callable[[float], None] | None = None,
     decisions: Decisions = DECISIONS,
 ) -> Experiment:
-    """Return the motion that tells most about what is open; see `pprs_dynamics.next_experiment`.
+    """Return the motion that decides most; see `pprs_dynamics.next_experiment`.
 
     Of an arm for 'separate' only; `arm_excitation` designs its first motion.
 

@@ -71,7 +71,7 @@ Part = tuple[FittedTerm, Array]
 
 @dataclass(frozen=True)
 class Question:
-    """What a motion is to tell.
+    """What a motion is designed to decide.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class Question:
     plan : ColumnPlan
     noise : mapping of drive to NoiseSpectrum
     known : (P, P) array
-        What recordings and tolerances tell already.
+        Information of recordings and tolerances.
     criterion : Separation or Precision
         Objective of a design, to be maximised, of the information of recordings, motion and prior
         together, (P, P).
@@ -108,7 +108,7 @@ class Question:
         return self.plan.model
 
     def grams(self, forces: Forces, time: Array, duration: float, block: int = 1) -> list[Array]:
-        """Return what motions of some duration, one after the other, would tell, (P, P) each.
+        """Return the information of motions of some duration, (P, P) each.
 
         Parameters
         ----------
@@ -122,7 +122,7 @@ class Question:
                 for columns in self.plan.on_motions(forces, time, block)]
 
     def worth(self, gram: Array) -> float:
-        """Return the value of a motion beside what is known already."""
+        """Return the value of a motion in addition to what is known."""
         return self.criterion.value(self.known + gram)
 
     def with_contests(self, contests: Sequence[Contest]) -> Question:
@@ -138,7 +138,7 @@ def question_of(model: ForceModel, recordings: Sequence[Recording],
 
 
 def question_after(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
-    """Return what a ranking leaves open.
+    """Return what a ranking does not decide.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def question_after(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
 
 
 def _separation(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
-    """Return how to tell sets apart: each tried by the data that each other one predicts."""
+    """Return how to separate sets: each is fitted to the data that each other one predicts."""
     sets = _told_apart(ranking, rivals)
     # The last search, or the first where one of the sets is linear around its point.
     fits = (ranking.last if all(ranking.fits_of(fitted) is ranking.last for fitted in sets)
@@ -253,7 +253,7 @@ def subjects_of(plan: ColumnPlan, prior_costs: PriorCosts) -> list[Explanation]:
 
 
 def precision_of(plan: ColumnPlan, subjects: Sequence[Explanation]) -> Precision:
-    """Return how well effects are known beside the base; without any, the model's numbers."""
+    """Return how well effects are known in addition to the base, or the model's numbers."""
     if not subjects:
         return Precision(plan.numbers, plan.others, np.ones(len(plan.numbers)))
     scales = np.concatenate([term.scales for subject in subjects for term in subject.terms])

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The search for the motion that tells most, within what the robot may do.
+"""The search for the most informative motion within the robot's limits.
 
-Of a 3-PPRS random series, each blown up until it meets a limit, are compared first; the best of
-several kinds are improved by sequential quadratic programming with the limits as constraints, and
-what comes out is checked at the rate at which it is played. Of an arm see `arm_motions`.
+Random series, each blown up until it meets a limit, are compared first; the best is improved by
+steps (`climbing`), and checked at the rate at which it is played. Limits of an arm are in
+`arm_motions`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.experiments.arm_motions import ArmLimits, ArmMotions, best_motion
+from pprs_dynamics.inference.experiments.arm_motions import ArmDrawing, ArmLimits, ArmMotions
 from pprs_dynamics.inference.experiments.climbing import climb
 from pprs_dynamics.inference.experiments.criteria import Contest, misfits_of
 from pprs_dynamics.inference.experiments.fourier_path import (
@@ -30,22 +30,20 @@ from pprs_dynamics.inference.experiments.question import Question
 from pprs_dynamics.measurement.motion.treatment import block_length
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.paths import HOME
-from pprs_dynamics.physics.model.drive_model import DriveForces, DriveModel
-from pprs_dynamics.system.parallel import each
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import Forces
 
 HARMONICS = 4  # of each degree of freedom
 SLOWEST_TOP = 5  # the highest harmonic of the slowest motions
 HIGHEST_FREQUENCY = 1.5  # [Hz]; above it reconstruction from positions smooths
-SAMPLES_PER_PERIOD = 12  # of the highest harmonic, while searching
-DRAWS, STARTS = 48, 2
-NEARBY = (0.7, 1.2)  # scales that put a step back on the limits
-BATCH = 8  # motions evaluated at once
+SAMPLES_PER_PERIOD, LEAST_SAMPLES = 12, 240  # of the highest harmonic and in all, while searching
+DRAWS = 48
+NEARBY = (0.1, 1.2)  # scales that put a step back on the limits
 REACH, TURN = 0.08, 0.25  # [m, rad], excursions to start from
 SCALES = (0.02, 4.0)  # times these
 HALVINGS = 7
 # Some series are left smaller than the limits allow: slow motion tells of friction near rest.
 SMALLER, SMALLEST = 0.25, 0.1
-OTHER_SPECTRUM = 0.2  # difference of ln of the highest harmonic
 OUTSIDE = 2.0  # use of limits where the mechanism cannot follow
 FINE_RATE = 500.0  # [Hz], at which limits are checked
 # Slow motion tells of friction, fast of inertia; above 1 Hz an arm shakes what it stands on.
@@ -65,7 +63,7 @@ class Found:
     ----------
     path : FourierPath or JointSeries
     gram : (P, P) array
-        What it would tell.
+        Its information.
     uses : mapping of str to float
         Of the limits, 1 is all.
     value : float
@@ -80,16 +78,11 @@ class Found:
 
 @dataclass(frozen=True)
 class Drawn:
-    """A random motion, what it would tell, nearly, (P, P), and its value."""
+    """A random motion, its approximate information (P, P), and its value."""
 
     path: FourierPath
     gram: Array
     value: float
-
-    @property
-    def top(self) -> int:
-        """Highest harmonic."""
-        return int(self.path.harmonics.max())
 
 
 class TrajectorySearch:
@@ -118,7 +111,7 @@ class TrajectorySearch:
             model.limits, condition_number=np.inf, rod_sine=1e-3))
         self.top = max(HARMONICS + 1, int(HIGHEST_FREQUENCY * duration))
         self.centre = self._centre()
-        samples = SAMPLES_PER_PERIOD * self.top
+        samples = max(SAMPLES_PER_PERIOD * self.top, LEAST_SAMPLES)
         self._time: Array = np.arange(samples, dtype=float) * (duration / samples)
         self._fine: Array = np.arange(round(duration * FINE_RATE) + 1) / FINE_RATE
 
@@ -133,17 +126,11 @@ class TrajectorySearch:
             self.question = self.question.with_contests(hopeful)
             drawn = self._ranked([replace(one, value=self.question.worth(one.gram))
                                   for one in drawn])
-        starts = self._kinds(drawn)
-        done = [0]
-
-        def improved(start: Drawn) -> FourierPath:
-            path = self._improve(start)
-            done[0] += 1
-            progress(0.3 + 0.6 * done[0] / len(starts))
-            return path
-
-        paths = [starts[0].path, *each(improved, starts)]
-        return max((self.assess(path) for path in paths), key=lambda one: one.value)
+        best = climb(drawn[0].path, self._beside, lambda path: self.question.worth(
+            self._gram(path)), np.random.default_rng(self.seed),
+            lambda share: progress(0.3 + 0.6 * share))
+        # Values while searching are of few samples: at full rate the start may be the better one.
+        return max(map(self.assess, (drawn[0].path, best)), key=lambda one: one.value)
 
     def _hopeful(self, drawn: list[Drawn]) -> list[Contest]:
         """Return the contests that at least one motion drawn would decide."""
@@ -166,11 +153,9 @@ class TrajectorySearch:
             fitted.append(self._to_limits(path).scaled(share))
             progress(0.5 * (k + 1) / draws)
         drawn: list[Drawn] = []
-        for k in range(0, draws, BATCH):
-            some = fitted[k:k + BATCH]
-            grams, _ = self._grams(some)
-            drawn += [Drawn(path, gram, self.question.worth(gram))
-                      for path, gram in zip(some, grams, strict=True)]
+        for path in fitted:
+            gram = self._gram(path)
+            drawn.append(Drawn(path, gram, self.question.worth(gram)))
             progress(0.5 + 0.5 * len(drawn) / draws)
         return self._ranked(drawn)
 
@@ -186,15 +171,6 @@ class TrajectorySearch:
         gram, = question.grams(forces, self._fine, self.duration, block_length(1 / FINE_RATE))
         return Found(path, gram, dict(zip(limit_names(question.model), uses, strict=True)),
                      question.worth(gram))
-
-    def _kinds(self, drawn: list[Drawn]) -> list[Drawn]:
-        """Return the best, and the best of others whose spectrum is another."""
-        chosen = [drawn[0]]
-        for one in drawn[1:]:
-            if len(chosen) < STARTS and all(abs(np.log(one.top / other.top)) > OTHER_SPECTRUM
-                                            for other in chosen):
-                chosen.append(one)
-        return chosen
 
     def _draw(self, rng: np.random.Generator) -> tuple[FourierPath, float]:
         """Return a motion of some size, and the share of the limits that it is to use."""
@@ -238,39 +214,23 @@ class TrajectorySearch:
             return OUTSIDE
         return float(self.limits.uses(self.question.model, forces, len(time)).max())
 
-    def _forces(self, paths: list[FourierPath], time: Array) -> DriveForces:
+    def _forces(self, paths: list[FourierPath], time: Array) -> Forces:
         return forces_of(self._lenient, paths, time)
 
-    def _grams(self, paths: list[FourierPath]) -> tuple[list[Array], Array]:
-        """Return what several paths would tell, and their uses of the limits."""
-        question = self.question
-        forces = self._forces(paths, self._time)
-        return (question.grams(forces, self._time, self.duration),
-                self.limits.uses(question.model, forces, len(self._time)))
+    def _gram(self, path: FourierPath) -> Array:
+        """Return the information of a path."""
+        return self.question.grams(self._forces([path], self._time), self._time, self.duration)[0]
 
-    def _improve(self, start: Drawn) -> FourierPath:
-        """Return the path after a few steps of sequential quadratic programming."""
-        path = start.path
+    def _beside(self, path: FourierPath, step: float, random: np.random.Generator) -> FourierPath:
+        """Return a path on the limits that differs by a step."""
         # Lengths and angles, of like size.
         unit = np.repeat((REACH, TURN), path.size // 2)
-
-        def moved(z: Array) -> FourierPath:
-            return path.with_parameters(unit * z)
-
-        def evaluated(rows: Array) -> tuple[Array, Array]:
-            values, rooms = [], []
-            for k in range(0, len(rows), BATCH):
-                grams, uses = self._grams([moved(row) for row in rows[k:k + BATCH]])
-                values += [self.question.worth(gram) for gram in grams]
-                rooms.append(1 - uses)
-            return np.array(values), np.concatenate(rooms)
-
-        best = climb(path.parameters / unit, evaluated,
-                     lambda z: self._to_limits(moved(z), NEARBY).parameters / unit)
-        return moved(best)
+        x = path.parameters / unit
+        return self._to_limits(path.with_parameters(unit * (
+            x + step * np.abs(x).max() * random.normal(size=len(x)))), NEARBY)
 
     def _centre(self) -> tuple[float, float, float]:
-        """Return the home pose, or the middle of the lifts' strokes where home leaves no room."""
+        """Return the home pose, or the middle of the lifts' strokes if home is at a limit."""
         limits, geometry = self.question.model.limits, self.question.model.robot.geometry
         lean = (geometry.base_radius - geometry.platform_radius * float(np.mean(np.cos(
             np.subtract(geometry.platform_angles, geometry.chain_angles))))) / geometry.rod_length
@@ -300,7 +260,7 @@ class TrajectorySearch:
         return np.linspace(0.0, self.duration, 4)
 
 
-def forces_of(model: DriveModel, paths: list[FourierPath], time: Array) -> DriveForces:
+def forces_of(model: DriveModel, paths: list[FourierPath], time: Array) -> Forces:
     """Return the forces that drives must apply along paths, one after the other."""
     return model.drive_forces(joined_motion(paths, time))
 
@@ -323,9 +283,8 @@ class ArmSearch:
 
     def run(self, progress: Callable[[float], None] = lambda share: None) -> Found:
         """Return the best motion found."""
-        best = best_motion(
-            self.motions, lambda series: self.question.worth(self._gram(series)), self.seed, OF_ARM,
-            SMALLEST_OF_ARM, progress)
+        best = ArmDrawing(self.motions, OF_ARM, SMALLEST_OF_ARM).best(
+            lambda series: self.question.worth(self._gram(series)), self.seed, progress)
         gram = self._gram(best)
         return Found(best, gram, self.motions.uses(best), self.question.worth(gram))
 

@@ -135,7 +135,7 @@ def own_numbers(model: MechanismModel) -> Array:
     """Return armature, viscous and dry friction, and offset of each joint, (n, 4)."""
     values = model.values
     return np.column_stack([values[key] for key in (
-        f'{model.block}.armature', 'friction.viscous', 'friction.coulomb', 'friction.offset')])
+        'robot.armature', 'friction.viscous', 'friction.coulomb', 'friction.offset')])
 
 
 def columns_of(model: MechanismModel, recordings: Sequence[Recording]) -> list[ArmColumns]:
@@ -204,7 +204,7 @@ def fit_arm(model: MechanismModel, columns: Sequence[ArmColumns]) -> ArmFit:
     names = np.array(model.drives)
     return ArmFit(
         _with(model, bodies.inertial(point), own, width), int(np.sum(ratio < DETERMINED ** 2)),
-        links, {f'{model.block}.armature': std[ARMATURE], 'friction.viscous': std[VISCOUS],
+        links, {'robot.armature': std[ARMATURE], 'friction.viscous': std[VISCOUS],
                 'friction.coulomb': std[COULOMB], 'friction.offset': std[OFFSET]},
         tuple(np.array(model.robot.body_joints)[masses > DETERMINED].tolist()),
         tuple(names[~moving].tolist()))
@@ -218,7 +218,7 @@ def _with(model: MechanismModel, inertial: Array, own: Array, width: Array) -> M
     values: dict[str, Any] = {
         **model.values,
         **{key: numbers(np.array(found)) for key, found in inertial_values(inertial).items()},
-        f'{model.block}.armature': numbers(own[:, ARMATURE]),
+        'robot.armature': numbers(own[:, ARMATURE]),
         'friction.viscous': numbers(own[:, VISCOUS]),
         'friction.coulomb': numbers(own[:, COULOMB]), 'friction.offset': numbers(own[:, OFFSET]),
         'friction.reversal_velocities': numbers(width)}

@@ -17,7 +17,7 @@ from pprs_dynamics.inference.fit.arm_fit import ArmFit, columns_of, fit_arm
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.sensitivities import model_numbers
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.residuals.paired_errors import rms_by_drive
+from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import calibrations
 from pprs_dynamics.inference.search.explained_effort import (
@@ -227,7 +227,7 @@ def _told(model: MechanismModel, fit: ArmFit) -> tuple[str, ...]:
     if fit.standing:
         told.append(f'{", ".join(fit.standing)} hardly moves: its friction stays as it was')
     if model.efforts_in_amperes:
-        told.append(f'efforts are currents times {model.block}.gain: a gain that is wrong by '
+        told.append('efforts are currents times robot.gain: a gain that is wrong by '
                     '1 % makes all numbers wrong by 1 %')
     return tuple(told)
 

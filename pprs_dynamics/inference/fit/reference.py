@@ -104,9 +104,9 @@ class Reference:
     repeats : (D,) array
         Correlation of the process in two runs.
     base : (N, P) array
-        Directions of unit variance of the base's numbers, those that the reference tells first.
+        Directions of unit variance of the base's numbers, those determined by the reference first.
     coefficients, root : (Q,) and (Q, Q) arrays
-        Of told directions, then of the processes of every drive; of their covariance.
+        Of determined directions, then of the processes of every drive; of their covariance.
     regression, fit : Regression, JointFit
     names : tuple of str
         Of the recordings, as they were given.
@@ -197,13 +197,13 @@ class Reference:
 
     @property
     def told(self) -> int:
-        """How many directions of the base's numbers it tells."""
+        """How many directions of the base's numbers it determines."""
         shared, *own = (len(one) for one in self.processes)
         return len(self.coefficients) - len(self.size) * shared - sum(own)
 
     @property
     def directions(self) -> str:
-        """The principal directions of the base's numbers that the recordings told, as a text.
+        """The principal directions of the base's numbers that the recordings determined, as a text.
 
         Each of unit variance, half a precision a number: (N, P); '' for none.
         """
@@ -281,7 +281,7 @@ class Reference:
                 (shared[0] ** 2).sum(axis=1) > self.decisions.reference_known)))
 
     def _repeating(self, q: Array, v: Array, period: float) -> Array:
-        """Return what repeats in a motion beside the base, (M, D) [N]; see `Waves.known`."""
+        """Return what repeats in addition to the base, (M, D) [N]; see `Waves.known`."""
         if len(q) > CHUNK:
             return np.concatenate([self._repeating(q[at:at + CHUNK], v[at:at + CHUNK], period)
                                    for at in range(0, len(q), CHUNK)])
@@ -333,10 +333,10 @@ class Reference:
                  for k, d in enumerate(regression.drives)})
 
     def _met_again(self, residuals: Residuals) -> Array:
-        """Return what no process tells of the reference where a recording is on its path, (M, D).
+        """Return the residual of the processes on the path of the reference, (M, D).
 
         Gears ripple and friction turns over within less than the lengths of a process. Where the
-        path is the same, so are they: what the fit leaves at the state of the reference that is
+        path is the same, so are they: the residual of the fit at the state of the reference that is
         nearest is then in the recording as well, by a share that is not known. 0 elsewhere.
         """
         reference, states = self.regression.residuals, States.of(self.regression.residuals)
@@ -407,7 +407,7 @@ def _as_array(text: str, key: str) -> Array:
 
 def _base(model: ForceModel, numbers: Array | None, residuals: Residuals, kept: str,
           ) -> tuple[Array, Array, int]:
-    """Return columns (M, D, P) of told directions of the base, all directions, and P."""
+    """Return columns (M, D, P) of determined directions of the base, all directions, and P."""
     if numbers is None:
         return np.zeros((len(residuals), len(residuals.drives), 0)), np.zeros((0, 0)), 0
     assert isinstance(model, MechanismModel)
@@ -500,8 +500,8 @@ def _processes(residuals: Residuals, columns: Array, measured: Sequence[int],
                gears: Sequence[float]) -> tuple[Process | Waves, ...]:
     """Return the process over all drives, those of each, and waves.
 
-    Lengths are those of the largest evidence, of one drive after another beside the base alone,
-    then of the shared process beside these; waves those in what they leave.
+    Lengths maximise the evidence, of one drive after another with the base alone, then of the
+    shared process with these; waves are those of the residual.
     """
     plain, drives = States.of(residuals), range(len(residuals.drives))
 

@@ -103,7 +103,7 @@ def with_own_reference(model: ForceModel, recordings: Sequence[Recording],
                        paths: Sequence[Path], keep_residual: bool = False) -> ForceModel:
     """Return a model that names the files it was fitted to, with what they left uncertain.
 
-    Where they are no reference, as they are too short, the model as it is. With `keep_residual`
+    Where they are no reference, as they are too short, the model unchanged. With `keep_residual`
     their errors stand in it, too: it needs no files then.
     """
     try:

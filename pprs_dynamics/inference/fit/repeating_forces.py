@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-r"""Forces that no number of a model explains but that come back where a machine comes back.
+r"""Forces that no number of a model explains but that repeat when the machine repeats its motion.
 
 A Gaussian process over the states of all drives or of one, s = (q / l_q, tanh(v / v_0) / l_v), is
 a finite sum, Phi(s) w, over states that a pivoted Cholesky factor of its kernel chooses; states of
-a recording that these do not reach get features of their own. Waves go over the position of a
-drive, finer than any length.
+a recording that these do not reach get features of their own. Waves depend on the position of
+a drive, finer than any length.
 
 References
 ----------
@@ -115,7 +115,7 @@ def factor_of(states: Array, most: int, known: Array | None = None) -> tuple[Int
 
 @dataclass(frozen=True)
 class Process:
-    """A process of unit size, told by some states.
+    """A process of unit size, conditioned on some states.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class Process:
         Over whose state; None: over those of all.
     states : States
     chosen : (R, k) array
-        States that it is told by.
+        States that it is conditioned on.
     root : (R, R) array
         Lower factor of their kernel.
     """
@@ -153,7 +153,7 @@ class Process:
         return known
 
     def new(self, q: Array, v: Array, known: Array) -> Array:
-        """Return features of states that it does not know, (M, r), beside the known ones."""
+        """Return features of states that it does not know, (M, r), orthogonal to the known ones."""
         return factor_of(self.states.at(q, v, self.drive), MOST_NEW, known)[1]
 
 
@@ -176,9 +176,9 @@ class Waves:
 
     @classmethod
     def of(cls, residuals: Residuals, drive: int, left: Array, gear: float) -> Waves:
-        """Return those that what is left of a drive's error, (M,), shows.
+        """Return those that a drive's residual, (M,), shows.
 
-        The strongest first, each beside those before it. One stroke tells a number by less than
+        The strongest first, each with those before it. One stroke determines a number to less than
         a wave, and where another path goes that is out of phase: what may be a whole number for
         each turn of the motor, `gear` times the drive's, is.
         """

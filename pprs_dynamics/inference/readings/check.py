@@ -127,7 +127,8 @@ def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]
     kinds = {mistake.kind for mistake in mistakes}
     if not mistakes:
         mistakes += find_scales(model, contents)
-    if not kinds & {'position_unit', 'drive_order'}:
+    # What explains the efforts well is in the right unit, whatever limits say.
+    if not kinds & {'position_unit', 'drive_order'} and search.plain_left > GOOD_FIT:
         mistakes += _of_strokes(model, recording)
     if not kinds & {'position_unit', 'position_sign', 'reversed_time'}:
         unit = 1.0 if best is None else best.time_unit
@@ -151,6 +152,7 @@ class Search:
 
     def __init__(self, model: ForceModel, excerpts: dict[float, Excerpt]) -> None:
         self.model, self.excerpts = model, excerpts
+        self.plain_left = 1.0  # residual of the plain reading
         self._parts: dict[tuple[float, bytes, bytes, bool], Parts | None] = {}
 
     def best(self) -> Fit | None:
@@ -160,6 +162,7 @@ class Search:
         # What the mechanism cannot follow is as unlikely as an effort of which nothing is right.
         start = self.fit(first, 1.0, in_pieces=True) or Fit(
             first, 1.0, 0.0, np.ones(len(drives)), 1.0)
+        self.plain_left = start.left
         if 1.0 in self.excerpts and start.left < CLOSE_FIT and start.is_plain and not (
                 self._outside(first, self.excerpts[1.0])):
             return None

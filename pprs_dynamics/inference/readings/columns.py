@@ -451,7 +451,9 @@ def _chains(links: Links, count: int) -> dict[str, list[int]]:
                    key=lambda pair: round(float(links.correlation[pair]), 5))
         pairs.append((i, j))
     pairs.sort()
-    if len(pairs) != count or len({j for _, j in pairs}) != count:
+    # Velocities of one robot are in one unit.
+    slopes = [float(np.log(links.slope[pair])) for pair in pairs]
+    if len(pairs) != count or len({j for _, j in pairs}) != count or np.ptp(slopes) > SAME_UNIT:
         return {}
     return {POSITION: [i for i, _ in pairs], VELOCITY: [j for _, j in pairs]}
 

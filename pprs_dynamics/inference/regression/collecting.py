@@ -15,7 +15,7 @@ from pprs_dynamics.inference.regression.terms import FullRate
 from pprs_dynamics.inference.residuals.reconstruction import Reconstruction
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.model.force_model import Forces
-from pprs_dynamics.physics.model.keys import is_gain
+from pprs_dynamics.physics.model.keys import GAIN
 
 
 class Column(NamedTuple):
@@ -39,7 +39,7 @@ class ColumnCollector:
         self.sensitivities = sensitivities
         # A gain changes nothing of efforts that were not recorded as currents.
         self.without_gain = [k for k, number in enumerate(sensitivities.numbers)
-                             if is_gain(number.key)
+                             if number.key == GAIN
                              and np.isnan(reconstruction.gain[number.element])]
         self.share = reconstruction.recorded_share(sensitivities.model)
         self.sensors = [effect.name for effect in sensitivities.model.effects

@@ -25,6 +25,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.regression.base_columns import BaseColumn
+from pprs_dynamics.inference.regression.constrained import Inequalities, conditioned
 from pprs_dynamics.inference.regression.normal_equations import (
     Block,
     DriveEquations,
@@ -44,6 +45,7 @@ LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
 CONVERGED, MOST_ROUNDS = 0.01, 40
 NOISE_STEPS = 3  # of the noise in a round: fitted to its end, rounds take a quarter longer
 MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
+MOST_PRODUCTS = 4000  # products of blocks on a drive that are kept: some 10 kB each
 MOST_EQUATIONS = 100  # of drives that are kept: some 0.2 to 1 MB each
 
 
@@ -198,17 +200,23 @@ class Regression:
 
         Of those that are not known all at once: a call is dearer than a product.
         """
+        known: dict[Block | None, Array] = {}
         for b in others:
-            if b is not None and (b, a, d) in self._products:
-                self._products[a, b, d] = self._products[b, a, d].transpose(0, 2, 1)
-        new = [b for b in others if (a, b, d) not in self._products]
+            if (found := self._products.get((a, b, d))) is not None:
+                known[b] = found
+            elif b is not None and (turned := self._products.get((b, a, d))) is not None:
+                known[b] = turned.transpose(0, 2, 1)
+        new = [b for b in others if b not in known]
         if new:
             rows = [self.base[d] if b is None else b.rows[d] for b in new]
             found = self.series[d].products(a.rows[d], np.concatenate(rows))
             for b, part in zip(new, np.split(found, np.cumsum(list(map(len, rows)))[:-1], axis=2),
                                strict=True):
-                self._products[a, b, d] = part
-        return [self._products[a, b, d] for b in others]
+                self._products[a, b, d] = known[b] = part
+            if len(self._products) > MOST_PRODUCTS:
+                for key in list(self._products)[:MOST_PRODUCTS // 2]:  # computed first
+                    self._products.pop(key, None)
+        return [known[b] for b in others]
 
     def equations(self, d: int, acting: tuple[Block, ...]) -> DriveEquations:
         """Return the equations of a drive, kept: sets that follow each other differ on few."""
@@ -220,8 +228,9 @@ class Regression:
         return found
 
     def release(self) -> None:
-        """Let go of equations; they are made again, of products that are kept."""
+        """Forget equations and products, which are computed again where a fit needs them."""
         self._equations.clear()
+        self._products.clear()
 
     def fit(self, blocks: Sequence[Block], start: Array | None = None) -> JointFit:
         """Return the fit of blocks beside the base columns, the noise fitted with it.
@@ -267,20 +276,33 @@ class Regression:
             found.spectra))
 
     def held(self, fit: JointFit, index: Integers, values: Array) -> JointFit:
-        """Return a fit with some coefficients (k,) as given, the others fitted beside them.
+        """Return a fit conditioned on the values (k,) of some coefficients, at its noise."""
+        return self.conditioned(fit, index, Inequalities(np.eye(len(index)), values))
 
-        The rest of a Gaussian posterior moves along with what is held; its density there is what
-        the departure costs. The noise stays.
+    def conditioned(self, fit: JointFit, index: Integers, equalities: Inequalities) -> JointFit:
+        """Return a fit given A c = b, at its noise.
+
+        The deviance rises by the squared distance in units of the covariance. The covariance
+        becomes that of the posterior given the equalities.
+
+        Parameters
+        ----------
+        fit : JointFit
+        index : (k,) int array
+            Of the coefficients c.
+        equalities : Inequalities
+            Taken as equalities.
         """
-        away = values - fit.coefficients[index]
-        pull = np.linalg.solve(fit.covariance[np.ix_(index, index)], away)
-        coefficients = fit.coefficients + fit.covariance[:, index] @ pull
+        A = np.zeros((len(equalities.b), len(fit.coefficients)))
+        A[:, index] = equalities.A
+        found = conditioned(fit.coefficients, fit.covariance, A, equalities.b)
+        coefficients = found.coefficients
         squares = np.empty_like(fit.squares)
         for k, d in enumerate(self.drives):
-            place, felt = self.local(fit, d)
-            squares[k] = self.equations(d, tuple(felt)).left(coefficients[place])
-        return replace(fit, coefficients=coefficients, squares=squares,
-                       deviance=fit.deviance + float(away @ pull))
+            place, acting = self.local(fit, d)
+            squares[k] = self.equations(d, tuple(acting)).left(coefficients[place])
+        return replace(fit, coefficients=coefficients, covariance=found.covariance,
+                       squares=squares, deviance=fit.deviance + found.rise)
 
     def noise(self, fit: JointFit) -> dict[int, NoiseSpectrum]:
         """Return the noise of every drive."""
@@ -346,12 +368,6 @@ class Regression:
     def own_information(self, fit: JointFit, block: Block) -> Array:
         """Return the information on a block's coefficients that a fit leaves, (k, k)."""
         return self._beside(fit, block)[0]
-
-    def own_share(self, fit: JointFit, block: Block, coefficients: Array) -> float:
-        """Return the share of the whitened square of a block's force that a fit cannot take."""
-        S, _, plain = self._beside(fit, block)
-        beyond, whole = (float(coefficients @ one @ coefficients) for one in (S, plain))
-        return beyond / max(whole, 1e-300)
 
     def _beside(self, fit: JointFit, block: Block) -> tuple[Array, Array, Array]:
         """Return own sums of products, those with what is left, and full products of a block."""

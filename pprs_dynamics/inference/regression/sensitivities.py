@@ -21,14 +21,18 @@ from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect, Parameter
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
+from pprs_dynamics.physics.effects.structure_effect import (
+    BodyEffect,
+    PassiveJointEffect,
+    StructureEffect,
+)
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.force_model import (
     ACTIVE_FRICTION,
     PASSIVE_FRICTION,
     ForceModel,
 )
-from pprs_dynamics.physics.model.keys import is_gain
+from pprs_dynamics.physics.model.keys import GAIN
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.system.parallel import each
 
@@ -209,7 +213,7 @@ class Sensitivities:
         step = there.position_step
 
         def efforts(drive: int, move: float) -> Array:
-            return self._efforts(self.model, self._at(self.model, there.moved(drive, move)))
+            return self._efforts(self.model, self._at(self.model, there.perturbed(drive, move)))
 
         def column(drive: int) -> Array:
             change = (efforts(drive, -step) - before) / step
@@ -242,7 +246,7 @@ class Sensitivities:
 
     def _at(self, model: Any, state: Any) -> Any:
         """Return the same motion with the bodies and the reversals of another model."""
-        found = replace(state.loaded(model.robot), load=None, reversal=model.reversal)
+        found = replace(state.with_load(model.robot), load=None, reversal=model.reversal)
         for effect in model.effects:
             if isinstance(effect, BodyEffect):
                 found = effect.apply(found)
@@ -257,7 +261,7 @@ class Sensitivities:
             return None
         if number.key in PER_CHAIN:
             return [number.element, number.element + len(self.model.drives) // 2]
-        return [number.element] if number.key in PER_DRIVE or is_gain(number.key) else None
+        return [number.element] if number.key in PER_DRIVE or number.key == GAIN else None
 
     @cached_property
     def _moved(self) -> dict[Number, ForceModel]:
@@ -298,12 +302,12 @@ class Sensitivities:
     def _change(self, number: Number, forces: Any, reference: Array) -> Array:
         """Return what a number moved by `RELATIVE_STEP` of itself changes, (N, D)."""
         moved, state = self._moved[number], forces.mechanism
-        if is_gain(number.key):
+        if number.key == GAIN:
             # The more torque an ampere gives, the fewer amperes the model's torque takes.
             given = np.asarray(self.given.values[number.key])
             return np.asarray(-forces.total * RELATIVE_STEP * given / self.model.gain)
         if number.key.startswith('friction.'):
-            return self._efforts(moved, state.turning_over(moved.reversal)) - reference
+            return self._efforts(moved, state.with_smoothing(moved.reversal)) - reference
         if number.key.startswith('geometry.'):
             state = moved.at_drives(state)
         return self._efforts(moved, self._at(moved, state)) - reference
@@ -326,6 +330,12 @@ class Sensitivities:
             step = coefficient.scale
             moved: Any = effect.at({**values, coefficient.name:
                                     values.get(coefficient.name, 0.0) + step})
+            if isinstance(moved, PassiveJointEffect):
+                more: Any = effect.at({coefficient.name: step})
+                rubbing = more.rubbing(state)
+                change = self.sensed((more.force(rubbing) + self._efforts(self.model, rubbing)
+                                      - reference) / step, state)
+                return change, change
             if not isinstance(moved, BodyEffect):
                 before = effect.at(values) if present is None else present
                 change = self.sensed((moved.force(state) - before.force(state)) / step, state)
@@ -375,7 +385,7 @@ def passive_reversal_columns(friction: Effect, state: Any) -> Array:
     A row for each of `PASSIVE_WIDTHS`, times the width of the state.
     """
     before = friction.force(state)
-    return np.stack([friction.force(state.turning_over(replace(
+    return np.stack([friction.force(state.with_smoothing(replace(
         state.reversal, rate=factor * state.reversal.rate,
         slide=factor * state.reversal.slide))) - before
         for factor in PASSIVE_WIDTHS])

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.files.samples import Mask
-from pprs_dynamics.measurement.motion.differentiation import LocalPolynomial
+from pprs_dynamics.measurement.motion.differentiation import ORDER, LocalPolynomial
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction, LiveSample
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.force_model import ForceModel
@@ -24,7 +24,10 @@ WINDOW = 0.12  # [s] of the smoothing that gives velocity and acceleration
 ARM_WINDOW = 0.25  # [s]
 ERROR_SPAN = 2.0  # [s] over which the running error is taken
 # Stamps to see before their step is known; more than a late first message or two.
-STAMPS_TO_LEARN = 50
+STAMPS_TO_LEARN = 16
+# Samples of a window: with three more than the polynomial has coefficients, residuals tell uneven
+# sampling from late stamps, and two samples may be missing.
+FEWEST = ORDER + 4
 # A drive's model explains nothing where its error is that share of what is larger of its effort and
 # the model's, both well above the noise: below it is the size of a friction that is off.
 AS_LARGE, ABOVE_NOISE = 0.9, 5.0
@@ -55,7 +58,8 @@ class LiveComparison:
     """Takes joint states one by one, and gives model and residual for those it can judge.
 
     Answers lag by half the smoothing window: acceleration needs samples from both sides. They
-    are computed many at a time, which costs hardly more than one.
+    are computed many at a time, which costs hardly more than one. A window has at least `FEWEST`
+    samples: of a stream at 10 Hz it lasts a second.
 
     Parameters
     ----------
@@ -70,7 +74,7 @@ class LiveComparison:
                  ) -> None:
         self._window = window or (ARM_WINDOW if model.moves_joints else WINDOW)
         self._span = span
-        self._stamps: list[float] = []
+        self._learning: list[tuple[float, ArrayLike, ArrayLike]] = []
         self._live: LiveReconstruction | None = None
         self._gaps_before = self._bridged_before = self._lost_in_a_row = 0
         self._waiting: list[LiveSample] = []
@@ -98,18 +102,17 @@ class LiveComparison:
     def push(self, time: float, position: ArrayLike, effort: ArrayLike) -> None:
         """Take one sample, drives in order, as it is recorded; effort NaN means no measurement."""
         if self._live is None:
-            self._learn(time)
-        if self._live is not None:
-            lost = self._live.gaps + self._live.bridged
-            sample = self._live.push(time, position, np.asarray(effort) * self._model.recorded_gain)
-            if sample is not None:
-                self._waiting.append(sample)
-            self._lost_in_a_row = (
-                self._lost_in_a_row + 1 if self._live.gaps + self._live.bridged > lost else 0)
-            if self._lost_in_a_row == STAMPS_TO_LEARN:  # nothing is lost: another rate
-                self._gaps_before, self._bridged_before = self.gaps + 1, self.bridged
-                self._lost_in_a_row = 0
-                self._live, self._stamps = None, []
+            self._learn(time, position, effort)
+            return
+        lost = self._live.gaps + self._live.bridged
+        sample = self._live.push(time, position, np.asarray(effort) * self._model.recorded_gain)
+        if sample is not None:
+            self._waiting.append(sample)
+        self._lost_in_a_row = (
+            self._lost_in_a_row + 1 if self._live.gaps + self._live.bridged > lost else 0)
+        if self._lost_in_a_row == STAMPS_TO_LEARN:  # nothing is lost: another rate
+            self._gaps_before, self._bridged_before = self.gaps + 1, self.bridged
+            self._lost_in_a_row, self._live = 0, None
 
     def evaluate(self) -> Compared | None:
         """Return the samples that have become judgeable since the last call, None for none.
@@ -174,15 +177,19 @@ class LiveComparison:
                 self._model.drives, errors.T, models.T, moves.T, strict=True)
             if _is_unexplained(error, model, moving))
 
-    def _learn(self, time: float) -> None:
-        if self._stamps and not time > self._stamps[-1]:
-            self._stamps.clear()
-        self._stamps.append(time)
-        if len(self._stamps) < STAMPS_TO_LEARN:
+    def _learn(self, time: float, position: ArrayLike, effort: ArrayLike) -> None:
+        """Find the step of the stamps; the samples it was found from are taken then."""
+        learning = self._learning
+        if learning and not time > learning[-1][0]:
+            learning.clear()
+        learning.append((time, position, effort))
+        if len(learning) < STAMPS_TO_LEARN:
             return
-        step = float(np.median(np.diff(self._stamps)))
-        samples = max(7, 2 * round(self._window / step / 2) + 1)
-        self._live = LiveReconstruction(LocalPolynomial(samples, step))
+        step = float(np.median(np.diff([stamp for stamp, _, _ in learning])))
+        samples = max(FEWEST, 2 * round(self._window / step / 2) + 1)
+        self._live, self._learning = LiveReconstruction(LocalPolynomial(samples, step)), []
+        for sample in learning:
+            self.push(*sample)
 
     def _forces(self, samples: list[LiveSample]) -> Array:
         model: Any = self._model

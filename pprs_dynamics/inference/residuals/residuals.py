@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.drives import DriveUnits, common_effort
 from pprs_dynamics.errors import PprsError
 
@@ -178,6 +178,18 @@ class Residuals:
             {name: mean(part) for name, part in self.parts.items()},
             {name: mean(array) for name, array in self.variables.items()}, self.period * factor,
             self.units, record)
+
+
+def rms(residuals: Residuals) -> float:
+    """Return the root of the mean squared error over samples and drives, in `residuals.unit`."""
+    return root_mean_square(residuals.error)
+
+
+def rms_by_drive(residuals: Residuals) -> dict[str, float]:
+    """Return the root of the mean squared error of every drive that was measured [N or N m]."""
+    return {drive: root_mean_square(residuals.error[:, d])
+            for d, drive in enumerate(residuals.drives)
+            if np.isfinite(residuals.error[:, d]).any()}
 
 
 def _runs(segment: np.typing.NDArray[np.int_]) -> list[slice]:

@@ -12,6 +12,7 @@ from math import comb, inf, log, log1p
 from typing import Any, ClassVar
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
@@ -424,19 +425,17 @@ class PriorCosts:
                          drives=self.of_drives(drives),
                          shapes=2 * log(families) + 2 * log(patterns))
 
-    def of_right_signs(self, component: Component) -> float:
-        """Return the prior cost of physical signs: less than nothing.
+    def of_sign(self, deviations: float) -> float:
+        """Return the penalty of a coefficient that is physical on one side only.
 
-        The prior of k signed coefficients is symmetric; of its 2^k orthants one has all but the
-        odds of a wrong sign, and the others share these.
+        -2 ln of the prior's mean over the posterior: e of the prior probability is on the wrong
+        side, where e are the odds of a wrong sign.
+
+        Parameters
+        ----------
+        deviations : float
+            Distance from the least physical value, in standard deviations of the posterior.
         """
-        k = len(component.signed)
-        return -2 * (k * log(2) + log1p(-self.decisions.wrong_sign_odds)) if k else 0.0
-
-    def of_wrong_signs(self, component: Component, values: Mapping[str, float]) -> float:
-        """Return what it costs more that parameters are unphysical by their sign."""
-        if all(values[name] >= component.effect.unphysical_below[name]
-               for name in component.signed):
-            return 0.0
-        odds = self.decisions.wrong_sign_odds
-        return -2 * log(odds / (1 - odds) / (2 ** len(component.signed) - 1))
+        e = self.decisions.wrong_sign_odds
+        return -2 * float(log(2) + np.logaddexp(log1p(-e) + log_ndtr(deviations),
+                                                log(e) + log_ndtr(-deviations)))

@@ -339,7 +339,6 @@ class Components:
     def component_prior_cost(self, component: Component) -> CostTerms:
         """Return the prior cost of a component beside that of its hypotheses and drives.
 
-        With signs that are physical; what others cost more is known once they are fitted.
         That an effect is usually small makes large values unlikely, and small ones no likelier:
         it costs by how much that narrows the prior, and the odds that it is otherwise at all, which
         a further sensor settles.
@@ -356,8 +355,7 @@ class Components:
                         else decisions.gain_odds))
             self._prior_costs[component] = CostTerms(
                 coefficients=narrowed, names=odds, shapes=self.prior_costs.of_component(
-                    component.effect, len(self.trials(component))),
-                signs=self.prior_costs.of_right_signs(component))
+                    component.effect, len(self.trials(component))))
         return self._prior_costs[component]
 
     def force(self, fitted: CandidateSet, candidate: Candidate, shape: tuple[int, ...]) -> Array:

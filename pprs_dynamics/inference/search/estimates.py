@@ -27,11 +27,13 @@ from pprs_dynamics.inference.search.candidates import CandidateSet, Component, E
 from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.reversal_widths import place_of
-from pprs_dynamics.physics.effects.added_body import AddedBody
+from pprs_dynamics.physics.effects.added_body import AXES, AddedBody
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 TOLD = 0.5  # of a coefficient's prior variance, below which the recordings tell it
+# Of the usual precision, for the centre of a body about which the set says nothing.
+FREE = 1e-2
 
 
 @dataclass(frozen=True)
@@ -107,6 +109,10 @@ def estimate(fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
     """
     slopes = dict(fits.slopes(fitted))
     elsewhere = [] if are_drives_known else _told_elsewhere(fits, fitted, candidate)
+    centres = {component: _free_centre(fits, component, names)
+               for component in candidate.components
+               if (names := moments_left_out(component.effect, component.names))}
+    elsewhere += centres.values()
     fit = fits.regression.stated(fitted.fit, [*slopes.values(), *elsewhere])
     parameters: dict[str, Estimate] = {}
     bound: list[str] = []
@@ -115,6 +121,11 @@ def estimate(fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
         index = _places(fits, fit, component, slopes.get(component))
         c, covariance = fitted.coefficients(component), _covariance(
             fits, fit, component, len(index), index)
+        if component in centres:
+            determined, covariance[0, 0] = _beside_centre(
+                component, c, fit, [*index[:1], *fit.index_of([centres[component]])],
+                fits.components.block(component).precision[0, 0])
+            moments.update(determined)
         some, held = _of_component(fits, component, c, covariance, moved=fitted.fit.coefficients)
         parameters.update(some)
         bound += held
@@ -122,6 +133,54 @@ def estimate(fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
     for key, changed in _left_out(fits, fitted, candidate).items():
         parameters[key] = replace(parameters[key], std=changed.std)
     return Estimates(parameters, tuple(bound), moments)
+
+
+def moments_left_out(effect: type[CatalogueEffect], names: Sequence[str]) -> tuple[str, ...]:
+    """Return the first moments of a body at the tool that was fitted as a mass alone."""
+    moments = tuple(f'moment_{axis}' for axis in AXES)
+    known = {coefficient.name for coefficient in effect.coefficients}
+    return moments if (issubclass(effect, AddedBody) and tuple(names) == ('mass',)
+                       and known.issuperset(moments)) else ()
+
+
+def _free_centre(fits: FittedSets, component: Component, moments: tuple[str, ...]) -> Block:
+    """Return the columns of first moments, of which nearly nothing is known beforehand.
+
+    A motion that determines mass times distance alone determines neither of them: the interval of
+    the mass has to allow for every centre.
+    """
+    block = fits.components.block(replace(component, names=moments, given=()))
+    return replace(block, precision=FREE * block.precision)
+
+
+def _beside_centre(component: Component, c: Array, fit: JointFit, index: Sequence[int],
+                   precision: float) -> tuple[dict[str, Estimate], float]:
+    """Return the best known combination of mass and first moments, and the variance of the mass.
+
+    Parameters
+    ----------
+    component : Component
+        A mass at a fixed centre.
+    c : (1,) array
+        The mass.
+    fit : JointFit
+    index : sequence of int
+        Places of the mass and of the first moments in the fit.
+    precision : float
+        Of the mass in its prior, which would narrow the interval by itself.
+    """
+    covariance = fit.covariance[np.ix_(index, index)]
+    scale = np.sqrt(np.diag(covariance))
+    inverse = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True)
+    weights = inverse[0] / inverse[0, 0] * scale[0] / scale
+    terms = [f'{"+" if weight > 0 else "-"} {abs(weight):.3g} moment_{axis}'
+             for axis, weight in zip(AXES, weights[1:], strict=True) if abs(weight) > 1e-3]
+    total = component.total(c)[[one.name for one in component.effect.coefficients].index('mass')]
+    combination = Estimate(
+        float(total), float(scale[0] * inverse[0, 0] ** -0.5), 'kg')
+    # Without its prior; of a mass that is all prior, with a share of it (Sherman and Morrison).
+    variance = covariance[0, 0] / max(1 - precision * covariance[0, 0], FREE)
+    return {' '.join(['mass', *terms]): combination} if terms else {}, float(variance)
 
 
 def averaged(reported: Estimates, others: Sequence[tuple[float, Estimates]]) -> Estimates:

@@ -29,12 +29,10 @@ from pprs_dynamics.inference.search.candidates import (
     set_key,
 )
 from pprs_dynamics.inference.search.components import Components
+from pprs_dynamics.inference.search.constraints import Constraints
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
-from pprs_dynamics.inference.search.possible_bodies import with_possible_bodies
-from pprs_dynamics.inference.search.possible_totals import with_possible_totals
-from pprs_dynamics.physics.effects.added_body import AddedBody
 
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
 NEAR = 1e-3  # [m], within which a body is where its columns are
@@ -74,6 +72,7 @@ class FittedSets:
         self.prior_costs = PriorCosts.of(self.regression, decisions, design.given)
         self.components = Components(design, self.regression, self.prior_costs)
         self.settled: dict[Hashable, Any] = {}
+        self.constraints = Constraints(design)
         self._evaluated: dict[Hashable, CandidateSet] = {}
         self._nuisance: dict[Hashable, tuple[Block, ...]] = {}
 
@@ -115,21 +114,16 @@ class FittedSets:
             nuisance = self._nuisance_blocks(candidates, self.regression.at(
                 self.blocks(candidates), start))
         fit = self.regression.fit(self.blocks(candidates, nuisance), start)
-        bodies = {component: self.components.block(component) for c in candidates
-                  for component in c.components
-                  if issubclass(component.effect, AddedBody) and component.effect.has_extent}
-        possible = with_possible_bodies(self.design.given, self.regression, fit, bodies)
         fitted = self._set(candidates, fit, nuisance)
+        possible = self.constraints.applied(self.regression, fit, fitted.blocks)
         if possible is None:
-            return replace(fitted, barred='no body that can be comes near')
-        possible = with_possible_totals(self.design, self.regression, possible,
-                                        fitted.blocks.items())
+            return replace(fitted, barred='no possible values come near')
         if possible is not fit:
-            # What possible values cost is told as such, not as a worse fit.
+            # The rise of the cost is a term of its own, not a worse fit.
             feasible = CostTerms(feasibility=possible.deviance - fit.deviance)
-            held = self._set(candidates, possible, nuisance)
-            signs = CostTerms(signs=held.terms.signs - fitted.terms.signs)
-            fitted = replace(held, terms=fitted.terms + signs + feasible)
+            moved = replace(fitted, fit=possible)
+            signs = CostTerms(signs=self._signs(moved, fit.covariance) - fitted.terms.signs)
+            fitted = replace(moved, terms=fitted.terms + signs + feasible)
         return replace(fitted, barred=self._barred(fitted))
 
     def pruned(self, fitted: CandidateSet) -> CandidateSet:
@@ -165,15 +159,10 @@ class FittedSets:
         return CostTerms(fit=left, coefficients=fit.deviance - left)
 
     def _barred(self, fitted: CandidateSet) -> str:
-        """Return why a set may not be: a value beyond its bounds, or a pattern that is none.
+        """Return why a set may not be: a pattern that is none.
 
         A pattern has to be more than the lack of fit of the effects beside it.
         """
-        beyond = sorted({component.effect.name for component in fitted.blocks
-                         if not component.is_within(fitted.coefficients(component),
-                                                    units_of(self.design.given, component.drive))})
-        if beyond:
-            return f'a value of {", ".join(beyond)} is beyond its bounds'
         for candidate in fitted.unknowns:
             ratio, names = discrepancy_ratio(self.design, self.regression, self.decisions, fitted,
                                              candidate)
@@ -218,12 +207,21 @@ class FittedSets:
         return self._set(candidates, fit, nuisance)
 
     def prior_cost(self, fitted: CandidateSet) -> CostTerms:
-        """Return the prior cost of all that was chosen, and of signs that are unphysical."""
-        wrong = CostTerms(signs=sum(
-            self.prior_costs.of_wrong_signs(
-                component, component.values(fitted.coefficients(component)))
-            for component in fitted.blocks))
-        return sum(map(self.components.prior_cost, fitted.candidates), wrong)
+        """Return the prior penalties of a set: of all that was chosen, and of signs."""
+        return sum(map(self.components.prior_cost, fitted.candidates),
+                   CostTerms(signs=self._signs(fitted, fitted.fit.covariance)))
+
+    def _signs(self, fitted: CandidateSet, covariance: Array) -> float:
+        """Return the penalty of the signs of a set's coefficients, given their covariance."""
+        cost = 0.0
+        for component, block in fitted.blocks.items():
+            values = component.values(fitted.coefficients(component))
+            for name in component.signed:
+                at = fitted.fit.places[block].start + component.names.index(name)
+                cost += self.prior_costs.of_sign(
+                    (values[name] - component.effect.unphysical_below[name])
+                    / max(float(covariance[at, at]) ** 0.5, 1e-300))
+        return cost
 
     def drop_cost(self, fitted: CandidateSet, component: Component) -> float:
         """Return by how much the deviance rises without a component, at the noise of a fit.
@@ -233,8 +231,11 @@ class FittedSets:
         block = fitted.blocks[component]
         if block.mean is not None:  # without it the shape goes, too
             return np.inf
-        place = fitted.fit.places[block]
-        c, covariance = fitted.fit.coefficients[place], fitted.fit.covariance[place, place]
+        # Without the constraints, which say nothing of the density at 0.
+        fit = (fitted.fit if fitted.terms.feasibility == 0
+               else self.regression.at(fitted.fit.blocks, fitted.fit.amplitudes))
+        place = fit.places[block]
+        c, covariance = fit.coefficients[place], fit.covariance[place, place]
         return float(c @ np.linalg.solve(covariance, c) + np.linalg.slogdet(covariance)[1]
                      + np.linalg.slogdet(block.precision)[1])
 
@@ -243,7 +244,7 @@ class FittedSets:
 
         At the noise of the set, so that a bad value cannot hide in it.
         """
-        fit = self.regression.held(self.regression.stated(fitted.fit), index, values)
+        fit = self.regression.held(fitted.fit, index, values)
         return replace(fitted, fit=fit, terms=fitted.terms + CostTerms(
             fit=fit.deviance - fitted.fit.deviance))
 

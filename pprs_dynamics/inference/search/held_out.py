@@ -1,74 +1,182 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Blocks of the recordings, each predicted from a fit to the others.
+"""The predictive test: whether data that took no part in a fit are predicted better with it.
 
-The noise and the priors are those of the whole fit. Rows are whitened and brought back into time,
-so that a block's share in the normal equations can be taken out.
+The gain of a drive is by how much its squared error falls, whitened by the noise, so that newtons
+and newton metres can be added. The noise at each frequency is what the better of the two models
+leaves there. A force that one of them takes for slow noise is then not forgiven.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import chain
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.regression.joint_fit import Integers
+from pprs_dynamics.inference.regression.joint_fit import LEAST_SAMPLES, Integers, Regression
 from pprs_dynamics.inference.regression.normal_equations import Prior
-from pprs_dynamics.inference.residuals.paired_errors import BLOCKS, PairedGain
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
+
+BLOCKS = 10
+SURE = 2.0  # standard errors by which a drive that loses must lose
+
+
+@dataclass(frozen=True)
+class PredictiveGain:
+    """By how much one model predicts held-out data better than another, drive by drive.
+
+    Parameters
+    ----------
+    drives : tuple of str
+        D of them.
+    gains : (B, D) array
+        Whitened squared error of the first model less that of the second, in B blocks.
+    sizes : (B, D) array
+        Whitened squares of the difference between the two predictions.
+    """
+
+    drives: tuple[str, ...]
+    gains: Array
+    sizes: Array
+
+    @cached_property
+    def by_drive(self) -> Mapping[str, float]:
+        """The gain of each drive in its standard errors; 0 where nothing was predicted."""
+        return {drive: _in_errors(self.gains[:, d], self.sizes[:, d])
+                for d, drive in enumerate(self.drives)}
+
+    @cached_property
+    def certainty(self) -> float:
+        """The gain of all drives together in its standard errors."""
+        return _in_errors(self.gains.sum(axis=1), self.sizes.sum(axis=1))
+
+    def confirms(self, errors: float) -> bool:
+        """Return whether the second model predicts better, by more than some standard errors.
+
+        The gain of all drives together is enough, or that of one drive beyond `_among_drives`, if
+        no other drive loses. A number that is not finite confirms nothing.
+        """
+        found = list(self.by_drive.values())
+        return bool(
+            np.all(np.isfinite([self.certainty, *found])) and not self.losing
+            and (self.certainty > errors or max(found, default=0.0) > self._among_drives(errors)))
+
+    @property
+    def losing(self) -> tuple[str, ...]:
+        """Drives that are predicted worse, beyond the uncertainty of their gain."""
+        least = self._among_drives(SURE)
+        return tuple(drive for drive, found in self.by_drive.items() if found < -least)
+
+    def _among_drives(self, errors: float) -> float:
+        """Return what one of D drives exceeds as rarely as a single one exceeds `errors`."""
+        from scipy.special import ndtr, ndtri  # here: a command that fits nothing starts without it
+
+        return float(-ndtri(ndtr(-errors) / max(len(self.drives), 1)))
+
+
+def _in_errors(gains: Array, sizes: Array) -> float:
+    """Return the sum of gains over blocks (B,) in its standard errors.
+
+    Of blocks in which a model changes nothing nothing is expected: the gain is a ratio estimate,
+    its error what gains differ by from their share by size (W. G. Cochran, Sampling Techniques,
+    3rd ed., 1977, 6.4), and no less than noise makes, with 4 |a - b|^2 the variance of
+    |noise - a|^2 - |noise - b|^2. It is no less than 1 either: two predictions that differ by less
+    than the noise of one coefficient are the same.
+    """
+    total, size, count = float(gains.sum()), float(sizes.sum()), len(gains)
+    if size <= 0:
+        return 0.0
+    spread = count / (count - 1) * float(np.sum((gains - total / size * sizes) ** 2))
+    return total / float(np.sqrt(max(4 * size, spread, 1.0)))
+
+
+def sample_gains(before: Residuals, after: Residuals) -> tuple[Array, Array]:
+    """Return `gains` and `sizes` of a `PredictiveGain` sample by sample, (M, D) each.
+
+    A drive with fewer than `LEAST_SAMPLES` measurements has gains of 0.
+
+    Parameters
+    ----------
+    before, after : Residuals
+        Of two models on the same recordings.
+    """
+    gains, sizes = np.zeros(before.error.shape), np.zeros(before.error.shape)
+    counts = np.isfinite(before.measured).sum(axis=0)
+    if counts.max() < LEAST_SAMPLES:
+        return gains, sizes
+    fits = [(regression, regression.fit(())) for regression in map(Regression, (before, after))]
+    for d in fits[0][0].drives:
+        series = fits[0][0].series[d]
+        power = np.minimum(*(regression.noise(fit)[d].power(series.frequency)
+                             for regression, fit in fits))
+        first, second = (series.inverse(series.cosines(error[:, d]) / np.sqrt(power))
+                         for error in (before.error, after.error))
+        gains[series.index, d] = first ** 2 - second ** 2
+        sizes[series.index, d] = (first - second) ** 2
+    return gains, sizes
+
+
+def predictive_gain(before: Residuals, after: Residuals) -> PredictiveGain:
+    """Return what the second of two models gains on recordings that neither was fitted to."""
+    edges = np.linspace(0, len(before), BLOCKS + 1).astype(int)[:-1]
+    return PredictiveGain(before.drives, *(
+        np.add.reduceat(values, edges, axis=0) for values in sample_gains(before, after)))
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Block cross-validation of a set.
+    """A set's predictions of blocks of the recordings, each from a fit to the other blocks.
 
     Parameters
     ----------
     error : float
         Root of the mean square over samples and drives, reversals as the model has them [N].
     penalties : (BLOCKS,) array
-        Of numbers that the fits to the other blocks stretch beyond what is known of them.
-    white : tuple of (n,) arrays
-        Whitened error of each block, of all drives.
+        Of numbers that the fits to the other blocks move beyond their tolerances.
+    residuals : Residuals
+        Errors of the predictions.
     """
 
     error: float
     penalties: Array
-    white: tuple[Array, ...]
+    residuals: Residuals
 
-    def gain(self, other: HeldOut) -> PairedGain:
-        """Return what another set, under the same noise, takes off the error of this one."""
-        pairs = list(zip(self.white, other.white, strict=True))
-        return PairedGain(
-            # Numbers that are stretched beyond what is known of them cost their share everywhere.
-            np.array([a @ a - b @ b for a, b in pairs])
-            + (self.penalties - other.penalties) / BLOCKS,
-            np.array([(a - b) @ (a - b) for a, b in pairs]))
+    def gain(self, other: HeldOut) -> PredictiveGain:
+        """Return what another set gains on this one."""
+        found = predictive_gain(self.residuals, other.residuals)
+        # Each fit pays for the numbers that it moves, all drives alike.
+        share = (self.penalties - other.penalties) / (BLOCKS * len(found.drives))
+        return replace(found, gains=found.gains + share[:, None])
 
 
 def hold_out(fits: FittedSets, fitted: CandidateSet) -> HeldOut:
-    """Return how well blocks of the recordings are predicted from the others."""
+    """Return how a set predicts blocks of the recordings from the others.
+
+    The fits to the other blocks have the priors and the noise of the whole fit.
+    """
     regression, fit = fits.regression, fitted.fit
     size = len(fit.coefficients)
     total = len(regression.residuals)
     edges = np.linspace(0, total, BLOCKS + 1)
     H, b = np.zeros((BLOCKS, size, size)), np.zeros((BLOCKS, size))
-    white: dict[int, tuple[Integers, Array, Array]] = {}
+    rows_of: dict[int, tuple[Integers, Array]] = {}
     for d in regression.drives:
         series = regression.series[d]
         index, acting = regression.local(fit, d)
-        rows = np.concatenate([regression.base[d][:-1], *(block.rows[d] for block in acting)])
-        y = regression.base[d][-1]
-        root = np.sqrt(series.spread(regression.weights(fit, d)))
-        stacked = series.inverse(np.concatenate((rows, y[None])) * root)
-        white[d] = index, stacked, series.inverse(np.concatenate((rows, y[None])))
+        rows = np.concatenate([regression.base[d][:-1], *(block.rows[d] for block in acting),
+                               regression.base[d][-1:]])
+        white = series.inverse(rows * np.sqrt(series.spread(regression.weights(fit, d))))
+        rows_of[d] = index, series.inverse(rows)
         at = np.searchsorted(series.index, edges)
         for k in range(BLOCKS):
-            part = stacked[:, at[k]:at[k + 1]]
+            part = white[:, at[k]:at[k + 1]]
             H[k][np.ix_(index, index)] += part[:-1] @ part[:-1].T
             b[k, index] += part[:-1] @ part[-1]
     prior = Prior.of(regression.columns, fit.blocks)
@@ -77,15 +185,15 @@ def hold_out(fits: FittedSets, fitted: CandidateSet) -> HeldOut:
     plain = coefficients.copy()
     plain[:, [k for k, column in enumerate(fits.design.base) if not column.in_model]] = 0.0
     plain[:, fit.index_of(chain(*fitted.nuisance.values()))] = 0.0
-    left: list[list[Array]] = [[] for _ in range(BLOCKS)]
+    left = np.full(regression.residuals.measured.shape, np.nan)
     squares, count = 0.0, 0
-    for d, (index, stacked, rows) in white.items():
-        series = regression.series[d]
-        at = np.searchsorted(series.index, edges)
-        for k in range(BLOCKS):
-            block = slice(at[k], at[k + 1])
-            left[k].append(stacked[-1, block] - coefficients[k, index] @ stacked[:-1, block])
-            rest = rows[-1, block] - plain[k, index] @ rows[:-1, block]
-            squares, count = squares + float(rest @ rest), count + len(rest)
+    for d, (index, rows) in rows_of.items():
+        samples = regression.series[d].index
+        block = np.searchsorted(edges, samples, side='right') - 1
+        left[samples, d] = rows[-1] - np.sum(coefficients[block][:, index].T * rows[:-1], axis=0)
+        rest = rows[-1] - np.sum(plain[block][:, index].T * rows[:-1], axis=0)
+        squares, count = squares + float(rest @ rest), count + len(rest)
     return HeldOut(float(np.sqrt(squares / max(count, 1))),
-                   np.array([fit.penalty for fit in others]), tuple(map(np.concatenate, left)))
+                   np.array([one.penalty for one in others]),
+                   replace(regression.residuals, measured=left, model=np.zeros_like(left),
+                           parts={}, variables={}))

@@ -4,7 +4,7 @@
 """What a fit may say of an effect and no machine can have: then it is no finding.
 
 A base that leans as none does, and a gain that is another unit. Negative friction and inertia are
-a matter of cost (`possible_totals`).
+a matter of cost (`constraints`).
 """
 
 from __future__ import annotations

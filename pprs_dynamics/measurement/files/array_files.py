@@ -6,10 +6,12 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
 PARQUET, MAT, NUMPY = ('.parquet', '.pq'), ('.mat',), ('.npz',)
 INFO = Path('meta') / 'info.json'  # of a LeRobot dataset
 DEEPEST = 6  # structures within structures of a MAT file
+LARGEST = 2_000_000_000  # bytes of a file's arrays in memory: 1 000 Hz of 7 joints for three hours
 
 
 @dataclass(frozen=True)
@@ -102,8 +105,16 @@ def _parquet(path: Path, files: Sequence[Path], labels: Mapping[str, Sequence[st
         except (ArrowException, OSError) as error:
             raise UnreadableFileError(file, f'no Parquet file ({_first_line(error)})') from None
 
+    def names_of(file: Path) -> list[str]:
+        try:
+            return list(opened(file).schema_arrow.names)
+        except (ArrowException, UnicodeDecodeError) as error:
+            raise UnreadableFileError(file, f'damaged: its columns have no names in UTF-8 '
+                                      f'({_first_line(error)})') from None
+
     def load(wanted: Sequence[str]) -> Mapping[str, Any]:
         parts = []
+        require_size(path, sum(_parquet_size(opened(file), wanted) for file in files))
         for file in files:
             try:
                 table = opened(file).read(list(wanted))
@@ -117,11 +128,28 @@ def _parquet(path: Path, files: Sequence[Path], labels: Mapping[str, Sequence[st
             raise UnreadableFileError(path, 'its Parquet files do not hold the same columns'
                                       ) from None
 
-    return ArrayTable(path, opened(files[0]).schema_arrow.names, load, labels)
+    return ArrayTable(path, names_of(files[0]), load, labels)
+
+
+def _parquet_size(file: Any, wanted: Sequence[str]) -> int:
+    """Return the bytes of columns by the file's metadata: packed ones by their number of values."""
+    metadata, size = file.metadata, 0
+    for group in map(metadata.row_group, range(metadata.num_row_groups)):
+        for column in map(group.column, range(group.num_columns)):
+            if column.path_in_schema.split('.')[0] in wanted:
+                size += max(column.total_uncompressed_size, 8 * column.num_values)
+    return size
+
+
+def require_size(path: Path, size: int) -> None:
+    """Raise UnreadableFileError for arrays of more bytes than are read."""
+    if size > LARGEST:
+        raise UnreadableFileError(path, f'its arrays have {size / 1e9:.3g} GB, must have at most '
+                                  f'{LARGEST / 1e9:.3g} GB: split it into several files')
 
 
 def _plain(values: Any) -> Any:
-    """Return a column of lists as an array, (N, K), and any other as it is."""
+    """Return a column of lists as an array, (N, K), and any other column unchanged."""
     if values.dtype == object and len(values) and isinstance(values[0], np.ndarray):
         try:
             return np.stack(list(values))
@@ -139,14 +167,24 @@ def _mat(path: Path) -> dict[str, Any]:
     from scipy.io.matlab import MatReadError
 
     try:
+        require_size(path, _mat_size(path))
         content = loadmat(path, squeeze_me=True, struct_as_record=False)
+    except UnreadableFileError:
+        raise
     except NotImplementedError:
         raise UnreadableFileError(path, 'a MAT file of version 7.3, must be saved with -v7'
                                   ) from None
-    except (MatReadError, ValueError, TypeError, OSError, EOFError, IndexError) as error:
+    except (MatReadError, MemoryError, ValueError, TypeError, OSError, IndexError) as error:
         raise UnreadableFileError(path, f'no MAT file ({_first_line(error)})') from None
     return dict(_fields({name: value for name, value in content.items()
                          if not name.startswith('__')}))
+
+
+def _mat_size(path: Path) -> int:
+    """Return the bytes of the variables by the headers of a MAT file."""
+    from scipy.io import whosmat
+
+    return sum(8 * math.prod(shape) for _, shape, _ in whosmat(path))
 
 
 def _fields(content: Mapping[str, Any], before: str = '', depth: int = 0,
@@ -167,8 +205,12 @@ def _fields(content: Mapping[str, Any], before: str = '', depth: int = 0,
 
 def _numpy(path: Path) -> dict[str, Any]:
     try:
+        with ZipFile(path) as archive:
+            require_size(path, sum(one.file_size for one in archive.infolist()))
         with np.load(path, allow_pickle=False) as content:
             return {name: content[name] for name in content.files}
+    except UnreadableFileError:
+        raise
     except Exception as error:  # a damaged archive surfaces as zipfile's and zlib's own errors
         raise UnreadableFileError(path, f'no NumPy file of arrays ({_first_line(error)})'
                                   ) from None

@@ -124,7 +124,7 @@ def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: st
 
 def _of_fields(bag: Bag, drives: tuple[str, ...], fields: Fields, topic: str | None,
                findings: list[Defect]) -> Samples:
-    """Read messages of any type by their fields, and joint states beside them."""
+    """Read messages of any type by their fields, and joint states."""
     topics = {one.topic for one in fields}
     connections = [one for one in bag.connections if one.topic in topics]
     named = {(one.joint, one.quantity) for one in fields}

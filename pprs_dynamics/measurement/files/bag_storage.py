@@ -110,7 +110,7 @@ class Bag:
             yield connection, received, message
 
     def types(self, connections: Collection[Connection]) -> Any:
-        """Return what ROS 2 itself defines, and what the bag defines beside it."""
+        """Return the message types of ROS 2 and those that the bag defines."""
         from rosbags.typesys import get_types_from_msg
 
         store = message_types()

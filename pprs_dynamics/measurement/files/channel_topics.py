@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What bags hold of drives beside their motion and effort: temperatures and pressures.
+"""Further channels of drives in bags: temperatures and pressures.
 
 sensor_msgs/Temperature and sensor_msgs/FluidPressure, and numbers of std_msgs on topics with such a
 name, belong to the drive that their topic or frame names, and to all drives where it names none.
@@ -43,7 +43,7 @@ def channel_of(topic: str, kind: str) -> str | None:
 
 
 def read_channels(bag: Bag, joints: tuple[str, ...], stamps: Indices) -> dict[str, Array]:
-    """Return what a bag holds beside motion and effort, (N, D) by channel, NaN between messages.
+    """Return further channels of a bag, (N, D) by name, NaN between messages.
 
     Parameters
     ----------

@@ -13,6 +13,7 @@ are libraries of 60 and 170 MB, and neither says in which row and column a cell 
 from __future__ import annotations
 
 import gzip
+import os
 import re
 import zlib
 from collections.abc import Iterator, Sequence
@@ -45,6 +46,7 @@ SEPARATORS = (',', ';', '\t', '|')
 BLANK = ' '  # where nothing else is between the cells
 REMARKS = ('#', '%', 'sep=')  # lines that may stand above a table
 ZSTANDARD = ('.zst', '.zstd')
+LARGEST_UNPACKED = 2_000_000_000  # bytes
 NO_TEXT = 'neither rosbag2 (MCAP, sqlite3) nor CSV text in UTF-8'
 
 
@@ -175,7 +177,10 @@ class CsvTable:
         """Yield the used columns of the rows, (n, columns used)."""
         dates = {k for k in used if k < len(self.sample) and self.sample[k].strip()
                  and not _is_number(self.sample[k], self.decimal) and _is_date(self.sample[k])}
+        is_packed, size = self.path.suffix in ('.gz', *ZSTANDARD), 0
         for start, lines in read_lines(self.path, file, start=self.above + 1):
+            size += sum(map(len, lines)) + len(lines)
+            _check_unpacked(self.path, size if is_packed else 0)
             numbered = [(number, line) for number, line in enumerate(lines, start) if line.strip()]
             if self.separator == BLANK:
                 numbered = [(number, BLANK.join(line.split())) for number, line in numbered]
@@ -284,10 +289,20 @@ def _text_of(path: Path) -> Iterator[tuple[TextIO, IO[bytes]]]:
 
 def _unpacked(path: Path, raw: IO[bytes]) -> IO[bytes]:
     if path.suffix == '.gz':
+        # Its last four bytes are the length of what was packed.
+        raw.seek(-min(4, path.stat().st_size), os.SEEK_END)
+        _check_unpacked(path, int.from_bytes(raw.read(), 'little'))
+        raw.seek(0)
         return cast('IO[bytes]', gzip.GzipFile(fileobj=raw))
     if path.suffix in ZSTANDARD:
         return cast('IO[bytes]', zstd().open(raw, 'rb'))
     return raw
+
+
+def _check_unpacked(path: Path, size: int) -> None:
+    if size > LARGEST_UNPACKED:
+        raise UnreadableFileError(path, f'it unpacks to more than {LARGEST_UNPACKED / 1e9:g} GB: '
+                                  'unpack it, or split it into several files')
 
 
 def zstd() -> Any:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Judging samples: every defect is found, told, and treated by the policy in `samples.POLICY`."""
+"""Check samples: every defect is reported and treated by the policy in `samples.POLICY`."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Judgement:
     Attributes
     ----------
     samples : Samples
-        What is left.
+        The remaining samples.
     segments : tuple of slice
         Stretches without reset, jump, gap or change of rate, of at least 20 samples.
     findings : list of Defect
@@ -72,7 +72,7 @@ class Judgement:
 
     def _tell(self, kind: str, count: int, what: str, places: Iterable[tuple[int, int]] = (),
               drives: Iterable[str] = ()) -> None:
-        """Add a finding with places as (first, last) samples, if there is anything to tell."""
+        """Add a finding with places as (first, last) samples, if there are any."""
         if not count:
             return
         time = self.samples.time
@@ -101,7 +101,7 @@ class Judgement:
         self._starts = np.union1d(self._starts, firsts.astype(np.int64))
 
     def _mark_impossible(self) -> None:
-        """Take numbers that nothing can have measured for such that were not."""
+        """Replace damaged numbers by NaN: beyond all measurement, or few and far from the rest."""
         samples = self.samples
         for quantity, unit, values in (('position', 'm', samples.position),
                                        ('velocity', 'm/s', samples.velocity),
@@ -109,6 +109,9 @@ class Judgement:
             if values is None:
                 continue
             bad = np.isfinite(values) & (np.abs(values) > LARGEST_MEASURED)
+            rest = np.where(bad, np.nan, values)
+            bad |= np.column_stack([signals.far_from_the_rest(column, SHORTEST_SEGMENT)
+                                    for column in rest.T])
             if not np.any(bad):
                 continue
             largest = float(np.abs(values[bad]).max())
@@ -118,7 +121,7 @@ class Judgement:
             unit = samples.unit_of(int(np.argmax(np.any(bad, axis=0))), unit)
             self._tell_samples(f'impossible_{quantity}', np.any(bad, axis=1),
                                f'with {article} {quantity} of {", ".join(drives)} up to '
-                               f'{largest:.3g} {unit}, which none can be,', drives)
+                               f'{largest:.3g} {unit}, far from all others,', drives)
 
     def _drop_non_finite(self) -> None:
         bad_time = ~np.isfinite(self.samples.time)

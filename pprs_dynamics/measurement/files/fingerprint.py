@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What tells one recording from every other: the SHA-256 of its file or of its samples."""
+"""Identity of a recording: the SHA-256 of its file or of its samples."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.system.input_files import require_file
 
 
 def fingerprint(path: str | PathLike[str]) -> str:
@@ -24,6 +25,7 @@ def fingerprint(path: str | PathLike[str]) -> str:
     path = Path(path)
     try:
         if not path.is_dir():
+            require_file(path)
             with path.open('rb') as file:
                 return hashlib.file_digest(file, 'sha256').hexdigest()
         whole = hashlib.sha256()

@@ -67,7 +67,7 @@ class Merged(NamedTuple):
     arrays : list of (N, D) arrays
         Positions, velocities and efforts, NaN where unknown.
     channels : dict of (N, D) arrays
-        What was measured beside them.
+        Further measured channels.
     in_amperes : tuple of D bool
         Drives whose efforts are currents.
     findings : list of Defect

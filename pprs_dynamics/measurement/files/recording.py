@@ -275,8 +275,8 @@ def _as_efforts(path: Path, samples: Samples, drives: RecordedDrives,
                                   'arm has a gain, by which they become efforts')
     if not is_known:
         samples = replace(samples, findings=(*samples.findings, Defect(
-            'no_gain', int(np.sum(currents)), f'the efforts of {names} are currents, and the model '
-            'has no gain (write gain, the effort per ampere of each drive)',
+            'no_gain', int(np.sum(currents)), f'the efforts of {names} are currents, and the gain '
+            'of the model is 1 (write gain, the effort per ampere of each drive)',
             drives=tuple(np.array(drives.names)[currents].tolist()))))
     applied: Array = np.where(currents, np.asarray(gain), np.nan)
     efforts = np.where(currents, samples.effort * np.asarray(gain), samples.effort)

@@ -130,7 +130,7 @@ class Samples:
     source : str
         Format and topic, for people.
     findings : tuple of Defect
-        What the reader of the file has to tell.
+        Remarks of the reader of the file.
     in_amperes : tuple of D bool
         Drives whose `effort` is a current [A]; () for none.
     units : tuple of D DriveUnits

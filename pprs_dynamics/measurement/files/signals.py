@@ -21,6 +21,9 @@ SURROUNDINGS = 5
 # A jump that is undone within this many samples is a spike; the remainder may be this part.
 SPIKE_SAMPLES = 3
 SPIKE_REMAINDER = 0.1
+# Damaged rows: at most this share of the values, farther from the middle of all others than this
+# many of their ranges.
+FEW, FAR = 0.005, 10.0
 # Sensors with any noise do not repeat all their values for so long [s], nor in so many samples.
 FROZEN_TIME = 0.1
 FROZEN_SAMPLES = 10
@@ -77,6 +80,20 @@ def find_jumps(samples: Samples) -> Jumps:
                 found.spike_drives.add(drive)
                 at = int(np.searchsorted(fast, back)) + 1
     found.jumps.sort()
+    return found
+
+
+def far_from_the_rest(values: Array, longest: int) -> Mask:
+    """Return which values, (N,), are few, short and far from the range of all others."""
+    found = np.zeros(len(values), dtype=bool)
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return found
+    low, high = np.quantile(known, (FEW, 1 - FEW), method='nearest')
+    far = np.isfinite(values) & (np.abs(values - (low + high) / 2) > FAR * (high - low))
+    if high > low and far.sum() <= FEW * len(known):
+        for first, last in runs(far):
+            found[first:last + 1] = last - first < longest
     return found
 
 

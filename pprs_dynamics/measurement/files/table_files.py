@@ -177,8 +177,14 @@ def _shared(table: Table, joints: tuple[str, ...], columns: RecordedColumns,
 
 
 def _require(table: Table, wanted: Sequence[Column]) -> None:
-    """Raise UnreadableFileError where a table lacks a column."""
+    """Raise UnreadableFileError where a table lacks a column, or has two of that name."""
     for column in wanted:
+        if not isinstance(column, int) and table.names.count(column) > 1:
+            places = [str(k) for k, name in enumerate(table.names, 1) if name == column]
+            raise UnreadableFileError(
+                table.path, f'{len(places)} columns have the name {column!r}: '
+                + (f'write the number of the right one, {" or ".join(places)}'
+                   if isinstance(table, CsvTable) else 'rename one of them'))
         if not isinstance(column, int) and not _holder(table, column):
             if not table.names:
                 raise UnreadableFileError(
@@ -228,6 +234,8 @@ def _series(path: Path, name: str, values: Any, element: int | None, length: int
     array = np.asarray(values)
     if not np.issubdtype(array.dtype, np.datetime64):
         try:
+            if array.dtype.kind == 'c':
+                raise TypeError('complex numbers')
             array = array if array.dtype.kind in 'iu' else array.astype(float)
         except (TypeError, ValueError):
             raise UnreadableFileError(path, f'column {name!r} holds something else than numbers'

@@ -95,18 +95,20 @@ class LocalPolynomial:
         return _coefficients(self.window, self.step)
 
     def fitted(self, offsets: Array, values: Array) -> tuple[Array, float]:
-        """Return value, first and second derivative in the middle, (3, D), and the squares left.
+        """Return value and two derivatives in the middle, (3, D), and the sum of squared residuals.
 
         Parameters
         ----------
-        offsets : (window,) array
-            Times of the samples less that of the middle [s], at equal steps or not.
-        values : (window, D) array
+        offsets : (n,) array
+            Times of the samples less that of the middle [s], at equal steps or not. With fewer
+            samples than the polynomial has coefficients its order is lower.
+        values : (n, D) array
         """
-        basis = np.polynomial.legendre.legvander(offsets / (self.half * self.step), ORDER)
-        found = np.linalg.solve(basis.T @ basis, basis.T @ values)
-        derivatives: Array = _middle(self.window, self.step) @ found
-        return derivatives, float(np.sum((values - basis @ found) ** 2))
+        order = min(ORDER, len(offsets) - 1)
+        basis = np.polynomial.legendre.legvander(offsets / (self.half * self.step), order)
+        coefficients = np.linalg.lstsq(basis, values, rcond=None)[0]
+        derivatives: Array = _middle(self.window, self.step)[:, :order + 1] @ coefficients
+        return derivatives, float(np.sum((values - basis @ coefficients) ** 2))
 
     @property
     def cut_off(self) -> float:
@@ -189,7 +191,7 @@ def representative(stretches: Sequence[Stretch]) -> list[Stretch]:
 def choose_smoothing(
     stretches: Sequence[Stretch], duration: float | None = None, unit: str = 'm',
 ) -> Smoothing:
-    """Return the window that leaves the least error in accelerations.
+    """Return the window with the least error in accelerations.
 
     For each window w the noise that it lets through is known, from that of the positions and its
     weights. Its distortion shows in the difference from a window of three quarters, which has
@@ -201,7 +203,7 @@ def choose_smoothing(
     stretches : sequence of Stretch
         Long enough for the shortest window.
     duration : float, optional
-        Take this window [s], and only say what it leaves.
+        Take this window [s], and only report its error.
     unit : str
         Of the positions.
 
@@ -238,7 +240,7 @@ def choose_smoothing(
 
 
 def position_noise(stretches: Sequence[Stretch]) -> Array:
-    """Return the noise of positions, (D,) [m rms], from what the shortest window leaves."""
+    """Return the noise of positions, (D,) [m rms], from the residual of the shortest window."""
     squares, count = 0.0, 0
     for q, step, _ in stretches:
         filter_ = LocalPolynomial(SHORTEST_WINDOW, step)

@@ -16,7 +16,7 @@ from pprs_dynamics.measurement.files.stamps import LOST_STEPS
 from pprs_dynamics.measurement.motion.differentiation import LocalPolynomial
 
 # Stamps that are off by less, in steps, count as equal steps.
-UNEVEN = 0.02
+UNEVEN = 0.001
 # Samples in a row that may be missing, as transport loses them: the polynomial goes through those
 # that are there. More are a standstill of the sender.
 BRIDGED = 2

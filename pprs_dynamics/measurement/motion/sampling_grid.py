@@ -9,7 +9,7 @@ instants of the samples again. Efforts stay where they were measured: they are n
 Stamps that jitter can mean two things: the samples were taken at equal steps and stamped late
 (a busy computer), or they were taken when the stamps say. The wrong reading adds noise to the
 positions, of the size of jitter times velocity, so the data decide. Where jitter is too small to
-matter beside the positions' own noise, the steps are taken as equal.
+matter against the noise of the positions, the steps are taken as equal.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class SamplingGrid:
 
 
 def find_grid(time: Array, position: Array) -> tuple[SamplingGrid, str]:
-    """Return the grid of a segment, and what there is to tell of it ('' for nothing).
+    """Return the grid of a segment, and a remark on it ('' for none).
 
     Parameters
     ----------

@@ -5,7 +5,7 @@
 
 It is no force law of the drive alone but a relaxation oscillation of falling friction, the
 stiffness before the drive and its controller (B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit,
-Automatica 30 (1994) 1083). What tells it from a motion that was meant to pause is the effort: it
+Automatica 30 (1994) 1083). The effort distinguishes it from a motion that was meant to pause: it
 builds up while the drive stands, and falls while it slips.
 """
 

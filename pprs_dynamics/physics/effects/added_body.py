@@ -99,7 +99,7 @@ class AddedBody(BodyEffect):
            alike: tuple[tuple[str, ...], ...], moved: float) -> type[Self]:
         """Return the effect with these places on a mechanism that moves so much mass.
 
-        Of links that are alike the first stands for all with a body anywhere; with a mass more
+        Of links that are alike the first represents all, with a body anywhere; with a mass more
         at its own centre each of them is a hypothesis of its own.
         """
         stand_ins = {name for group in alike for name in group[1:]}

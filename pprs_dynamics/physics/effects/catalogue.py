@@ -106,11 +106,6 @@ CATALOGUE: dict[str, type[CatalogueEffect]] = {
 # A measured curve is in models like any of them, but no cause.
 EFFECTS: dict[str, type[CatalogueEffect]] = {**CATALOGUE, MeasuredCurve.name: MeasuredCurve}
 
-# Effects that there were, and what is written instead.
-REPLACED = {
-    'payload_moment': 'payload_mass with the centre x, y, z: a body has no moment without a mass',
-    'payload_inertia': 'payload_mass with xx ... yz: a body has no inertia without a mass'}
-
 
 def find_effect(name: str) -> type[CatalogueEffect] | None:
     """Return the effect of that name, or None; other packages are asked only where need be."""

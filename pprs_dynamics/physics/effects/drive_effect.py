@@ -27,7 +27,7 @@ class DriveSamples:
 
     `friction_load` is what its guide or gear carries, without a sign; `transmitted` what its gear
     or screw passes on to the mechanism, without friction, with the sign of the effort [N, N m];
-    `channels` has what was measured of the drive beside, as `temperature` [degC].
+    `channels` has further measurements of the drive, such as `temperature` [degC].
     """
 
     time: Array | None
@@ -70,7 +70,7 @@ class DriveRange:
     is_loaded : bool
         Whether its guide or gear carries anything that is known.
     channels : mapping of str to (lowest, highest)
-        What was measured beside, as `temperature` [degC].
+        Further measurements, such as `temperature` [degC].
     middle : float
         Of the stroke [m, rad].
     """
@@ -89,7 +89,7 @@ class DriveRange:
 
 @dataclass(frozen=True)
 class Windup:
-    """What a second encoder, on the link, tells of a drive.
+    """Measurement of a drive by a second encoder on the link.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class Windup:
 
 @dataclass(frozen=True)
 class Clearance:
-    """What a second encoder, on the link, tells of a drive that leads it by one of two distances.
+    """Measurement of a drive by a second encoder that it leads by one of two distances.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ class DriveEffect(CatalogueEffect):
 
     @classmethod
     def begin(cls, memory: Any, time: float) -> None:
-        """Tell a fresh memory of one drive when the recording began [s]; by default nothing.
+        """Set the start time of the recording [s] in a fresh memory of one drive; default: nothing.
 
         The first samples that are evaluated may be later, since derivatives need a window.
         """
@@ -342,7 +342,7 @@ class MeasurementEffect(DriveEffect):
         return np.zeros_like(transmitted)
 
     def windup_error(self, drives: Sequence[str], transmitted: Array, windup: Array) -> Array:
-        """Return what second encoders say beside `loaded_position_error`, (3, N, D).
+        """Return the errors of second encoders apart from `loaded_position_error`, (3, N, D).
 
         Errors of position, velocity and acceleration; by default none.
 

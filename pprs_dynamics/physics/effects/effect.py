@@ -101,7 +101,7 @@ class Effect(ABC):
     name : str
         Name in files, topics and reports.
     assumed_at_start : str
-        What a fresh memory takes for granted, of an effect with one; nodes tell it.
+        What a fresh memory assumes, for an effect with memory; nodes publish it.
 
     Attributes
     ----------
@@ -217,7 +217,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     may_be_measurement : bool
         True where a model file may declare it a sensor's, in `effects.measured`.
     is_friction : bool
-        True for friction: of a drive that stands it tells nothing, any constant force looks like
+        True for friction: a drive at rest shows nothing of it, any constant force looks like
         it, and it may not give power back.
     nonlinear : bool
         True where the effect changes how others show, or holds in its linear form nearby only: a

@@ -57,12 +57,12 @@ class BodyEffect(StructureEffect):
         return robot
 
     def load(self, state: Any) -> StructureLoad | None:
-        """Return a load beside bodies and gravity; None, the default, for none."""
+        """Return a load in addition to bodies and gravity, or None (default)."""
         return None
 
     def apply(self, state: Any) -> Any:
         """Return the state with the effect in its bodies."""
-        return state.loaded(self.changed(state.robot), self.load(state))
+        return state.with_load(self.changed(state.robot), self.load(state))
 
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the change of the rigid body's drive forces [N, N m], (N, D)."""
@@ -80,6 +80,10 @@ def with_bodies(robot: Any, effects: Iterable[object]) -> Any:
 
 class PassiveJointEffect(StructureEffect):
     """Friction in the passive joints: a force on top of the rigid body's."""
+
+    def rubbing(self, state: Any) -> Any:
+        """Return the state whose joints carry this friction as well; by default as it is."""
+        return state
 
     @abstractmethod
     def force(self, state: Any, memory: Any = None) -> Array:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Links and joints of a mechanism whose bodies and friction no motion of the drives tells apart.
+"""Links and joints of a mechanism whose bodies and friction no motion of the drives can separate.
 
 Links that turn alike, as those of a parallelogram, may move any body in the same way: the columns
 of their inertial parameters then span the same space. A passive joint whose rate is always the

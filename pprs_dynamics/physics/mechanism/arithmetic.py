@@ -64,7 +64,7 @@ def solve(A: Any, B: Any, order: Any) -> Any:
     ----------
     A : (n, n) or (n, n, N) array
     B : (n, K) or (n, K, N) array
-    order : Tables
+    order : Model
         In which compiled code eliminates.
     """
     left, right = (np.asarray(each) for each in (A, B))
@@ -175,5 +175,5 @@ def compiled_solve(A: Any, B: Any, order: Any) -> Any:
 
 
 def compiled_elements(named: Any) -> Any:
-    """Return a named tuple of arrays as it is: compiled code reads them fast enough."""
+    """Return a named tuple of arrays unchanged: compiled code reads them fast enough."""
     return named

@@ -90,7 +90,7 @@ def likely_branches(description: Description, recorded: Collection[str] = ()) ->
 
 
 def as_likely(description: Description, recorded: Collection[str] = ()) -> list[Branch]:
-    """Return the best branch, and those beside it that are as long and move by other joints."""
+    """Return the best branch, and others as long that move by other joints."""
     first, *others = likely_branches(description, recorded) or [
         Branch(root_of(description), ())]
     own = {*first.names}

@@ -22,9 +22,9 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     LOOP,
     TRANSLATION,
     Integers,
-    Tables,
+    Model,
 )
-from pprs_dynamics.physics.mechanism.tree_evaluation import survey
+from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
 
 X, Y, Z = range(3)
 Row = tuple[int, tuple[int, int, int, int], tuple[float, float]]
@@ -92,7 +92,7 @@ class Closing:
 
     Parameters
     ----------
-    t : Tables
+    t : Model
         With all rows; which coordinates are passive is not looked at.
     slides : (C,) bool array
         Coordinates in metres.
@@ -103,7 +103,7 @@ class Closing:
         Of the mechanism [m].
     """
 
-    def __init__(self, t: Tables, slides: Array, names: list[str], loops: list[str], size: float,
+    def __init__(self, t: Model, slides: Array, names: list[str], loops: list[str], size: float,
                  ) -> None:
         self.t, self.names, self.loops = t, names, loops
         self.columns = np.where(slides, size, 1.0)
@@ -111,7 +111,7 @@ class Closing:
 
     def derivatives(self, q: Array) -> tuple[Array, Array]:
         """Return rows (r,) and their derivatives by all coordinates (r, C), in units of size."""
-        residuals, J, _ = survey(self.t, q, np.arange(len(q)))
+        residuals, J, _ = constraint_jacobian(self.t, q, np.arange(len(q)))
         return residuals * self.rows, self.rows[:, None] * J * self.columns
 
     def home(self, q: Array, free: Integers) -> Array:
@@ -135,7 +135,7 @@ class Closing:
 
     def _require_closed(self, q: Array) -> None:
         t = self.t
-        residuals, _, m = survey(t, q, np.arange(len(q)))
+        residuals, _, m = constraint_jacobian(t, q, np.arange(len(q)))
         worst = np.abs(residuals * self.rows)
         if np.max(worst, initial=0.0) > OPEN:
             row = int(np.argmax(worst))
@@ -203,7 +203,8 @@ class Closing:
                 raise ModelError(
                     'robot.drives', [self.names[c] for c in drives], 'determine the motion: '
                     f'{freedoms} degrees of freedom, {len(drives)} drives: '
-                    f'{", ".join(names[:6])} can move while all drives stand')
+                    f'{", ".join(names[:6])} can move while all drives '
+                    'stand: drive them as well, or lock them under robot.locked')
         rows = passive[:0]
         determined = passive[:0]
         condition = 1.0

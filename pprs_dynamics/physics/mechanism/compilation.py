@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable
 from functools import cache
 from itertools import count
-from pathlib import Path
 from types import CellType, CodeType, FunctionType
 from typing import Any
 
@@ -29,7 +28,6 @@ REPLACED: dict[Any, Any] = {
     arithmetic.solve: arithmetic.compiled_solve,
     arithmetic.elements: arithmetic.compiled_elements,
 }
-PHYSICS = Path(__file__).parents[1]
 
 
 def compiler() -> Callable[[Any, tuple[Any, ...]], Callable[..., int]] | None:
@@ -56,47 +54,70 @@ def compiled_function(function: FunctionType) -> Callable[..., Any]:
     """Return a function compiled for the arguments that it gets, kept on disk."""
     import numba
 
-    own = _bound(function, _plain)
-    # See `_compiled_loop` on the name.
-    own.__qualname__ = f'{function.__name__}_{_code_digest(function)}'
+    # It makes no arrays, so that nothing needs to count references to those that it gets.
     compiled: Callable[..., Any] = numba.njit(
-        cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True, _nrt=False)(own)
+        cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True, _nrt=False)(
+            _keyed(_bound(function, _compiled_without_references), function))
     return compiled
 
 
 @cache
-def _plain(function: FunctionType) -> Any:
-    """Return a function of this package, and all that it calls, for Numba.
+def _compiled_without_references(function: FunctionType) -> Any:
+    """Return a function of this package, and all that it calls, for functions without arrays."""
+    return _inlined(_bound(function, _compiled_without_references), _nrt=False)
 
-    It makes no arrays, so that nothing counts references to those of its tables: what is called
-    need not be inlined for that, and compiles in half of the time.
+
+def _keyed(function: FunctionType, *sources: Any) -> FunctionType:
+    """Return a function that Numba stores under the code of itself and all that it calls.
+
+    Numba looks only at the file of a function to decide whether stored code is up to date. All
+    functions get this file, and a name with a fingerprint of their code.
     """
-    import numba
+    function = FunctionType(function.__code__.replace(co_filename=__file__),
+                            function.__globals__, function.__name__, function.__defaults__,
+                            function.__closure__)
+    function.__qualname__ = f'{function.__name__}_{_fingerprint(*sources)}'
+    function.__module__ = __name__
+    return function
 
-    return numba.njit(nogil=True, error_model='numpy', _nrt=False, no_cpython_wrapper=True,
-                      no_cfunc_wrapper=True)(_bound(function, _plain))
 
+def _fingerprint(*sources: Any) -> str:
+    """Return a hash of the code of functions and of all that they call and read.
 
-def _code_digest(function: FunctionType) -> str:
-    """Return a fingerprint of the code of a function and of all that it calls."""
-    content, seen = hashlib.sha256(Path(__file__).read_bytes()), set()
-    waiting = [function]
+    Parameters
+    ----------
+    sources : function, type or str
+    """
+    content, waiting = hashlib.sha256(), [*sources]
+    seen: set[Any] = set()
     while waiting:
-        one = waiting.pop()
-        one = REPLACED.get(one, one)
-        if one in seen or not isinstance(one, FunctionType):
-            continue
-        seen.add(one)
-        code = one.__code__
-        # Instructions have numbers of names: those that read m.w and m.u are the same.
-        content.update(code.co_code + repr((code.co_consts, code.co_names)).encode())
-        for name in sorted(_names(one.__code__) & one.__globals__.keys()):
-            used = one.__globals__[name]
-            if isinstance(used, FunctionType) and used.__module__.startswith(PACKAGE):
-                waiting.append(used)
-            elif isinstance(used, (int, float)):
-                content.update(f'{name}={used}'.encode())
+        source = waiting.pop()
+        source = REPLACED.get(source, source)
+        if isinstance(source, str):
+            content.update(source.encode())
+        elif isinstance(source, FunctionType) and source not in seen:
+            seen.add(source)
+            # A docstring is a constant, too, but nothing that is compiled depends on it.
+            content.update(_code_text(source.__code__, source.__doc__).encode())
+            waiting += [cell.cell_contents for cell in source.__closure__ or ()]
+            for name in sorted(_names(source.__code__) & source.__globals__.keys()):
+                used = source.__globals__[name]
+                if isinstance(used, (int, float)):
+                    content.update(f'{name}={used!r}'.encode())
+                elif getattr(used, '__module__', '').startswith(PACKAGE):
+                    waiting.append(used)
+        elif isinstance(source, type) and source not in seen:
+            seen.add(source)
+            content.update(f'{source.__name__}{getattr(source, "_fields", ())}'.encode())
     return content.hexdigest()[:12]
+
+
+def _code_text(code: CodeType, doc: str | None) -> str:
+    """Return instructions, names and constants of a function, without its place in a file."""
+    constants = [_code_text(constant, None) if isinstance(constant, CodeType) else repr(constant)
+                 for constant in code.co_consts if constant != doc or doc is None]
+    # Instructions have numbers of names: those that read m.w and m.u are the same.
+    return repr((code.co_code, code.co_names, code.co_freevars, constants))
 
 
 def _nothing(p: Any, s: Any) -> bool:
@@ -115,15 +136,13 @@ def _template(row: Any, *tables: Any) -> int:
 def _compiled_loop(kernel: Any, named: tuple[Any, ...]) -> Callable[..., int]:
     import numba
 
-    own = {'kernel': _compiled(kernel), 'read': _inlined(_reader(named))}
+    reader = _reader(named)
+    own = {'kernel': _compiled(kernel), 'read': _inlined(reader)}
     loop = FunctionType(_template.__code__, {**_template.__globals__, **own},
-                        f'{kernel.__name__}_loop')
-    # Numba looks only at the file of the loop when it decides whether what it kept is up to
-    # date; the name tells it of all other files.
-    loop.__qualname__ = f'{kernel.__module__}.{kernel.__name__}_{_digest()}'.replace('.', '_')
-    loop.__module__ = __name__
+                        f'{kernel.__module__}_{kernel.__name__}'.replace('.', '_'))
     compiled: Callable[..., int] = numba.njit(
-        cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True)(loop)
+        cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True)(
+            _keyed(loop, _template, kernel, reader))
     return compiled
 
 
@@ -142,7 +161,8 @@ def _reader(named: tuple[Any, ...]) -> Any:
         return f'{type(value).__name__}({elements})'
 
     # Written out: Numba makes named tuples only where all their elements are.
-    exec(f'def read(row):\n    return {expression(named)}', namespace)
+    source = f'def read(row):\n    return {expression(named)}'
+    exec(source, namespace)
     return namespace['read']
 
 
@@ -170,14 +190,14 @@ def _bound(function: FunctionType, compile_one: Callable[[Any], Any]) -> Functio
     return bound
 
 
-def _inlined(function: FunctionType) -> Any:
+def _inlined(function: FunctionType, **options: bool) -> Any:
     """Return a function that Numba inlines where it is called."""
     import numba
 
     # Else their many results are copied through memory: four times slower. Nobody calls them from
     # Python, and wrappers for that would take half of the compiling.
     return numba.njit(nogil=True, error_model='numpy', forceinline=True, no_cpython_wrapper=True,
-                      no_cfunc_wrapper=True)(function)
+                      no_cfunc_wrapper=True, **options)(function)
 
 
 def _names(code: CodeType) -> set[str]:
@@ -185,12 +205,3 @@ def _names(code: CodeType) -> set[str]:
     own = {step.argval for step in dis.get_instructions(code) if step.opname == 'LOAD_GLOBAL'}
     return own.union(*(_names(constant) for constant in code.co_consts
                        if isinstance(constant, CodeType)))
-
-
-@cache
-def _digest() -> str:
-    """Return a fingerprint of every file that equations may stand in."""
-    content = hashlib.sha256()
-    for file in sorted(PHYSICS.rglob('*.py')):
-        content.update(file.read_bytes())
-    return content.hexdigest()[:12]

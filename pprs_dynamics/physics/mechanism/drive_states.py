@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What every kernel tells of the drives along a motion."""
+"""State of the drives along a motion, for every kernel."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class DriveStates(Protocol):
 
     @property
     def channels(self) -> Mapping[str, Array]:
-        """What was measured beside the motion, by name, (N, D) each."""
+        """Measured channels in addition to the motion, by name, (N, D) each."""
 
     @property
     def position(self) -> Array:

@@ -27,9 +27,9 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     PATH_START,
     TRANSLATION,
     Integers,
-    Tables,
+    Model,
 )
-from pprs_dynamics.physics.mechanism.tree_evaluation import survey
+from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
 
 PIVOT = 0.1  # of the largest number in its column: the least that a pivot is at home
 
@@ -52,12 +52,13 @@ class Order(NamedTuple):
     right: list[list[int]]
 
 
-def determining(t: Tables, rows: Integers, passive: Integers, units: Array, q: Array) -> Tables:
+def with_elimination_order(t: Model, rows: Integers, passive: Integers, units: Array,
+                           q: Array) -> Model:
     """Return tables whose first rows determine passive coordinates, in an order of elimination.
 
     Parameters
     ----------
-    t : Tables
+    t : Model
     rows, passive : int arrays
         As many independent rows as coordinates.
     units : (C,) array
@@ -68,7 +69,7 @@ def determining(t: Tables, rows: Integers, passive: Integers, units: Array, q: A
     implied = np.setdiff1d(np.arange(len(t.rows)), rows)
     order = Order(rows[:0], rows[:0], [], [], [])
     if len(rows):
-        _, J, _ = survey(t, q, passive)
+        _, J, _ = constraint_jacobian(t, q, passive)
         order = elimination_order(J[rows] / t.row_unit[rows, None] * units[passive],
                                   _may_differ_from_zero(t, len(q))[np.ix_(rows, passive)])
     every, passive = np.concatenate((rows[order.rows], implied)), passive[order.columns]
@@ -83,7 +84,7 @@ def determining(t: Tables, rows: Integers, passive: Integers, units: Array, q: A
         starts=np.column_stack([np.cumsum([0, *map(len, one)]) for one in lists]))
 
 
-def given(t: Tables, drives: Integers, count: int) -> Tables:
+def with_actuated_coordinates(t: Model, drives: Integers, count: int) -> Model:
     """Return tables of so many coordinates, of which some are given."""
     places = np.full((count, 2), -1)
     places[:, DRIVE_OF] = columns_of(drives, count)
@@ -97,7 +98,7 @@ def columns_of(coordinates: Integers, count: int) -> Integers:
     return column
 
 
-def _may_differ_from_zero(t: Tables, count: int) -> Array:
+def _may_differ_from_zero(t: Model, count: int) -> Array:
     """Return where derivatives of rows by coordinates may not be zero, somewhere, (r, C)."""
     found = np.zeros((len(t.rows), count), dtype=bool)
     for r, k in enumerate(t.rows[:, LOOP]):

@@ -28,7 +28,7 @@ class JointMotion:
     time : (N,) array, optional
         [s]
     channels : mapping of str to (N, D) array
-        What was measured of the drives beside it, as `temperature` [degC].
+        Further measurements of the drives, such as `temperature` [degC].
     """
 
     position: Array
@@ -52,7 +52,7 @@ class JointMotion:
         return replace(self, time=checked_times(time, len(self)))
 
     def with_channels(self, channels: Mapping[str, Array]) -> Self:
-        """Return the motion with what was measured beside it."""
+        """Return the motion with measured channels."""
         return replace(self, channels=channels)
 
     @classmethod

@@ -29,17 +29,23 @@ from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.tree_equations import (
     CONDITION,
     DETERMINANT,
+    JOINT_EFFORT,
     KIND,
     LOOP,
     OPEN_IN_MOTION,
     TRANSLATION,
+    TRANSMITTED,
     WORST_CONDITION,
+    Data,
     JointFriction,
     Loads,
-    Motion,
     residual,
 )
-from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, Found, samples_last
+from pprs_dynamics.physics.mechanism.tree_evaluation import (
+    NO_FRICTION,
+    InverseDynamicsResult,
+    samples_last,
+)
 from pprs_dynamics.system.parallel import lazy
 
 
@@ -113,7 +119,7 @@ class Mechanism:
 
     @property
     def numbers(self) -> Array:
-        """All that efforts follow from beside the structure, in one row."""
+        """All numbers besides the structure that determine efforts, in one row."""
         return np.concatenate((self.inertial.ravel(), self.armature, self.gravity))
 
     @cached_property
@@ -197,7 +203,7 @@ class LinkMotion:
     ----------
     structure : Structure
     rows : (N, K) array
-        See `Evaluation.follow`.
+        See `Evaluation.forward_kinematics`.
     drives : tuple of (N, D) arrays
         What it was computed for: position, velocity and acceleration.
     """
@@ -209,8 +215,9 @@ class LinkMotion:
     @classmethod
     def of(cls, structure: Structure, position: Array, velocity: Array, acceleration: Array,
            start: Array | None = None, nearby: Array | None = None) -> LinkMotion:
-        """Return the motion, or raise as `Mechanism.at`; see `Evaluation.follow`."""
-        rows, failed = structure.evaluation.follow(position, velocity, acceleration, start, nearby)
+        """Return the motion, or raise as `Mechanism.at`; see `Evaluation.forward_kinematics`."""
+        rows, failed = structure.evaluation.forward_kinematics(
+            position, velocity, acceleration, start, nearby)
         if failed >= 0:
             raise WorkspaceError(failed, 'the loops do not close for the positions of the drives',
                                  'must be within reach, on the way from home')
@@ -221,7 +228,7 @@ class LinkMotion:
         return found
 
     @cached_property
-    def motion(self) -> Motion:
+    def motion(self) -> Data:
         """The motion by name."""
         return self.structure.evaluation.motion(self.rows)
 
@@ -284,9 +291,9 @@ class LinkMotion:
         return Frame(m.R[:, row] @ frame.R, m.p[:, row] + m.R[:, row] @ frame.p)
 
     @cached_property
-    def twists(self) -> tuple[Array, Array]:
+    def link_jacobians(self) -> tuple[Array, Array]:
         """Angular and linear velocity of links per rate of drives, (N, J + 1, 3, D)."""
-        return self.structure.evaluation.twists(self.rows)
+        return self.structure.evaluation.link_jacobians(self.rows)
 
     def load_rows(self, mechanism: Mechanism,
                   wrenches: Mapping[int, tuple[Array, Array]] | None = None) -> Array:
@@ -333,7 +340,7 @@ class LinkMotion:
             turned: Array = np.einsum('nbji,nbj...->nbi...', R, values)
             return turned
 
-        W, U = (own(each[:, rows]) for each in self.twists)
+        W, U = (own(each[:, rows]) for each in self.link_jacobians)
         w, wd = own(m.w[:, rows])[..., None], own(m.wd[:, rows])[..., None]
         a = own(m.ud[:, rows] - np.asarray(mechanism.gravity))[..., None]
 
@@ -374,7 +381,7 @@ class MechanismState(JointMotion):
     friction : JointFriction
         The model's own, which is found with the efforts.
     start, nearby : (N, C) and (C,) arrays, optional
-        See `Evaluation.follow`.
+        See `Evaluation.forward_kinematics`.
     """
 
     robot: Mechanism = field(kw_only=True)
@@ -396,14 +403,14 @@ class MechanismState(JointMotion):
         return self.robot.structure.drives
 
     @lazy
-    def found(self) -> Found | None:
+    def inverse_dynamics(self) -> InverseDynamicsResult | None:
         """Closed coordinates, efforts and own friction in one pass; None where links are needed."""
         if self.known is not None or self.load is not None:
             return None
         robot = self.robot
-        return robot.structure.evaluation.found(
+        return robot.structure.evaluation.inverse_dynamics(
             (self.position, self.velocity, self.acceleration), robot.by_joint, robot.gravity_row,
-            self.friction, self.start, self.nearby)
+            self.friction, None, self.start, self.nearby)
 
     @lazy
     def links(self) -> LinkMotion:
@@ -411,14 +418,14 @@ class MechanismState(JointMotion):
         motion = self.position, self.velocity, self.acceleration
         if self.known is not None and self.known.is_of(*motion):
             return self.known
-        found = vars(self).get('found')
+        found = vars(self).get('inverse_dynamics')
         start, nearby = (self.start, self.nearby) if found is None else (found.q, None)
         return LinkMotion.of(self.robot.structure, *motion, start, nearby)
 
     @property
     def closed(self) -> Array:
         """Closed coordinates, (N, C)."""
-        return self.links.motion.q if self.found is None else self.found.q
+        return self.links.motion.q if self.inverse_dynamics is None else self.inverse_dynamics.q
 
     @lazy
     def direction(self) -> Array:
@@ -438,7 +445,8 @@ class MechanismState(JointMotion):
 
         The motor accelerates its rotor on its own side of the gear.
         """
-        efforts: Array = self.reactions.efforts if self.found is None else self.found.efforts
+        efforts: Array = (self.reactions.efforts if self.inverse_dynamics is None
+                          else self.inverse_dynamics.efforts[TRANSMITTED])
         return efforts
 
     @lazy
@@ -478,7 +486,7 @@ class MechanismState(JointMotion):
         """By which a drive is moved for derivatives [rad, m]."""
         return 1e-4
 
-    def moved(self, drive: int, step: float) -> MechanismState:
+    def perturbed(self, drive: int, step: float) -> MechanismState:
         """Return the state with a drive at other positions, which moves as it did."""
         position = self.position.copy()
         position[:, drive] += step
@@ -492,18 +500,23 @@ class MechanismState(JointMotion):
 
     def against_friction(self, friction: JointFriction) -> Array:
         """Return the drives' efforts against friction of joints, (N, D)."""
-        if friction is self.friction and self.found is not None:
-            return self.found.friction
+        if friction is self.friction and self.inverse_dynamics is not None:
+            efforts: Array = self.inverse_dynamics.efforts[JOINT_EFFORT]
+            return efforts
         return self.robot.structure.evaluation.friction(self.links.rows, self._load_rows,
                                                         friction)
 
-    def turning_over(self, reversal: Reversal) -> MechanismState:
+    def with_friction(self, friction: JointFriction) -> MechanismState:
+        """Return the state as it is: what friction in its joints adds to loads is not computed."""
+        return self
+
+    def with_smoothing(self, reversal: Reversal) -> MechanismState:
         """Return the state with a sgn of other widths; all else is computed once for both."""
         state = replace(self, reversal=reversal, known=self.links)
         vars(state)['_load_rows'] = self._load_rows
         return state
 
-    def loaded(self, robot: Mechanism, load: StructureLoad | None = None) -> MechanismState:
+    def with_load(self, robot: Mechanism, load: StructureLoad | None = None) -> MechanismState:
         """Return a state of this motion with other bodies, and with an additional load."""
         if load is None:
             load = self.load

@@ -56,12 +56,14 @@ def read_mjcf(path: str) -> Description:
     except ImportError:
         raise MissingLibraryError('mujoco', 'a model from MJCF', 'sim') from None
     content = read_content(path)
-    model = compiled(mujoco, path)
+    model = readable_spec(mujoco, path).compile()
     return _Reader(mujoco, model, path).description(hashlib.sha256(content).hexdigest())
 
 
-def compiled(mujoco: Any, path: str) -> Any:
-    """Return MuJoCo's model of an MJCF. Files of meshes that no mass needs may be missing.
+def readable_spec(mujoco: Any, path: str) -> Any:
+    """Return MuJoCo's specification of an MJCF, which compiles.
+
+    Files of meshes may be missing if no mass follows from them.
 
     Raises
     ------
@@ -69,14 +71,17 @@ def compiled(mujoco: Any, path: str) -> Any:
         If it cannot be compiled.
     """
     try:
-        return mujoco.MjModel.from_xml_path(path)
+        spec = mujoco.MjSpec.from_file(path)
+        spec.compile()
+        return spec
     except (ValueError, mujoco.FatalError) as error:
         reason = f'not MJCF that can be compiled: {" ".join(str(error).split())}'
     weighed: list[str] = []
     try:
         spec = mujoco.MjSpec.from_file(path)
         weighed = _without_shapes(mujoco, spec)
-        return spec.compile()
+        spec.compile()
+        return spec
     except (ValueError, mujoco.FatalError):
         pass
     if weighed:
@@ -131,7 +136,7 @@ class _Reader:
                            (float(x), float(y), float(z)), tuple(self._remarks()))
 
     def _require_known_forces(self) -> None:
-        """Raise ModelError for forces that no part of a mechanism here stands for."""
+        """Raise ModelError for forces that a mechanism here cannot represent."""
         model = self.model
         for name, what in FOREIGN_PARTS.items():
             if getattr(model, name, 0):

@@ -57,7 +57,7 @@ class PlatformMotion:
     rows : (N, 19) array
         All of it but the times, in the order of the parameters: what kernels take.
     channels : mapping of str to (N, 6) array
-        What was measured of the drives beside it, as `temperature` [degC].
+        Further measurements of the drives, such as `temperature` [degC].
 
     Raises
     ------
@@ -67,8 +67,8 @@ class PlatformMotion:
     """
 
     rows: Array
-    time: Array | None
-    channels: Mapping[str, Array]
+    time: Array | None = None
+    channels: Mapping[str, Array] = MappingProxyType({})
 
     def __init__(
         self, position: ArrayLike, orientation: ArrayLike, linear_velocity: ArrayLike,
@@ -81,8 +81,8 @@ class PlatformMotion:
         if rows is None or evaluate_if_ready(_motion_kernel, _NO_PARAMETERS, rows) >= 0:
             rows = _checked(columns)
         self.__dict__['rows'] = rows
-        self.__dict__['time'] = None if time is None else checked_times(time, len(rows))
-        self.__dict__['channels'] = {}
+        if time is not None:
+            self.__dict__['time'] = checked_times(time, len(rows))
 
     @classmethod
     def _of(cls, rows: Array, time: ArrayLike | None,
@@ -95,7 +95,7 @@ class PlatformMotion:
         return motion
 
     def __setattr__(self, name: str, value: Any) -> None:
-        raise AttributeError(f'a PlatformMotion stays as it is: {name} was to be set')
+        raise AttributeError(f'a PlatformMotion cannot be changed: {name} was to be set')
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -155,7 +155,7 @@ class PlatformMotion:
         return PlatformMotion._of(self.rows, time, self.channels)
 
     def with_channels(self, channels: Mapping[str, Array]) -> PlatformMotion:
-        """Return the motion with what was measured of the drives beside it, (N, 6) each."""
+        """Return the motion with measured channels of the drives, (N, 6) each."""
         return PlatformMotion._of(self.rows, self.time, channels)
 
     def resampled(self, rate: float) -> PlatformMotion:
@@ -263,12 +263,15 @@ class PlatformMotion:
 
 def _joined(columns: Sequence[Any]) -> Array | None:
     """Return columns as one table where they are floats of the right shapes, else None."""
+    P, q, v, omega, a, epsilon = columns
     try:
-        widths = [column.shape[1] for column in columns]
+        # Written out: a comparison of lists takes twice as long.
+        right = (P.shape[1] == v.shape[1] == omega.shape[1] == a.shape[1] == epsilon.shape[1] == 3
+                 and q.shape[1] == 4)
         rows = np.concatenate(columns, 1)
     except (AttributeError, IndexError, ValueError):
         return None
-    right = widths == WIDTHS and type(rows) is np.ndarray and rows.dtype is FLOAT and len(rows)
+    right = right and type(rows) is np.ndarray and rows.dtype is FLOAT and len(rows) > 0
     return rows if right else None
 
 

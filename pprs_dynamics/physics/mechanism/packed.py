@@ -20,10 +20,10 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.tree_equations import (
     OF_FORCES,
     OF_LINK,
+    Data,
     Integers,
     Loads,
-    Motion,
-    Tables,
+    Model,
 )
 
 
@@ -46,33 +46,34 @@ class Sizes(NamedTuple):
     links: int
     forces: int
     loop_forces: int
+    solved: int
 
     @classmethod
-    def of(cls, t: Tables) -> Sizes:
+    def of(cls, t: Model) -> Sizes:
         """Return those of tables."""
         joints, loops = len(t.joints), len(t.closures)
         return cls(len(t.frames), joints, len(t.places), len(t.drives), len(t.passive), loops,
                    len(t.closure_frames), len(t.rows), len(t.path), len(t.starts), len(t.swap),
                    len(t.below), len(t.right), OF_LINK * joints, OF_FORCES * joints,
-                   OF_FORCES * loops)
+                   OF_FORCES * loops, len(t.passive) + len(t.drives))
 
 
 SHAPES: dict[type, dict[str, tuple[str | int, ...]]] = {
-    Tables: {
+    Model: {
         'joints': ('joints', 3), 'passive': ('passive',), 'drives': ('drives',),
         'places': ('coordinates', 2), 'closures': ('loops', 4), 'rows': ('rows', 6),
         'path': ('path', 2), 'starts': ('starts', 3), 'swap': ('swap',), 'below': ('below',),
         'right': ('right',), 'frames': ('frames', 3), 'ratio': ('joints',),
         'offset': ('joints',), 'stride': ('drives',), 'closure_frames': ('closure_frames', 3),
         'row_reals': ('rows', 3), 'passive_unit': ('passive',)},
-    Motion: {
+    Data: {
         'q': ('coordinates',), 'v': ('coordinates',), 'a': ('coordinates',), 'links': ('links', 3),
         'loops': ('closure_frames', 3), 'drive_to_joint': ('coordinates', 'drives'),
-        'inverse': ('passive', 'passive'), 'solution': (4,), 'J': ('passive', 'passive'),
+        'inverse': ('passive', 'solved'), 'solution': (4,), 'J': ('passive', 'passive'),
         'by_drives': ('passive', 'drives'), 'residuals': ('passive', 1)},
     Loads: {
-        'links': ('forces', 3), 'loops': ('loop_forces', 3), 'coordinates': ('coordinates',),
-        'rubbed': ('coordinates',), 'efforts': ('drives',)}}
+        'links': ('forces', 3), 'loops': ('loop_forces', 3), 'tau': ('coordinates',),
+        'tau_friction': ('coordinates',), 'efforts': ('drives',)}}
 FIRST_OF_REALS = 'frames'  # of the tables: whole numbers come before
 N = TypeVar('N', bound=tuple[Any, ...])
 
@@ -85,10 +86,10 @@ class PackedTables(NamedTuple):
     reals: Array
 
 
-def packed_tables(t: Tables) -> PackedTables:
+def packed_tables(t: Model) -> PackedTables:
     """Return tables as rows of numbers."""
     sizes = np.array(Sizes.of(t), dtype=np.int64)
-    first = Tables._fields.index(FIRST_OF_REALS)
+    first = Model._fields.index(FIRST_OF_REALS)
     return PackedTables(sizes, np.concatenate([np.ravel(values) for values in t[:first]]),
                         np.concatenate([np.ravel(values) for values in t[first:]]))
 
@@ -127,7 +128,7 @@ def _reader(kind: type) -> Callable[..., Any]:
     for name, shape in SHAPES[kind].items():
         if name == FIRST_OF_REALS:
             lines.append('    at = 0')
-        source = 'more' if kind is Tables and _is_real(name) else 'row'
+        source = 'more' if kind is Model and _is_real(name) else 'row'
         count = ' * '.join(map(str, shape))
         reshaped = f'.reshape(({", ".join(map(str, shape))}))' if len(shape) > 1 else ''
         lines += [f'    of_{name} = {source}[at:at + {count}]{reshaped}', f'    at += {count}']
@@ -139,7 +140,7 @@ def _reader(kind: type) -> Callable[..., Any]:
 
 
 def _is_real(name: str) -> bool:
-    return Tables._fields.index(name) >= Tables._fields.index(FIRST_OF_REALS)
+    return Model._fields.index(name) >= Model._fields.index(FIRST_OF_REALS)
 
 
-read_tables, read_motion, read_loads = (_reader(kind) for kind in (Tables, Motion, Loads))
+read_tables, read_motion, read_loads = (_reader(kind) for kind in (Model, Data, Loads))

@@ -34,9 +34,12 @@ from pprs_dynamics.physics.mechanism.description import (
     inertial_in,
     moved_along,
 )
-from pprs_dynamics.physics.mechanism.elimination import determining, given
-from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Integers, Tables
-from pprs_dynamics.physics.mechanism.tree_evaluation import Evaluation, survey
+from pprs_dynamics.physics.mechanism.elimination import (
+    with_actuated_coordinates,
+    with_elimination_order,
+)
+from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Integers, Model
+from pprs_dynamics.physics.mechanism.tree_evaluation import Evaluation, constraint_jacobian
 
 # Drives move by these between closings when a motion is walked to.
 STRIDE_TURN, STRIDE_SLIDE = 0.1, 0.1  # [rad], and of the mechanism's size
@@ -50,7 +53,7 @@ class Structure:
     Parameters
     ----------
     description : Description
-    tables : Tables
+    tables : Model
         Their drives are in the model's order.
     drives : tuple of str
     kinds : tuple of str
@@ -73,7 +76,7 @@ class Structure:
     """
 
     description: Description
-    tables: Tables
+    tables: Model
     drives: tuple[str, ...]
     kinds: tuple[str, ...]
     coordinates: tuple[str, ...]
@@ -117,6 +120,15 @@ class Structure:
             names.setdefault(row, link)
         return names
 
+    @property
+    def couplings(self) -> list[tuple[str, str, float, float]]:
+        """Coupled joints: name, the free joint that each follows, ratio and offset."""
+        t, joints = self.tables, self.description.joints
+        leaders = {int(t.coordinate[row]): name for name, row in self.rows.items()
+                   if joints[name].mimic is None}
+        return [(name, leaders[int(t.coordinate[row])], float(t.ratio[row]), float(t.offset[row]))
+                for name, row in self.rows.items() if joints[name].mimic is not None]
+
     def room(self, widest: float) -> tuple[Array, Array]:
         """Return the middle of the drives' motion and the way to either side, (D,) each.
 
@@ -155,9 +167,7 @@ class _Builder:
     """Tables under construction."""
 
     description: Description
-    drives: tuple[str, ...]
-    lock_others: bool
-    block: str
+    locked: Mapping[str, float]
 
     def __post_init__(self) -> None:
         self.parent, self.turns, self.coordinate = [0], [False], [-1]
@@ -168,7 +178,7 @@ class _Builder:
         self.start: list[float] = []
         self.rows: dict[str, int] = {}
         self.links: dict[str, tuple[int, Frame]] = {}
-        self.locked: dict[str, float] = {}
+        self.stopped: dict[str, float] = {}
 
     def hang(self, base: str, home: Mapping[str, float], poses: Mapping[str, Frame]) -> None:
         """Hang all links on the base, joint by joint."""
@@ -178,7 +188,7 @@ class _Builder:
             below.setdefault(joint.parent, []).append(joint)
         children = {joint.child for joint in joints.values()}
         root = next(link for link in self.description.links if link not in children)
-        self.links[root] = (0, self._root(root, base, home))
+        self.links[root] = (0, self._root(root, base))
         waiting = [root]
         followers: list[tuple[int, Joint]] = []
         while waiting:
@@ -186,7 +196,7 @@ class _Builder:
                 row, frame = self.links[joint.parent]
                 placed = frame @ joint.frame
                 if self._is_locked(joint):
-                    self.links[joint.child] = (row, frame @ self._locked_frame(joint, home))
+                    self.links[joint.child] = (row, frame @ self._locked_frame(joint))
                 elif joint.kind == FLOATING:
                     self._float(joint, row, frame, placed, poses)
                 else:
@@ -202,41 +212,43 @@ class _Builder:
         for added, joint in followers:
             self._follow(added, joint)
 
-    def _root(self, root: str, base: str, home: Mapping[str, float]) -> Frame:
+    def _root(self, root: str, base: str) -> Frame:
         """Return the root's frame in the base's; no drive moves one against the other."""
         link, frame = base, Frame()
         hung = {joint.child: joint for joint in self.description.joints.values()}
         while link != root:
             joint = hung[link]
             if not self._is_locked(joint):
-                raise ModelError(f'{self.block}.base', base,
-                                 f'be a link that none of {self.block}.'
-                                 f'{"joints" if self.lock_others else "drives"} moves')
-            frame, link = self._locked_frame(joint, home) @ frame, joint.parent
+                raise ModelError('robot.base', base, 'be a link that no joint moves, but '
+                                 f'{joint.name} ({joint.kind}) does')
+            frame, link = self._locked_frame(joint) @ frame, joint.parent
         return frame.inverse
 
-    def _is_locked(self, joint: Joint) -> bool:
-        if joint.kind == FIXED:
-            return True
+    def _leader(self, joint: Joint) -> tuple[Joint, float, float]:
+        """Return the joint that one follows in the end, itself by default; ratio and offset."""
+        ratio, offset, seen = 1.0, 0.0, {joint.name}
         leader = joint
         while leader.mimic is not None:
+            offset, ratio = offset + ratio * leader.mimic.offset, ratio * leader.mimic.ratio
             leader = self.description.joints[leader.mimic.joint]
-        return self.lock_others and leader.name not in self.drives
+            if leader.name in seen:
+                raise ModelError('robot.urdf', joint.name, 'mimic no joint that mimics it')
+            seen.add(leader.name)
+        return leader, ratio, offset
 
-    def _locked_frame(self, joint: Joint, home: Mapping[str, float]) -> Frame:
+    def _is_locked(self, joint: Joint) -> bool:
+        return joint.kind == FIXED or self._leader(joint)[0].name in self.locked
+
+    def _locked_frame(self, joint: Joint) -> Frame:
         """Return the frame of the child of a locked joint in the parent's."""
-        if joint.kind in (FIXED, FLOATING):
+        if joint.kind == FIXED:
             return joint.frame
-        position = self.locked[joint.name] = self._locked_position(joint, home)
+        position = self.stopped[joint.name] = self._locked_position(joint)
         return joint.frame @ moved_along(joint, position)
 
-    def _locked_position(self, joint: Joint, home: Mapping[str, float]) -> float:
-        """Return the position of home, of the file, or the one within limits nearest to 0."""
-        if joint.mimic is not None:
-            leader = self.description.joints[joint.mimic.joint]
-            return joint.mimic.ratio * self._locked_position(leader, home) + joint.mimic.offset
-        position = home.get(joint.name, joint.start)
-        return min(max(0.0, joint.lower), joint.upper) if position is None else position
+    def _locked_position(self, joint: Joint) -> float:
+        leader, ratio, offset = self._leader(joint)
+        return ratio * self.locked[leader.name] + offset
 
     def _add(self, parent: int, place: Frame, axis: Array, turns: bool) -> int:
         self.parent.append(parent)
@@ -262,7 +274,7 @@ class _Builder:
         """Add slides along the parent's axes and turns about the child's at home."""
         if joint.child in poses:
             if parent:
-                raise ModelError(f'{self.block}.home.{joint.child}_pose', joint.child,
+                raise ModelError(f'robot.home.{joint.child}_pose', joint.child,
                                  'hang on the base: its pose is in `base`')
             placed = poses[joint.child]
         row = parent
@@ -277,21 +289,14 @@ class _Builder:
         self.links[joint.child] = (row, Frame())
 
     def _follow(self, row: int, joint: Joint) -> None:
-        ratio, offset = 1.0, 0.0
-        leader, seen = joint, {joint.name}
-        while leader.mimic is not None:
-            offset, ratio = offset + ratio * leader.mimic.offset, ratio * leader.mimic.ratio
-            leader = self.description.joints[leader.mimic.joint]
-            if leader.name in seen:
-                raise ModelError(f'{self.block}.urdf', joint.name, 'mimic no joint that mimics it')
-            seen.add(leader.name)
+        leader, ratio, offset = self._leader(joint)
         if leader.name not in self.rows:
-            raise ModelError(f'{self.block}.urdf', joint.name,
+            raise ModelError('robot.urdf', joint.name,
                              f'mimic a joint that moves, not {leader.name}')
         self.coordinate[row] = self.coordinate[self.rows[leader.name]]
         self.ratio[row], self.offset[row] = ratio, offset
 
-    def tables(self, loops: tuple[Loop, ...], size: float) -> Tables:
+    def tables(self, loops: tuple[Loop, ...], drives: tuple[str, ...], size: float) -> Model:
         """Return tables with all rows of the loops, and no passive coordinates yet."""
         placed = [(*self._on(loop, 'a'), *self._on(loop, 'b')) for loop in loops]
         rows = [(k, row) for k, loop in enumerate(loops) for row in ROWS[loop.kind]]
@@ -304,9 +309,9 @@ class _Builder:
                         joints.append(row)
                         signs.append(sign)
             starts.append(len(joints))
-        driven = _integers([self.coordinate[self.rows[name]] for name in self.drives])
+        driven = _integers([self.coordinate[self.rows[name]] for name in drives])
         none = _integers([])
-        return given(Tables(
+        return with_actuated_coordinates(Model(
             joints=np.column_stack((self.parent, self.turns, self.coordinate)).astype(np.int64),
             passive=none, drives=driven, places=none,
             closures=_integers([(a, b, *ends) for (a, _, b, _), ends in zip(
@@ -343,8 +348,8 @@ def _vectors(rows: Iterable[Any]) -> Array:
 
 def build_structure(description: Description, base: str, tool: str, drives: tuple[str, ...],
                     loops: tuple[Loop, ...] = (), home: Mapping[str, float] | None = None,
-                    poses: Mapping[str, Frame] | None = None, *, block: str = 'robot',
-                    lock_others: bool = False) -> Structure:
+                    poses: Mapping[str, Frame] | None = None,
+                    locked: Mapping[str, float] | None = None) -> Structure:
     """Return the structure of a mechanism.
 
     Parameters
@@ -359,11 +364,10 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
         Positions of joints near which the loops close.
     poses : mapping of str to Frame, optional
         Of links on floating joints, in the base.
-    block : str
-        Of the model file, for errors.
-    lock_others : bool
-        True where joints that are not driven are locked: at home, else at the position of the file,
-        else at that within their limits which is nearest to 0.
+    locked : mapping of str to float, optional
+        Joints that do not move, and their positions; joints that mimic them do not move either.
+        Without loops every joint that is not driven is locked: at home, else at the position of
+        the description, else at that within its limits which is nearest to 0.
 
     Raises
     ------
@@ -371,21 +375,22 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
         Where the description lacks what is named, loops do not close, or the drives do not
         determine the motion.
     """
-    home, poses = home or {}, poses or {}
+    home, poses, locked = home or {}, poses or {}, locked or {}
     for key, name in (('base', base), ('tool', tool)):
         if name not in description.links:
-            raise ModelError(f'{block}.{key}', name, 'be a link of the URDF: '
+            raise ModelError(f'robot.{key}', name, 'be a link of the URDF: '
                              f'{", ".join(list(description.links)[:40])}')
-    build = _Builder(description, drives, lock_others, block)
-    _require_joints(description, drives, block, home)
+    if not loops:
+        locked = {**_undriven(description, drives, home), **locked}
+    build = _Builder(description, locked)
+    _require_joints(description, drives, home, locked)
     build.hang(base, home, poses)
     if not build.links[tool][0]:
-        raise ModelError(f'{block}.tool', tool, f'be a link that {block}.'
-                         f'{"joints" if lock_others else "drives"} move')
+        raise ModelError('robot.tool', tool, 'be a link that robot.drives move')
     start = np.array(build.start)
     none = _integers([])
-    size = _size(build.tables(loops, 1.0), start)
-    t = build.tables(loops, size)
+    size = _size(build.tables(loops, drives, 1.0), start)
+    t = build.tables(loops, drives, size)
     closing = Closing(t, np.array(build.slides), build.coordinates,
                       [loop.name for loop in loops], size)
     named = [name for name in home if name in build.rows]
@@ -395,12 +400,12 @@ def build_structure(description: Description, base: str, tool: str, drives: tupl
         description, t, drives,
         tuple(REVOLUTE if description.joints[name].kind in TURNING else PRISMATIC
               for name in drives), tuple(build.coordinates), build.links, build.rows, loops, tool,
-        Mobility(none, none, none, q, len(q), 1.0), size, build.locked,
+        Mobility(none, none, none, q, len(q), 1.0), size, build.stopped,
         *(np.array([getattr(description.joints[name], limit) for name in drives])
           for limit in ('lower', 'upper', 'speed', 'effort')))
     mobility = closing.mobility(q, t.drives, _moves(structure) * closing.columns)
     units = np.where(build.slides, size, 1.0)
-    return replace(structure, mobility=mobility, tables=determining(
+    return replace(structure, mobility=mobility, tables=with_elimination_order(
         t, mobility.rows, mobility.passive, units, q))
 
 
@@ -421,18 +426,23 @@ def _home(closing: Closing, start: Array, free: Array) -> Array:
         raise
 
 
-def _require_joints(description: Description, drives: tuple[str, ...], block: str,
-                    home: Mapping[str, float]) -> None:
-    listed = f'{block}.{"joints" if block == "arm" else "drives"}'
-    joints = description.joints
+def _undriven(description: Description, drives: tuple[str, ...], home: Mapping[str, float],
+              ) -> dict[str, float]:
+    """Return the positions at which joints are locked that are neither driven nor mimic one."""
+    found = {}
+    for name, joint in description.joints.items():
+        if joint.kind in (*TURNING, PRISMATIC) and joint.mimic is None and name not in drives:
+            at = home.get(name, joint.start)
+            found[name] = min(max(0.0, joint.lower), joint.upper) if at is None else at
+    return found
+
+
+def _require_joints(description: Description, drives: tuple[str, ...],
+                    home: Mapping[str, float], locked: Mapping[str, float]) -> None:
+    listed, joints = 'robot.drives', description.joints
     if len(set(drives)) < len(drives):
         raise ModelError(listed, list(drives), 'name each joint once')
     moving = [name for name, joint in joints.items() if joint.kind != FIXED]
-    for name, joint in joints.items():
-        if block == 'arm' and joint.kind == FLOATING:
-            raise ModelError('arm.urdf', description.path, 'be of a robot with a fixed base, of '
-                             f'revolute and prismatic joints: {name} is floating (where '
-                             'loops hold it, describe the robot by a robot block: docs/robots.md)')
     for name in drives:
         if name not in joints:
             raise ModelError(listed, name, 'be joints of the URDF: '
@@ -444,14 +454,26 @@ def _require_joints(description: Description, drives: tuple[str, ...], block: st
         if joint.mimic is not None:
             raise ModelError(listed, name, f'move by itself, but mimics {joint.mimic.joint} in '
                              'the URDF')
-    for name in home:
-        if name not in joints:
-            raise UnknownNameError('joint', name, moving, f'{block}.home')
+    for key, names in (('robot.home', home), ('robot.locked', locked)):
+        for name in names:
+            if name not in joints:
+                raise UnknownNameError('joint', name, moving, key)
+    for name in locked:
+        if name in drives:
+            raise ModelError(f'robot.locked.{name}', locked[name],
+                             f'not be given: robot.drives has {name} as well')
+        lower, upper = joints[name].lower, joints[name].upper
+        if not lower <= locked[name] <= upper:
+            raise ModelError(f'robot.locked.{name}', locked[name],
+                             f'be within its limits, {lower:g} to {upper:g}')
+        if joints[name].kind not in (*TURNING, PRISMATIC) or joints[name].mimic is not None:
+            raise ModelError(f'robot.locked.{name}', locked[name], 'be of a revolute, continuous '
+                             'or prismatic joint that mimics none')
 
 
-def _size(t: Tables, q: Array) -> float:
+def _size(t: Model, q: Array) -> float:
     """Return the mean distance of joints and closures from the base's origin [m]."""
-    _, _, m = survey(t, q, np.arange(len(q)))
+    _, _, m = constraint_jacobian(t, q, np.arange(len(q)))
     points = np.concatenate((m.p[0, 1:], m.pA[0], m.pB[0]))
     return max(float(np.mean(np.linalg.norm(points, axis=1))), 1e-3)
 
@@ -459,7 +481,7 @@ def _size(t: Tables, q: Array) -> float:
 def _moves(structure: Structure) -> Array:
     """Return the tool's motion and that of all centres of mass per rate of each coordinate."""
     t, size = structure.tables, structure.size
-    _, _, m = survey(t, structure.home, np.arange(len(structure.home)))
+    _, _, m = constraint_jacobian(t, structure.home, np.arange(len(structure.home)))
     row, frame = structure.links[structure.tool]
     points = [(row, m.p[0, row] + m.R[0, row] @ frame.p, True)]
     for body, parameters in enumerate(structure.inertial):

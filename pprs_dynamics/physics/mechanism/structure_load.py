@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Loads on a mechanism beside its bodies and gravity, as effects state them."""
+"""Loads of effects on a mechanism, in addition to bodies and gravity."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pprs_dynamics.arrays import Array
 
 
 class StructureLoad(NamedTuple):
-    """Loads on the mechanism beside bodies and gravity.
+    """Loads on the mechanism in addition to bodies and gravity.
 
     Parameters
     ----------

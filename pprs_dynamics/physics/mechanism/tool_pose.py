@@ -6,7 +6,7 @@
 The tool's pose becomes six coordinates of the mechanism, three slides along the base's axes and
 three turns about the tool's axes at home, tied to the tool by a closure of type `fixed`. Of these
 coordinates as many are given as the robot has drives; the drives are then passive, and
-`tree_evaluation.follow` closes the loops for them as it does for the drives.
+`tree_evaluation.forward_kinematics` closes the loops for them as it does for the drives.
 """
 
 from __future__ import annotations
@@ -20,7 +20,10 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError, SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism.closures import RANK, ROWS
 from pprs_dynamics.physics.mechanism.description import Frame
-from pprs_dynamics.physics.mechanism.elimination import determining, given
+from pprs_dynamics.physics.mechanism.elimination import (
+    with_actuated_coordinates,
+    with_elimination_order,
+)
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -30,7 +33,7 @@ from pprs_dynamics.physics.mechanism.structure import (
     Structure,
     path_to_base,
 )
-from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Integers, Tables
+from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Integers, Model
 
 COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
 SLIDES = 3  # the first of them
@@ -63,10 +66,10 @@ class ToolPose:
         t, home = structure.tables, structure.home
         row, frame = structure.links[structure.tool]
         q = home[None, t.drives]
-        rows, _ = structure.evaluation.follow(q, np.zeros_like(q), np.zeros_like(q))
+        rows, _ = structure.evaluation.forward_kinematics(q, np.zeros_like(q), np.zeros_like(q))
         m = structure.evaluation.motion(rows)
         self.home = Frame(m.R[0, row], m.p[0, row]) @ frame
-        W, U = (each[0, row] for each in structure.evaluation.twists(rows))
+        W, U = (each[0, row] for each in structure.evaluation.link_jacobians(rows))
         lever = m.R[0, row] @ frame.p
         linear, angular = U + np.cross(W, lever, axis=0), W
         self.chosen = _independent(np.vstack((linear / structure.size,
@@ -192,7 +195,7 @@ def _independent(rows: Array) -> Integers:
 
 
 def _tied_tables(structure: Structure, row: int, frame: Frame, home: Frame, chosen: Integers,
-                 ) -> Tables:
+                 ) -> Model:
     """Return tables with the pose's coordinates, those chosen as drives, tied to the tool.
 
     Parameters
@@ -225,9 +228,9 @@ def _tied_tables(structure: Structure, row: int, frame: Frame, home: Frame, chos
         'rows': [(k, kind, *of) for kind, of, _ in ties], 'path': along,
         'row_reals': [(*weights, size if kind == TRANSLATION else 1.0)
                       for kind, _, weights in ties]}
-    tied = given(t._replace(
+    tied = with_actuated_coordinates(t._replace(
         stride=strides[chosen], **{name: np.concatenate((getattr(t, name), values))
                                    for name, values in added.items()}), count + chosen, count + 6)
     rows = np.array([*range(len(t.passive)), *range(len(t.rows), len(tied.rows))])
-    return determining(tied, rows, np.concatenate((t.passive, t.drives, count + left)),
+    return with_elimination_order(tied, rows, np.concatenate((t.passive, t.drives, count + left)),
                        np.append(every, units), np.append(structure.home, np.zeros(6)))

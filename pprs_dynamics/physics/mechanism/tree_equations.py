@@ -64,7 +64,7 @@ LOOP_A, LOOP_B, PATH_START, PATH_END = 0, 1, 2, 3
 LOOP, KIND, AXES = 0, 1, 2
 JOINT, SIGN = 0, 1
 UNIT = 2  # column of `row_reals`
-# Of `Motion.solution`.
+# Of `Data.solution`.
 OPEN, DETERMINANT, CONDITION, STEPS = 0, 1, 2, 3
 
 
@@ -73,7 +73,7 @@ def _part(table: Array, of: int, at: int | slice) -> Array:
     return table.reshape(*table.shape[:-2], -1, of, 3)[..., at, :]
 
 
-class Tables(NamedTuple):
+class Model(NamedTuple):
     """A mechanism as tables; joints are 1 .. J, in an order in which parents come first.
 
     They are few: what compiled functions take costs by the number of arrays.
@@ -198,7 +198,7 @@ class Tables(NamedTuple):
         return self.row_reals[:, UNIT]
 
 
-class Motion(NamedTuple):
+class Data(NamedTuple):
     """Motion of joints and links; per sample, vectors in the base's frame.
 
     Parameters
@@ -212,13 +212,13 @@ class Motion(NamedTuple):
         Frames of the closures.
     drive_to_joint : (C, D) array
         T: rates of all coordinates per rate of each drive.
-    inverse : (passive, passive) array
-        Of J_p.
+    inverse : (passive, passive + D) array
+        J_p^-1, and J_p^-1 J_a.
     solution : (4,) array
         Largest row before the last step (OPEN); determinant and condition number of J_p; steps of
         Newton in the last stride.
     J, by_drives, residuals : arrays
-        Scratch: J_p as it is eliminated, J_a, and rows.
+        Scratch: J_p during its elimination, J_a, and rows.
     """
 
     q: Any
@@ -333,7 +333,7 @@ def turned_back(table: Any, k: int, v: Vector) -> Vector:
     return plus(plus(times(v.x, x), times(v.y, y)), times(v.z, z))
 
 
-def place(t: Tables, m: Motion) -> None:
+def update_frame_placements(t: Model, m: Data) -> None:
     """Place joints and frames of closures for the coordinates."""
     links, frames = m.links, t.frames
     for r in range(3):
@@ -372,7 +372,7 @@ def place(t: Tables, m: Motion) -> None:
                 put_column(m.loops, own, c, turned(links, j, column(t.closure_frames, own, c)))
 
 
-def residual(t: Tables, m: Motion, r: int) -> Any:
+def residual(t: Model, m: Data, r: int) -> Any:
     """Return a row's value: by how much a closure is open [m, rad]."""
     k, i, loops = OF_CLOSURE * t.rows[r, LOOP], t.rows[r, AXES], m.loops
     if t.rows[r, KIND] == TRANSLATION:
@@ -382,7 +382,7 @@ def residual(t: Tables, m: Motion, r: int) -> Any:
             + t.row_reals[r, 1] * dot(column(loops, k + A_R, g), column(loops, k + B_R, h)))
 
 
-def row_axis(t: Tables, m: Motion, r: int) -> Vector:
+def row_axis(t: Model, m: Data, r: int) -> Vector:
     """Return what a row multiplies the relative velocity by: of points, or angular."""
     k, i, loops = OF_CLOSURE * t.rows[r, LOOP], t.rows[r, AXES], m.loops
     if t.rows[r, KIND] == TRANSLATION:
@@ -393,12 +393,12 @@ def row_axis(t: Tables, m: Motion, r: int) -> Vector:
         times(t.row_reals[r, 1], product(column(loops, k + B_R, h), column(loops, k + A_R, g))))
 
 
-def jacobian(t: Tables, m: Motion, places: Any, of_passive: Any, of_drives: Any) -> None:
+def jacobian(t: Model, m: Data, places: Any, of_passive: Any, of_drives: Any) -> None:
     """Fill in the derivatives of the first rows by passive coordinates, and by drives.
 
     Parameters
     ----------
-    t, m : Tables, Motion
+    t, m : Model, Data
     places : (C, 2) int array
         Column of each coordinate in either, or -1.
     of_passive (r, P), of_drives (r, D) : arrays
@@ -429,7 +429,7 @@ def jacobian(t: Tables, m: Motion, places: Any, of_passive: Any, of_drives: Any)
                 of_drives[r, d] += x
 
 
-def reach(t: Tables, m: Motion, start: Any, goal: Any) -> bool:
+def close_loops(t: Model, m: Data, start: Any, goal: Any) -> bool:
     """Close the loops for the drives' positions `goal`, walked from closed coordinates `start`.
 
     In each stride Newton's method moves the passive coordinates until the loops close.
@@ -458,7 +458,7 @@ def reach(t: Tables, m: Motion, start: Any, goal: Any) -> bool:
             m.q[c] = goal[d] + (1.0 - k / strides) * (start[c] - goal[d])
         for n in range(MOST_STEPS):
             m.solution[STEPS] = 1.0 + n + zero
-            place(t, m)
+            update_frame_placements(t, m)
             size = zero
             for r in range(count):
                 m.residuals[r, 0] = residual(t, m, r)
@@ -479,7 +479,7 @@ def reach(t: Tables, m: Motion, start: Any, goal: Any) -> bool:
     return everywhere(size < CLOSED)
 
 
-def is_near(t: Tables, start: Any, goal: Any) -> bool:
+def is_near(t: Model, start: Any, goal: Any) -> bool:
     """Return whether all drives are within a stride of a goal (D,) at coordinates `start`."""
     near = True
     for d in range(len(t.drives)):
@@ -487,12 +487,12 @@ def is_near(t: Tables, start: Any, goal: Any) -> bool:
     return near
 
 
-def is_sound(t: Tables, m: Motion, at_home: Any) -> bool:
+def is_regular_and_closed(t: Model, m: Data, at_home: Any) -> bool:
     """Return whether the loops are assembled as at home, well conditioned, and all closed.
 
     Parameters
     ----------
-    t, m : Tables, Motion
+    t, m : Model, Data
     at_home : (4,) array
         `m.solution` there.
     """
@@ -505,13 +505,13 @@ def is_sound(t: Tables, m: Motion, at_home: Any) -> bool:
     return True
 
 
-def follow(t: Tables, m: Motion, v: Any, a: Any) -> None:
+def forward_kinematics(t: Model, m: Data, v: Any, a: Any) -> None:
     """Fill in all that follows from closed positions, and velocities and accelerations of drives.
 
     Parameters
     ----------
-    t : Tables
-    m : Motion
+    t : Model
+    m : Data
         With `q`.
     v, a : (D,) arrays
     """
@@ -527,30 +527,30 @@ def follow(t: Tables, m: Motion, v: Any, a: Any) -> None:
         m.v[t.drives[d]] = v[d]
         m.a[t.drives[d]] = a[d]
         T[t.drives[d], d] = 1.0
-    place(t, m)
+    update_frame_placements(t, m)
     m.solution[DETERMINANT] = m.solution[CONDITION] = zero
     if count:
         jacobian(t, m, t.places, m.J, by_drives)
         there = zero
         for r in range(count):
+            x = zero
             for c in range(count):
-                x = m.J[r, c] * t.passive_unit[c] / t.row_reals[r, UNIT]
-                there = there + x * x
+                x = x + (m.J[r, c] * t.passive_unit[c]) ** 2
                 inverse[r, c] = 1.0 if r == c else 0.0
+            for d in range(drives):
+                inverse[r, count + d] = by_drives[r, d]
+            there = there + x / t.row_reals[r, UNIT] ** 2
         m.solution[DETERMINANT] = solve(m.J, inverse, t)
         # The condition number takes all of the inverse, so that it serves for the rest as well.
         back = zero
         for c in range(count):
+            x = zero
             for r in range(count):
-                x = inverse[c, r] * t.row_reals[r, UNIT] / t.passive_unit[c]
-                back = back + x * x
+                x = x + (inverse[c, r] * t.row_reals[r, UNIT]) ** 2
+            back = back + x / t.passive_unit[c] ** 2
+            for d in range(drives):
+                T[passive[c], d] = -inverse[c, count + d]
         m.solution[CONDITION] = sqrt(there * back)
-        # Drives innermost: their sums do not wait for one another.
-        for c in range(count):
-            k = passive[c]
-            for r in range(count):
-                for d in range(drives):
-                    T[k, d] -= inverse[c, r] * by_drives[r, d]
         for c in range(count):
             x = zero
             for d in range(drives):
@@ -569,25 +569,38 @@ def follow(t: Tables, m: Motion, v: Any, a: Any) -> None:
         accelerations(t, m)
 
 
-def predict(t: Tables, m: Motion, goal: Any, start: Any) -> None:
-    """Move closed coordinates from a sample to where its rates lead with the next drives' goal.
+def predict(t: Model, m: Data, goal: Any, start: Any) -> None:
+    """Extrapolate closed coordinates to the next drive positions, to second order.
+
+    The passive coordinates move by T dq + drift dt^2 / 2, where drift = a_p - T a is quadratic in
+    the drives' velocity v and dt = v' dq / v' v.
 
     Parameters
     ----------
-    t, m : Tables, Motion
+    t, m : Model, Data
     goal : (D,) array
-        Within a stride.
+        Drive positions within a stride.
     start : (C,) array
-        Those of the sample.
+        Closed coordinates of the sample; overwritten by the extrapolation.
     """
+    T, square, along = m.drive_to_joint, 1e-300, 0.0
     for d in range(len(t.drives)):
-        moved = goal[d] - start[t.drives[d]]
+        v = m.v[t.drives[d]]
+        square += v * v
+        along += v * (goal[d] - start[t.drives[d]])
+    half = 0.5 * (along / square) ** 2
+    for p in range(len(t.passive)):
+        c = t.passive[p]
+        drift, move = m.a[c], 0.0
+        for d in range(len(t.drives)):
+            drift -= T[c, d] * m.a[t.drives[d]]
+            move += T[c, d] * (goal[d] - start[t.drives[d]])
+        start[c] += move + half * drift
+    for d in range(len(t.drives)):
         start[t.drives[d]] = goal[d]
-        for c in range(len(t.passive)):
-            start[t.passive[c]] += m.drive_to_joint[t.passive[c], d] * moved
 
 
-def velocities(t: Tables, m: Motion) -> None:
+def velocities(t: Model, m: Data) -> None:
     """Fill in the velocities of the links."""
     links = m.links
     for c in range(3):
@@ -606,7 +619,7 @@ def velocities(t: Tables, m: Motion) -> None:
         put(links, at + U, u)
 
 
-def accelerations(t: Tables, m: Motion) -> None:
+def accelerations(t: Model, m: Data) -> None:
     """Fill in the accelerations of the links."""
     links = m.links
     for c in range(3):
@@ -627,7 +640,7 @@ def accelerations(t: Tables, m: Motion) -> None:
         put(links, at + UD, ud)
 
 
-def _point(m: Motion, j: int, at: Vector) -> Any:
+def _point(m: Data, j: int, at: Vector) -> Any:
     """Return velocity and acceleration of a link's point at a place."""
     k = OF_LINK * j
     arm, w = minus(at, vector(m.links, k + P)), vector(m.links, k + W)
@@ -637,14 +650,14 @@ def _point(m: Motion, j: int, at: Vector) -> Any:
                  product(w, v)))
 
 
-def _turning(m: Motion, j: int, direction: Vector) -> Any:
+def _turning(m: Data, j: int, direction: Vector) -> Any:
     """Return first and second derivative of a direction fixed in a link."""
     w = vector(m.links, OF_LINK * j + W)
     v = product(w, direction)
     return v, plus(product(vector(m.links, OF_LINK * j + WD), direction), product(w, v))
 
 
-def row_acceleration(t: Tables, m: Motion, r: int) -> Any:
+def row_acceleration(t: Model, m: Data, r: int) -> Any:
     """Return the second derivative of a row by time."""
     k, i, loops = t.rows[r, LOOP], t.rows[r, AXES], m.loops
     if t.rows[r, KIND] == TRANSLATION:
@@ -660,7 +673,7 @@ def row_acceleration(t: Tables, m: Motion, r: int) -> Any:
         t, m, k, t.rows[r, AXES + 2], t.rows[r, AXES + 3])
 
 
-def _angle_acceleration(t: Tables, m: Motion, k: int, i: int, j: int) -> Any:
+def _angle_acceleration(t: Model, m: Data, k: int, i: int, j: int) -> Any:
     own = OF_CLOSURE * k
     a, b = column(m.loops, own + A_R, i), column(m.loops, own + B_R, j)
     da, dda = _turning(m, t.closures[k, LOOP_A], a)
@@ -677,16 +690,16 @@ class Loads(NamedTuple):
         What each joint transmits to its link: force, and moment about its origin.
     loops : (L OF_FORCES, 3) array
         What the link of A does to that of B in each closure: force and moment.
-    coordinates, rubbed : (C,) arrays
-        Efforts of the tree's coordinates; scratch, for those against friction of joints.
+    tau, tau_friction : (C,) arrays
+        Efforts of the tree's coordinates: of the bodies, and against friction of joints.
     efforts : (D,) array
         Of the drives.
     """
 
     links: Any
     loops: Any
-    coordinates: Any
-    rubbed: Any
+    tau: Any
+    tau_friction: Any
     efforts: Any
 
     @property
@@ -705,10 +718,10 @@ class Loads(NamedTuple):
         return _part(self.loops, OF_FORCES, FORCE)
 
 
-def inverse_dynamics(t: Tables, m: Motion, inertial: Any, gravity: Any, o: Loads) -> None:
+def inverse_dynamics(t: Model, m: Data, inertial: Any, gravity: Any, o: Loads) -> None:
     """Add the forces that move the bodies, `inertial` (J + 1, 10), and the efforts that follow.
 
-    `o.links` holds what links apply to the world beside them.
+    `o.links` holds what links apply to the world in addition to them.
     """
     g, links = Vector(gravity[0], gravity[1], gravity[2]), m.links
     for j in range(1, len(t.joints)):
@@ -723,16 +736,16 @@ def inverse_dynamics(t: Tables, m: Motion, inertial: Any, gravity: Any, o: Loads
                     product(w, _inertia_times(links, j, inertial, w)))
         increase(o.links, OF_FORCES * j + MOMENT, plus(spin, product(h, a)))
     for c in range(len(m.q)):
-        o.coordinates[c] = 0.0
+        o.tau[c] = 0.0
     for j in range(len(t.joints) - 1, 0, -1):
         i, own = t.joints[j, PARENT], OF_FORCES * j
         f, n = vector(o.links, own + FORCE), vector(o.links, own + MOMENT)
         along = dot(vector(links, OF_LINK * j + Z), n if t.joints[j, TURNS] else f)
-        o.coordinates[t.joints[j, COORDINATE]] += t.ratio[j] * along
+        o.tau[t.joints[j, COORDINATE]] += t.ratio[j] * along
         arm = minus(vector(links, OF_LINK * j + P), vector(links, OF_LINK * i + P))
         increase(o.links, OF_FORCES * i + FORCE, f)
         increase(o.links, OF_FORCES * i + MOMENT, plus(n, product(arm, f)))
-    to_drives(t, m, o.coordinates, o.efforts)
+    project_to_actuators(t, m, o.tau, o.efforts)
 
 
 def _is_zero(inertial: Any, j: int) -> bool:
@@ -750,7 +763,7 @@ def _inertia_times(links: Any, j: int, inertial: Any, v: Vector) -> Vector:
         xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z))
 
 
-def to_drives(t: Tables, m: Motion, of_tree: Any, efforts: Any) -> None:
+def project_to_actuators(t: Model, m: Data, of_tree: Any, efforts: Any) -> None:
     """Fill in the drives' efforts T' tau for efforts of the tree's coordinates."""
     T, passive, driven = m.drive_to_joint, t.passive, t.drives
     for d in range(len(driven)):
@@ -760,7 +773,7 @@ def to_drives(t: Tables, m: Motion, of_tree: Any, efforts: Any) -> None:
         efforts[d] = x
 
 
-def constraint_forces(t: Tables, m: Motion, o: Loads) -> None:
+def constraint_forces(t: Model, m: Data, o: Loads) -> None:
     """Fill in what the closures transmit, and with them the joints."""
     count, inverse = len(t.passive), m.inverse
     for k in range(len(o.loops)):
@@ -769,7 +782,7 @@ def constraint_forces(t: Tables, m: Motion, o: Loads) -> None:
     for r in range(count):
         x = 0.0 * m.q[0]
         for c in range(count):
-            x = x + inverse[c, r] * o.coordinates[t.passive[c]]
+            x = x + inverse[c, r] * o.tau[t.passive[c]]
         kind = FORCE if t.rows[r, KIND] == TRANSLATION else MOMENT
         increase(o.loops, OF_FORCES * t.rows[r, LOOP] + kind, times(x, row_axis(t, m, r)))
     for k in range(len(t.closures)):
@@ -782,7 +795,7 @@ def constraint_forces(t: Tables, m: Motion, o: Loads) -> None:
             increase(o.links, OF_FORCES * j + MOMENT, times(-sign, plus(N, product(arm, F))))
 
 
-def twist(t: Tables, m: Motion, of_turns: Any, of_origins: Any) -> None:
+def link_jacobians(t: Model, m: Data, of_turns: Any, of_origins: Any) -> None:
     """Fill in angular and linear velocity of each link per rate of each drive, (3 (J + 1), D)."""
     drives = len(t.drives)
     for c in range(3):
@@ -823,12 +836,39 @@ class JointFriction(NamedTuple):
     width: Any
 
 
-def joint_friction(t: Tables, m: Motion, o: Loads, s: JointFriction, efforts: Any) -> None:
+# Rows of the parameters of drives, and of the efforts that follow from them.
+ARMATURE, VISCOUS, COULOMB, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5
+TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4, 5
+
+
+def actuator_efforts(drives: Any, v: Any, a: Any, efforts: Any) -> None:
+    """Fill in rigid-body effort, drive friction and the total of D drives.
+
+    The motor accelerates its rotor on its own side of the gear.
+
+    Parameters
+    ----------
+    drives : (OF_DRIVE, D) array
+        Armature [kg m^2, kg], viscous and Coulomb friction, offset, and width of the sign.
+    v, a : (D,) arrays
+        Velocities and accelerations of the drives.
+    efforts : (EFFORTS, D) array
+        JOINT_EFFORT and TRANSMITTED are given, the other rows are filled in.
+    """
+    for d in range(len(v)):
+        efforts[RIGID, d] = efforts[TRANSMITTED, d] + drives[ARMATURE, d] * a[d]
+        efforts[DRIVE_FRICTION, d] = (drives[VISCOUS, d] * v[d]
+                                      + drives[COULOMB, d] * tanh(v[d] / drives[WIDTH, d]))
+        efforts[TOTAL, d] = (efforts[RIGID, d] + efforts[DRIVE_FRICTION, d] + drives[OFFSET, d]
+                             + efforts[JOINT_EFFORT, d])
+
+
+def joint_friction(t: Model, m: Data, o: Loads, s: JointFriction, efforts: Any) -> None:
     """Fill in the drives' efforts (D,) against friction of passive joints, with their loads.
 
     The moment in a closure acts on both of its links: it is felt in the joints between them.
     """
-    zero, of_tree, links = 0.0 * m.q[0], o.rubbed, m.links
+    zero, of_tree, links = 0.0 * m.q[0], o.tau_friction, m.links
     for c in range(len(m.q)):
         of_tree[c] = zero
     for k in range(len(s.joint)):
@@ -851,4 +891,4 @@ def joint_friction(t: Tables, m: Motion, o: Loads, s: JointFriction, efforts: An
                 if t.joints[i, TURNS]:
                     of_tree[t.joints[i, COORDINATE]] += t.path[n, SIGN] * t.ratio[i] * dot(
                         vector(links, OF_LINK * i + Z), moment)
-    to_drives(t, m, of_tree, efforts)
+    project_to_actuators(t, m, of_tree, efforts)

@@ -3,7 +3,7 @@
 
 """Evaluation of a mechanism's equations at samples: compiled, on floats, or on arrays.
 
-One function goes through the samples, from each to the next; it is compiled, or runs as it is on
+One function goes through the samples, from each to the next; it is compiled, or runs uncompiled on
 Python's floats. Of many samples without a compiler NumPy takes all at once, each walked to from
 home, or from where it is known to be. All end on the branch that home is on.
 """
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -28,26 +28,32 @@ from pprs_dynamics.physics.mechanism.packed import (
     views,
 )
 from pprs_dynamics.physics.mechanism.tree_equations import (
+    EFFORTS,
+    JOINT_EFFORT,
+    OF_DRIVE,
     OPEN,
     STEPS,
+    TRANSMITTED,
     WARM_STEPS,
+    WIDTH,
+    Data,
     Integers,
     JointFriction,
     Loads,
-    Motion,
-    Tables,
+    Model,
+    actuator_efforts,
+    close_loops,
     constraint_forces,
-    follow,
+    forward_kinematics,
     inverse_dynamics,
     is_near,
-    is_sound,
+    is_regular_and_closed,
     jacobian,
     joint_friction,
-    place,
+    link_jacobians,
     predict,
-    reach,
     residual,
-    twist,
+    update_frame_placements,
 )
 
 # Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
@@ -57,53 +63,60 @@ NOWHERE = np.zeros(4)
 NO_FRICTION = JointFriction(*np.zeros((2, 0), dtype=np.int64), *np.zeros((4, 0)))
 
 
-class Found(NamedTuple):
-    """What a robot needs for a motion, of N samples.
+class InverseDynamicsResult:
+    """Closed coordinates and drive efforts of N samples.
 
     Parameters
     ----------
     q : (N, C) array
         Closed coordinates.
-    efforts, friction : (N, D) arrays
-        Of the drives: without friction of joints, and against it [N m, N].
+    efforts : (EFFORTS, N, D) array
+        By row: TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT and TRANSMITTED [N m, N].
     """
 
-    q: Array
-    efforts: Array
-    friction: Array
+    __slots__ = ('efforts', 'q')
+
+    def __init__(self, q: Array, efforts: Array) -> None:
+        self.q, self.efforts = q, efforts
 
 
 def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, start: Any,
               given: Any, motions: Any, inertial: Any, gravity: Any, loads: Any, rubbing: Any,
-              resistance: Any, found: Any, stages: int, nearby: bool) -> int:
-    """Go through the samples; see `follow_drives` and `Evaluation`."""
+              resistance: Any, actuators: Any, closed: Any, efforts: Any, stages: int,
+              nearby: bool) -> int:
+    """Evaluate the stages at each sample in turn; see `Evaluation`.
+
+    Return the first sample that fails, or -1.
+    """
     t = elements(read_tables(sizes, integers, reals))
-    rubs = elements(JointFriction(rubbing[0], rubbing[1], resistance[0], resistance[1],
-                                  resistance[2], resistance[3]))
-    coordinates, drives = len(home), given.shape[2]
-    for s in range(len(found)):
+    friction = elements(JointFriction(rubbing[0], rubbing[1], resistance[0], resistance[1],
+                                      resistance[2], resistance[3]))
+    for s in range(len(closed)):
         at = s if stages & KEPT else 0
         m = elements(read_motion(sizes, motions[at], reals))
         o = elements(read_loads(sizes, loads[at], reals))
         if stages & MOTION:
-            q, v, a = given[0, s], given[1, s], given[2, s]
-            done = False
-            if nearby and s == 0:
-                if is_near(t, start, q) and reach(t, m, start, q):
-                    follow(t, m, v, a)
-                    done = m.solution[STEPS] <= WARM_STEPS and is_sound(t, m, at_home)
-                if not done:
-                    for c in range(coordinates):
-                        start[c] = home[c]
-            if not done:
-                if not reach(t, m, start, q) and not reach(t, m, home, q):
-                    return s
-                follow(t, m, v, a)
-            for c in range(coordinates):
-                found[s, c] = start[c] = m.q[c]
-            if s + 1 < len(found) and is_near(t, start, given[0, s + 1]):
+            q = given[0, s]
+            # First from coordinates of another motion, then from the last sample, then from home.
+            is_closed = False
+            for trial in range(0 if nearby and s == 0 else 1, 3):
+                if trial > 0 or is_near(t, start, q):
+                    is_closed = close_loops(t, m, start, q)
+                if is_closed:
+                    forward_kinematics(t, m, given[1, s], given[2, s])
+                    if trial > 0 or (m.solution[STEPS] <= WARM_STEPS
+                                     and is_regular_and_closed(t, m, at_home)):
+                        break
+                is_closed = False
+                for c in range(len(home)):
+                    start[c] = home[c]
+            if not is_closed:
+                return s
+            for c in range(len(home)):
+                closed[s, c] = start[c] = m.q[c]
+            if s + 1 < len(closed) and is_near(t, start, given[0, s + 1]):
                 predict(t, m, given[0, s + 1], start)
-            if not stages & KEPT and not is_sound(t, m, at_home):
+            if not stages & KEPT and not is_regular_and_closed(t, m, at_home):
                 return s
         if stages & FORCES:
             if not stages & KEPT:
@@ -112,16 +125,19 @@ def _evaluate(sizes: Any, integers: Any, reals: Any, home: Any, at_home: Any, st
                         o.links[k, c] = 0.0
             inverse_dynamics(t, m, inertial, gravity, o)
             constraint_forces(t, m, o)
-            for d in range(drives):
-                found[s, coordinates + d] = o.efforts[d]
-            joint_friction(t, m, o, rubs, found[s, coordinates + drives:])
+            if not stages & KEPT:
+                own = efforts[:, s]
+                for d in range(given.shape[2]):
+                    own[TRANSMITTED, d] = o.efforts[d]
+                joint_friction(t, m, o, friction, own[JOINT_EFFORT])
+                actuator_efforts(actuators, given[1, s], given[2, s], own)
     return -1
 
 
-def _twist(sizes: Any, integers: Any, reals: Any, motions: Any, W: Any, U: Any) -> None:
+def _link_jacobians(sizes: Any, integers: Any, reals: Any, motions: Any, W: Any, U: Any) -> None:
     t = read_tables(sizes, integers, reals)
     for s in range(len(motions)):
-        twist(t, read_motion(sizes, motions[s], reals), W[s], U[s])
+        link_jacobians(t, read_motion(sizes, motions[s], reals), W[s], U[s])
 
 
 class Evaluation:
@@ -129,37 +145,41 @@ class Evaluation:
 
     Parameters
     ----------
-    t : Tables
+    t : Model
     home : (C,) array
         Closed coordinates.
     """
 
-    def __init__(self, t: Tables, home: Array) -> None:
+    def __init__(self, t: Model, home: Array) -> None:
         self.tables, self.home, self.packed = t, home, packed_tables(t)
         self.sizes = self.packed.sizes
-        self._lengths = length_of(Motion, self.sizes), length_of(Loads, self.sizes)
+        self._lengths = length_of(Data, self.sizes), length_of(Loads, self.sizes)
         self._no_bodies = np.zeros((len(t.joints), 10))
         self._friction = NO_FRICTION, np.array(NO_FRICTION[:2]), np.array(NO_FRICTION[2:])
+        drives = len(t.drives)
+        self._no_motion, self._no_efforts = np.empty((3, 0, drives)), np.empty((EFFORTS, 0, drives))
+        self._no_actuators = np.zeros((OF_DRIVE, drives))
+        self._no_actuators[WIDTH] = 1.0
 
     @cached_property
     def at_home(self) -> Array:
-        """`Motion.solution` at home, (4,)."""
+        """`Data.solution` at home, (4,)."""
         still = np.zeros((3, 1, len(self.tables.drives)))
         still[0] = self.home[self.tables.drives]
-        rows, _ = self.follow(*still)
+        rows, _ = self.forward_kinematics(*still)
         solution: Array = self.motion(rows).solution[0]
         return solution
 
-    def motion(self, rows: Array) -> Motion:
-        """Return by name what rows of `follow` hold."""
-        return views(Motion, self.sizes, rows)
+    def motion(self, rows: Array) -> Data:
+        """Return by name what rows of `forward_kinematics` hold."""
+        return views(Data, self.sizes, rows)
 
     def loads(self, rows: Array) -> Loads:
         """Return by name what rows of `forces` hold."""
         return views(Loads, self.sizes, rows)
 
-    def follow(self, q: Array, v: Array, a: Array, start: Array | None = None,
-               nearby: Array | None = None) -> tuple[Array, int]:
+    def forward_kinematics(self, q: Array, v: Array, a: Array, start: Array | None = None,
+                           nearby: Array | None = None) -> tuple[Array, int]:
         """Return the motion of all links for positions, velocities and accelerations of the drives.
 
         Parameters
@@ -184,7 +204,7 @@ class Evaluation:
 
     def forces(self, rows: Array, inertial: Array, gravity: Array,
                wrenches: Mapping[int, tuple[Array, Array]] | None = None) -> Array:
-        """Return what joints and closures transmit, in rows (N, K), for rows of `follow`.
+        """Return what joints and closures transmit, (N, K), for rows of `forward_kinematics`.
 
         Parameters
         ----------
@@ -208,15 +228,16 @@ class Evaluation:
         found = np.zeros((len(rows), len(self.tables.drives)))
         m, o = samples_last(self.motion(rows)), samples_last(self.loads(loads))
         # Loads are everybody's: what is of one friction alone does not go through them.
-        o = o._replace(rubbed=np.empty_like(o.rubbed))
+        o = o._replace(tau_friction=np.empty_like(o.tau_friction))
         with np.errstate(all='ignore'):
             joint_friction(self.tables, m, o, friction, found.T)
         return found
 
-    def found(self, motion: tuple[Array, Array, Array], inertial: Array, gravity: Array,
-              friction: JointFriction, start: Array | None = None,
-              nearby: Array | None = None) -> Found | None:
-        """Return what is needed for a motion, with nothing kept of the way there.
+    def inverse_dynamics(self, motion: tuple[Array, Array, Array], inertial: Array,
+                         gravity: Array, friction: JointFriction,
+                         actuators: Array | None = None, start: Array | None = None,
+                         nearby: Array | None = None) -> InverseDynamicsResult | None:
+        """Return the efforts for a motion of the drives, in one pass that stores nothing else.
 
         Parameters
         ----------
@@ -225,46 +246,48 @@ class Evaluation:
         inertial : (J + 1, 10) array
         gravity : (3,) array
         friction : JointFriction
+        actuators : (OF_DRIVE, D) array, optional
+            See `actuator_efforts`; without it the drives have no rotor and no friction.
         start, nearby : (N, C) and (C,) arrays, optional
-            See `follow`.
+            See `forward_kinematics`.
 
         Returns
         -------
-        Found or None
-            None where a sample cannot be or is too near a singularity: `follow` tells which.
+        InverseDynamicsResult or None
+            None where a sample is out of reach or singular: `forward_kinematics` says which.
         """
         given = np.array(motion)
         samples, drives = given.shape[1:]
-        count = len(self.home)
-        table = np.empty((samples, count + 2 * drives))
-        rows = np.empty((1, self._lengths[0]))
-        if self._run(given, start, rows, MOTION | FORCES, gravity, nearby, inertial,
-                     np.empty((1, self._lengths[1])), friction, table) >= 0:
-            return None
-        return Found(table[:, :count], table[:, count:count + drives], table[:, count + drives:])
+        closed, efforts = np.empty((samples, len(self.home))), np.empty((EFFORTS, samples, drives))
+        failed = self._run(
+            given, start, np.empty((1, self._lengths[0])), MOTION | FORCES, gravity, nearby,
+            inertial, np.empty((1, self._lengths[1])), friction,
+            self._no_actuators if actuators is None else actuators, closed, efforts)
+        return None if failed >= 0 else InverseDynamicsResult(closed, efforts)
 
-    def twists(self, rows: Array) -> tuple[Array, Array]:
+    def link_jacobians(self, rows: Array) -> tuple[Array, Array]:
         """Return angular and linear velocities of links per rate of drives, (N, J + 1, 3, D)."""
         t = self.tables
         W, U = np.zeros((2, len(rows), 3 * len(t.joints), len(t.drives)))
-        loop = compiled_or_none(_twist, len(rows))
+        loop = compiled_or_none(_link_jacobians, len(rows))
         if loop is not None:
             loop(*self.packed, rows, W, U)
         else:
-            twist(t, samples_last(self.motion(rows)), *samples_last((W, U)))
+            link_jacobians(t, samples_last(self.motion(rows)), *samples_last((W, U)))
         shape = len(rows), len(t.joints), 3, len(t.drives)
         return W.reshape(shape), U.reshape(shape)
 
     def _run(self, given: Array | None, start: Array | None, rows: Array, stages: int,
              gravity: Array, nearby: Array | None, inertial: Array | None = None,
              loads: Array | None = None, friction: JointFriction = NO_FRICTION,
-             found: Array | None = None) -> int:
+             actuators: Array | None = None, closed: Array | None = None,
+             efforts: Array | None = None) -> int:
         """Evaluate stages, and return the first sample that fails or -1; see `_evaluate`."""
-        drives = len(self.tables.drives)
-        if found is None:
-            found = np.empty((len(rows), len(self.home) + 2 * drives))
+        if closed is None or efforts is None or actuators is None:
+            closed, efforts, actuators = (
+                np.empty((len(rows), len(self.home))), self._no_efforts, self._no_actuators)
         if given is None:
-            given = np.empty((3, 0, drives))
+            given = self._no_motion
         if loads is None or inertial is None:
             loads, inertial = np.empty((len(rows), self._lengths[1])), self._no_bodies
         last = self._friction
@@ -276,58 +299,62 @@ class Evaluation:
                  self.home if start is None or not len(start) else start[0])
         arguments = (
             *self.packed, self.home, at_home, np.array(first), given, rows, inertial, gravity,
-            loads, last[1], last[2], found, stages, warm)
-        loop = compiled_or_none(_evaluate, len(found))
+            loads, last[1], last[2], actuators, closed, efforts, stages, warm)
+        loop = compiled_or_none(_evaluate, len(closed))
         if loop is not None:
             return int(loop(*arguments))
-        if len(found) <= TREE_FEW:
+        if len(closed) <= TREE_FEW:
             try:
                 return _evaluate(*arguments)
             except (ZeroDivisionError, OverflowError, ValueError):
                 pass  # arrays answer with infinities instead
         with np.errstate(all='ignore'):
             return self._run_on_arrays(given, start, rows, stages, gravity, at_home, inertial,
-                                       loads, friction, found)
+                                       loads, friction, actuators, closed, efforts)
 
     def _run_on_arrays(self, given: Array, start: Array | None, rows: Array, stages: int,
                        gravity: Array, at_home: Array, inertial: Array, loads: Array,
-                       friction: JointFriction, found: Array) -> int:
-        t, count, drives = self.tables, len(self.home), len(self.tables.drives)
+                       friction: JointFriction, actuators: Array, closed: Array,
+                       efforts: Array) -> int:
+        t = self.tables
         if not stages & KEPT:
-            rows, loads = (np.zeros((len(found), each.shape[1])) for each in (rows, loads))
+            rows, loads = (np.zeros((len(closed), each.shape[1])) for each in (rows, loads))
         m, o = samples_last(self.motion(rows)), samples_last(self.loads(loads))
+        q, v, a = np.moveaxis(given, 1, -1)
         if stages & MOTION:
-            q, v, a = np.moveaxis(given, 1, -1)
-            if not reach(t, m, self.home if start is None else start.T, q):
+            if not close_loops(t, m, self.home if start is None else start.T, q):
                 size = m.solution[OPEN]
                 return int(np.argmax(~(size < np.inf) | (size == np.max(size))))
-            follow(t, m, v, a)
-            found[:, :count] = m.q.T
-            if not stages & KEPT and not is_sound(t, m, at_home):
+            forward_kinematics(t, m, v, a)
+            closed[:] = m.q.T
+            if not stages & KEPT and not is_regular_and_closed(t, m, at_home):
                 return 0
         if stages & FORCES:
             inverse_dynamics(t, m, inertial, gravity, o)
             constraint_forces(t, m, o)
-            found[:, count:count + drives] = o.efforts.T
-            joint_friction(t, m, o, friction, found[:, count + drives:].T)
+            if not stages & KEPT:
+                own = np.moveaxis(efforts, 1, -1)
+                own[TRANSMITTED] = o.efforts
+                joint_friction(t, m, o, friction, own[JOINT_EFFORT])
+                actuator_efforts(actuators, v, a, own)
         return -1
 
 
 def samples_last(arrays: Any) -> Any:
     """Return views with the samples last, as NumPy takes the equations."""
     moved = (np.moveaxis(array, 0, -1) for array in arrays)
-    return type(arrays)(*moved) if isinstance(arrays, Motion | Loads) else tuple(moved)
+    return type(arrays)(*moved) if isinstance(arrays, Data | Loads) else tuple(moved)
 
 
-def survey(t: Tables, q: Array, columns: Integers) -> tuple[Array, Array, Motion]:
+def constraint_jacobian(t: Model, q: Array, columns: Integers) -> tuple[Array, Array, Data]:
     """Return all rows and their derivatives by some coordinates, (r,) and (r, K), at one place."""
     sizes = packed_tables(t).sizes
-    m = views(Motion, sizes, np.zeros((1, length_of(Motion, sizes))))
+    m = views(Data, sizes, np.zeros((1, length_of(Data, sizes))))
     m.q[0] = q
     one = type(m)(*(array[0].data for array in m))
     places = np.full((len(q), 2), -1)
     places[columns, 0] = np.arange(len(columns))
-    place(t, one)
+    update_frame_placements(t, one)
     residuals = np.array([residual(t, one, r) for r in range(len(t.rows))])
     J = np.zeros((len(t.rows), len(columns)))
     jacobian(t, one, places, J, np.empty((len(J), 0)))

@@ -10,6 +10,7 @@ installed.
 
 from __future__ import annotations
 
+import codecs
 import hashlib
 import re
 import xml.etree.ElementTree as ElementTree
@@ -99,7 +100,8 @@ def expanded(path: str) -> bytes:
         Where the file cannot be read, or holds xacro that cannot be run.
     """
     content = read_content(path)
-    if not XACRO.search(COMMENT.sub(b'', content)):
+    is_xml = content.removeprefix(codecs.BOM_UTF8).lstrip().startswith(b'<')
+    if not is_xml or not XACRO.search(COMMENT.sub(b'', content)):
         return content
     try:
         import xacro

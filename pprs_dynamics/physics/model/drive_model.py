@@ -16,12 +16,11 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import PLATFORM, Effect
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.effects_block import added_effects
-from pprs_dynamics.physics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
-from pprs_dynamics.physics.model.former_names import with_general_names
+from pprs_dynamics.physics.model.force_model import ForceModel, Forces, ModelState
 from pprs_dynamics.physics.model.keys import KEYS, is_axis, is_mechanism, title_of
 from pprs_dynamics.physics.model.limits import Limits
 from pprs_dynamics.physics.model.one_pass import OnePass
@@ -44,36 +43,6 @@ HOME_HEIGHT = 0.5  # [m], of the platform at home
 # Of a long trajectory that many samples are looked at for their condition number, evenly spread:
 # neighbours hardly differ, and a singular value decomposition each would cost more than the model.
 MOST_CONDITIONS = 64
-
-__all__ = ['RIGID_BODY', 'DriveForces', 'DriveModel', 'ModelState']
-
-
-@dataclass(frozen=True)
-class DriveForces(Forces):
-    """Drive forces of N samples.
-
-    Parameters
-    ----------
-    total : (N, 6) array
-        What the drives must apply [N], in drive order.
-    parts : dict of (N, 6) arrays
-        `rigid_body`, `active_friction`, `passive_friction` and one per added effect; they sum
-        to `total`.
-    mechanism : ThreePprsState
-        Drive motion, Jacobians, reactions: what the forces were computed from.
-    """
-
-    mechanism: ThreePprsState
-
-    @property
-    def drive_motion(self) -> tuple[Array, ...]:
-        """Position, velocity and acceleration of the drives [m, m/s, m/s^2], (N, 6) each."""
-        return self.mechanism.kinematics.drive_motion
-
-
-def _parts(table: Array) -> dict[str, Array]:
-    """Return the parts in a table of `OnePass.forces` by name."""
-    return {RIGID_BODY: table[1], ActiveFriction.name: table[2], PassiveFriction.name: table[3]}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +94,6 @@ class DriveModel(ForceModel):
                 raise ModelError(other, parameters[other], 'not be given: this needs a 3-PPRS, and '
                                  f'{title_of(parameters)} is for pprs compare, diagnose, adopt, '
                                  'fit and history')
-            parameters = with_general_names(parameters)
             values = checked_values(parameters)
             for stroke in ('limits.slide_stroke', 'limits.lift_stroke'):
                 if not values[stroke][0] < values[stroke][1]:
@@ -166,6 +134,8 @@ class DriveModel(ForceModel):
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
             return solve_mechanism(
                 self.robot, motion, reversal=self.reversal, printed=self.equations == 'printed',
+                friction=tuple(effect.joints for effect in self.effects
+                               if isinstance(effect, WholeMechanismFriction)),
                 minimum_sine=self.limits.rod_sine, condition_limit=self.limits.condition_number)
 
     def at_drives(self, state: ThreePprsState) -> ThreePprsState:
@@ -175,33 +145,29 @@ class DriveModel(ForceModel):
                                          state.channels)
         return self.mechanism(found if state.time is None else found.with_time(state.time))
 
-    def drive_forces(
-        self, motion: PlatformMotion, state: ModelState | None = None,
-    ) -> DriveForces:
+    def drive_forces(self, motion: PlatformMotion, state: ModelState | None = None) -> Forces:
         """Return the forces for a platform motion; see `ForceModel.drive_forces`."""
         self._require_motion(motion)
         one_pass = self._one_pass
         table = None if one_pass is None else one_pass.forces(motion)
         if one_pass is None or table is None:
             return self.forces_at(self.mechanism(motion), state)
-        parts, mechanism = _parts(table), one_pass.mechanism(motion, table)
         added = self.effects[2:]
+        if added:
+            return self._with_effects(added, one_pass.parts(table),
+                                      one_pass.mechanism(motion, table), state)
         if state is not None:
-            state.begin(motion.time)
-        return (self._with_effects(added, parts, mechanism, state, DriveForces) if added
-                else DriveForces(table[0], parts, mechanism))
-
-    def forces_at(self, mechanism: ThreePprsState, state: ModelState | None = None) -> DriveForces:
-        """Return the forces at a solved state of the mechanism; see `drive_forces`."""
-        return self._with_effects(self.effects, {RIGID_BODY: mechanism.rigid_force}, mechanism,
-                                  state, DriveForces)
+            state.advance(motion.time, self.initial_state)
+        return Forces(table[0], lambda: one_pass.parts(table),
+                      lambda: one_pass.mechanism(motion, table))
 
     @cached_property
     def _one_pass(self) -> OnePass | None:
-        """The paper's model in one pass, where no effect changes the bodies that it is of."""
+        """The paper's model in one pass, where no effect changes its bodies or loads."""
         match self.effects:
             case (ActiveFriction() as active, WholeMechanismFriction() as passive, *added):
-                if not any(isinstance(effect, BodyEffect) for effect in added):
+                if not any(isinstance(effect, BodyEffect | PassiveJointEffect)
+                           for effect in added):
                     return OnePass(self.robot, active, passive, self.limits, self.reversal,
                                    self.equations == 'printed')
         return None

@@ -9,10 +9,9 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.effects.catalogue import REPLACED, catalogue, find_effect
+from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.effects.former_names import FORMER
 from pprs_dynamics.physics.model.keys import Key, title_of
 
 # Keys of the block `effects` that are no effect.
@@ -59,8 +58,7 @@ def added_effects(
 
 
 def _unknown(name: str, place: str) -> UnknownNameError:
-    instead = FORMER[name].effect if name in FORMER else REPLACED.get(name, '')
-    return UnknownNameError('effect', name, catalogue(), place, instead=instead)
+    return UnknownNameError('effect', name, catalogue(), place)
 
 
 def _check_place(name: str, block: Any, effect: type[CatalogueEffect], kind: str,

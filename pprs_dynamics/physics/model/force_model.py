@@ -13,11 +13,11 @@ import copy
 import hashlib
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -27,8 +27,7 @@ from pprs_dynamics.errors import EffectError, MotionError
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.drive_states import DriveStates
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.keys import EFFORT_UNITS, FILES, Key, title_of
@@ -48,32 +47,49 @@ def total_force(parts: tuple[Any, ...]) -> Any:
     return total
 
 
-@dataclass(frozen=True)
 class Forces:
     """Forces of N samples of D drives.
 
     Parameters
     ----------
     total : (N, D) array
-        What the drives must apply [N], in drive order.
-    parts : dict of (N, D) arrays
+        What the drives must apply [N, N m], in drive order.
+    parts : dict of (N, D) arrays, or function that returns it
         `rigid_body`, the model's own friction, and one per added effect; they sum to `total`.
-    mechanism : DriveStates
+    mechanism : state, or function that returns it
         What the forces were computed from.
     """
 
-    total: Array
-    parts: dict[str, Array]
-    mechanism: DriveStates
+    __slots__ = ('_mechanism', '_parts', 'total')
+
+    # Functions, because of most samples only the total is read: building the rest takes longer
+    # than the equations.
+    def __init__(self, total: Array, parts: dict[str, Array] | Callable[[], dict[str, Array]],
+                 mechanism: Any) -> None:
+        self.total, self._parts, self._mechanism = total, parts, mechanism
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Forces, (self.total, self.parts, self.mechanism)
+
+    @property
+    def parts(self) -> dict[str, Array]:
+        """Parts of the total, by name."""
+        if callable(self._parts):
+            self._parts = self._parts()
+        return self._parts
+
+    @property
+    def mechanism(self) -> Any:
+        """The state of the mechanism."""
+        if callable(self._mechanism):
+            self._mechanism = self._mechanism()
+        return self._mechanism
 
     @property
     def drive_motion(self) -> tuple[Array, ...]:
         """Position, velocity and acceleration of the drives, (N, D) each."""
         state = self.mechanism
         return state.position, state.velocity, state.acceleration
-
-
-F = TypeVar('F', bound=Forces)
 
 
 class ModelState:
@@ -88,6 +104,8 @@ class ModelState:
 
     Attributes
     ----------
+    end : float, optional
+        Time of the last sample [s].
     closed : dict of Structure to (C,) array
         Coordinates of a mechanism at the last sample, from which its loops close in fewer steps
         where the next one is near. No result depends on them.
@@ -95,12 +113,21 @@ class ModelState:
 
     def __init__(self, memories: dict[str, Any], start: float | None = None) -> None:
         self.memories, self.start = memories, start
+        self.end: float | None = None
         self.closed: dict[Any, Array] = {}
 
-    def begin(self, time: Array | None) -> None:
-        """Take the first sample of times (N,) as the start, where that is not known yet."""
-        if self.start is None and time is not None and len(time):
+    def advance(self, time: Array | None, fresh: Callable[[], ModelState]) -> None:
+        """Take note of the times (N,) of the next samples, the first of which is the start.
+
+        Times that go back are of another stream: everything begins anew, from a fresh state.
+        """
+        if time is None or not len(time):
+            return
+        if self.end is not None and time[0] < self.end:
+            self.memories, self.start = fresh().memories, None
+        if self.start is None:
             self.start = float(time[0])
+        self.end = float(time[-1])
 
     @property
     def has_memory(self) -> bool:
@@ -123,6 +150,7 @@ class ModelState:
                 raise EffectError(name, 'its memory cannot be copied '
                                   f'({type(error).__name__}: {error})') from error
         state = ModelState(copied, self.start)
+        state.end = self.end
         state.closed = dict(self.closed)
         return state
 
@@ -428,13 +456,13 @@ class ForceModel(ABC):
     def forces_at(self, mechanism: Any, state: ModelState | None = None) -> Forces:
         """Return the forces at a state of the mechanism; see `drive_forces`."""
         return self._with_effects(self.effects, {RIGID_BODY: mechanism.rigid_force}, mechanism,
-                                  state, Forces)
+                                  state)
 
     def _with_effects(self, effects: Sequence[Effect], parts: dict[str, Array], mechanism: Any,
-                      state: ModelState | None, kind: type[F]) -> F:
+                      state: ModelState | None) -> Forces:
         """Return the forces of parts that are there and of effects."""
         state = self.initial_state() if state is None else state
-        state.begin(mechanism.time)
+        state.advance(mechanism.time, self.initial_state)
         for effect in self.effects:
             effect.check_memory(state.memories)
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
@@ -445,9 +473,12 @@ class ForceModel(ABC):
                     parts[effect.name] = loaded.rigid_force - mechanism.rigid_force
                     mechanism = loaded
             for effect in effects:
+                if isinstance(effect, PassiveJointEffect):
+                    mechanism = effect.rubbing(mechanism)
+            for effect in effects:
                 if not effect.is_measurement and not isinstance(effect, BodyEffect):
                     parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
-            return kind(total_force(tuple(parts.values())), parts, mechanism)
+            return Forces(total_force(tuple(parts.values())), parts, mechanism)
 
     @abstractmethod
     def at_home(self, samples: int) -> Any:
@@ -486,6 +517,7 @@ class ForceModel(ABC):
         used any more: memories are handed over, not copied.
         """
         continued = self.initial_state(state.start)
+        continued.end = state.end
         known = {effect.name for effect in model.effects} & state.memories.keys()
         for effect in self.effects:
             if effect.name in known:
@@ -520,7 +552,7 @@ class ForceModel(ABC):
         """Return the model without the effect of that name."""
         return replace(self, effects=tuple(each for each in self.effects if each.name != effect))
 
-    def measured(self, forces: F, state: ModelState | None = None) -> F:
+    def measured(self, forces: Forces, state: ModelState | None = None) -> Forces:
         """Return the measured forces where the drives apply `forces`.
 
         Effects of measurement become parts of their own; without any, `forces` are returned.
@@ -545,7 +577,7 @@ class ForceModel(ABC):
                      if isinstance(effect, MeasurementEffect)
                      else total + effect.force(mechanism, memory))
             parts[effect.name], total = after - total, after
-        return replace(forces, total=total, parts=parts)
+        return Forces(total, parts, mechanism)
 
     @property
     def misreadings(self) -> tuple[MeasurementEffect, ...]:

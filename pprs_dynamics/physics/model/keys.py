@@ -194,51 +194,28 @@ AXIS_KEYS: dict[str, Key] = {key.name: key for key in (
 EFFORT_UNITS = {'N m': 1.0, 'N': 1.0, 'A': 1.0, 'mN m': 1e-3, 'mN': 1e-3, 'kN m': 1e3, 'kN': 1e3,
                 'N cm': 1e-2, 'kgf cm': 0.0980665, 'kgf m': 9.80665, 'kgf': 9.80665,
                 'lbf in': 0.1129848290276167}
-# Blocks of mechanisms: a serial arm, and a robot that may have loops. What the first names joints
-# the second names drives.
-ARM, ROBOT, AXIS = 'arm', 'robot', 'axis'
-GAIN = '.gain'
-FILES = ('arm.urdf', 'robot.urdf', 'robot.mjcf')  # keys that hold paths
+ROBOT, AXIS = 'robot', 'axis'  # blocks that describe a mechanism
+DRIVES_KEY, GAIN, LOCKED = 'robot.drives', 'robot.gain', 'robot.locked.'
+FILES = ('robot.urdf', 'robot.mjcf')  # keys that hold paths
 LOOPS = ('spherical', 'revolute', 'universal', 'cylindrical', 'prismatic', 'fixed')
 
 
-def drives_key(block: str) -> str:
-    """Return the key that names the drives."""
-    return 'arm.joints' if block == ARM else 'robot.drives'
-
-
-def is_gain(key: str) -> bool:
-    """Return whether a key is the effort per ampere."""
-    return key in (ARM + GAIN, ROBOT + GAIN)
-
-
-def mechanism_block(names: Iterable[str]) -> str:
-    """Return the block of a mechanism that keys are of, or an empty string."""
-    for name in names:
-        block = name.partition('.')[0]
-        if block in (ARM, ROBOT) and block != name:
-            return block
-    return ''
-
-
 @cache
-def mechanism_keys(block: str, count: int) -> dict[str, Key]:
+def mechanism_keys(count: int) -> dict[str, Key]:
     """Return the keys of a mechanism with that many drives, but for those by names of its own."""
     zeros, ones = (0.0,) * count, (1.0,) * count
     # What a description may hold; an empty list is what it says.
     described: dict[str, Any] = {'may_be_empty': True, 'default': ()}
-    listed = drives_key(block)
 
     def drives(name: str, description: str, unit: str = '', **more: Any) -> Key:
-        return Key(name, f'{description}, of each of {listed}', unit, size=count,
+        return Key(name, f'{description}, of each of {DRIVES_KEY}', unit, size=count,
                    **{'default': zeros, **more})
 
     def links(name: str, description: str, unit: str) -> Key:
         return Key(name, f'{description}; without it, as the URDF says', unit, size=ANY,
                    may_be_empty=True, default=())
 
-    files = (Key('arm.urdf', "path of the arm's URDF, from the folder of this file",
-                 is_text=True),) if block == ARM else (
+    return {key.name: key for key in (
         Key('robot.urdf', "path of the robot's URDF, from the folder of this file", is_text=True,
             may_be_empty=True, default=''),
         Key('robot.mjcf', "path of the robot's MJCF instead", is_text=True, may_be_empty=True,
@@ -246,21 +223,19 @@ def mechanism_keys(block: str, count: int) -> dict[str, Key]:
         Key('friction.reversal_rate', 'width in which sgn turns over in passive joints that turn',
             'rad/s', positive=True, default=0.01),
         Key('friction.reversal_slide', 'width in which sgn turns over in passive slides', 'm/s',
-            positive=True, default=0.001))
-    return {key.name: key for key in (
-        *files,
-        Key(f'{block}.base', 'link that stands', is_text=True),
-        Key(f'{block}.tool', 'link that carries the load', is_text=True),
-        Key(listed, 'revolute and prismatic joints that are driven', size=count, is_text=True),
-        drives(block + GAIN, 'torque, or force, per ampere', 'N m/A, N/A', positive=True,
+            positive=True, default=0.001),
+        Key('robot.base', 'link that stands', is_text=True),
+        Key('robot.tool', 'link that carries the load', is_text=True),
+        Key(DRIVES_KEY, 'revolute and prismatic joints that are driven', size=count, is_text=True),
+        drives(GAIN, 'torque, or force, per ampere', 'N m/A, N/A', positive=True,
                default=ones),
-        drives(f'{block}.gear_ratio', 'turns of the motor per turn of the joint; without it, as '
+        drives('robot.gear_ratio', 'turns of the motor per turn of the joint; without it, as '
                'the URDF says, else 1', '', positive=True, **described),
-        Key(f'{block}.effort_unit', f'unit of the efforts of recordings; A: times {block}.gain',
+        Key('robot.effort_unit', f'unit of the efforts of recordings; A: times {GAIN}',
             choices=tuple(EFFORT_UNITS), default='N m'),
-        Key(f'{block}.gravity', 'gravity in the base; without it, as an MJCF says, else -9.81 '
+        Key('robot.gravity', 'gravity in the base; without it, as an MJCF says, else -9.81 '
             'along z', 'm/s^2', size=3, **described),
-        drives(f'{block}.armature', 'inertia of the rotor, seen at the joint; without it, as the '
+        drives('robot.armature', 'inertia of the rotor, seen at the joint; without it, as the '
                'MJCF says, else 0', 'kg m^2, kg', lower=0, **described),
         links('links.mass', 'mass of what each joint moves up to the next', 'kg'),
         links('links.moment', 'x y z of mass times centre, in the frame of each joint', 'kg m'),
@@ -293,7 +268,8 @@ OF_JOINT = {
 POSE = '_pose'
 MOTORS = 'friction.motors.'
 NAMED_BLOCKS: dict[str, dict[str, Key]] = {
-    'robot.loops.': OF_LOOP, 'friction.joints.': OF_JOINT, 'robot.home.': {}, MOTORS: {}}
+    'robot.loops.': OF_LOOP, 'friction.joints.': OF_JOINT, 'robot.home.': {}, LOCKED: {},
+    MOTORS: {}}
 
 
 def named_keys(parameters: Iterable[str]) -> dict[str, Key]:
@@ -304,6 +280,8 @@ def named_keys(parameters: Iterable[str]) -> dict[str, Key]:
             found[name] = (Key(name, 'x y z qx qy qz qw in the base near which the loops close',
                                'm', size=7) if name.endswith(POSE) else
                            Key(name, 'position near which the loops close', 'rad, m'))
+        if name.startswith(LOCKED):
+            found[name] = Key(name, 'position at which the joint is locked', 'rad, m')
         if name.startswith(MOTORS):
             found[name] = Key(name, 'turns of a motor per turn of a joint, of motors that move '
                               'several', '')
@@ -327,35 +305,31 @@ def is_axis(names: Iterable[str]) -> bool:
 
 
 def is_mechanism(names: Iterable[str]) -> bool:
-    """Return whether keys are those of a serial arm, or of a robot with loops."""
-    return bool(mechanism_block(names))
+    """Return whether keys are those of a robot that a description file describes."""
+    return any(name.startswith('robot.') for name in names)
 
 
 def title_of(parameters: Mapping[str, Any]) -> str:
     """Return what keys and values are a model of, for a sentence."""
-    block = mechanism_block(parameters)
-    if block == ROBOT and any(name.startswith('robot.loops.') or (name == 'robot.mjcf' and value)
-                              for name, value in parameters.items()):
+    if any(name.startswith('robot.loops.') or (name == 'robot.mjcf' and value)
+           for name, value in parameters.items()):
         return 'a robot with loops'
-    if block:
+    if is_mechanism(parameters):
         return 'a serial arm'
     return 'a single axis' if is_axis(parameters) else 'a 3-PPRS'
 
 
 def keys_of(parameters: Mapping[str, Any]) -> dict[str, Key]:
     """Return the keys of the kind of model that some keys and values belong to."""
-    block = mechanism_block(parameters)
-    if block:
-        drives = parameters.get(drives_key(block), ())
+    if is_mechanism(parameters):
+        drives = parameters.get(DRIVES_KEY, ())
         count = len(drives) if isinstance(drives, (list, tuple)) and drives else 1
-        keys = mechanism_keys(block, count)
-        return {**keys, **named_keys(parameters if block == ROBOT else [
-            name for name in parameters if name.startswith(MOTORS)])}
+        return {**mechanism_keys(count), **named_keys(parameters)}
     return AXIS_KEYS if is_axis(parameters) else KEYS
 
 
 # Names of all keys of the model, of whatever kind.
-NAMES = frozenset({*KEYS, *AXIS_KEYS, *mechanism_keys(ARM, 1), *mechanism_keys(ROBOT, 1)})
+NAMES = frozenset({*KEYS, *AXIS_KEYS, *mechanism_keys(1)})
 
 
 # Keys of ROS 2 itself and of single nodes, which may stand in the same file.

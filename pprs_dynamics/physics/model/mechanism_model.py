@@ -21,7 +21,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import MISSING, ModelError
-from pprs_dynamics.physics.effects.effect import ARM, SINGLE_AXIS, CatalogueEffect
+from pprs_dynamics.physics.effects.effect import ARM, SINGLE_AXIS, CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
@@ -33,19 +33,32 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tool_pose import ToolPose
-from pprs_dynamics.physics.mechanism.tree_equations import WORST_CONDITION, JointFriction
-from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION
+from pprs_dynamics.physics.mechanism.tree_equations import (
+    ARMATURE,
+    COULOMB,
+    DRIVE_FRICTION,
+    JOINT_EFFORT,
+    OF_DRIVE,
+    OFFSET,
+    RIGID,
+    TOTAL,
+    VISCOUS,
+    WIDTH,
+    WORST_CONDITION,
+    JointFriction,
+)
+from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
 from pprs_dynamics.physics.model.effects_block import added_effects
-from pprs_dynamics.physics.model.force_model import ForceModel, Forces, ModelState
-from pprs_dynamics.physics.model.keys import ARM as ARM_BLOCK
-from pprs_dynamics.physics.model.keys import AXIS as AXIS_BLOCK
+from pprs_dynamics.physics.model.force_model import RIGID_BODY, ForceModel, Forces, ModelState
 from pprs_dynamics.physics.model.keys import (
+    AXIS,
+    DRIVES_KEY,
     GAIN,
+    ROBOT,
     Key,
-    drives_key,
     is_axis,
+    is_mechanism,
     keys_of,
-    mechanism_block,
 )
 from pprs_dynamics.physics.model.limits import JointLimits
 from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
@@ -95,7 +108,7 @@ class MechanismModel(ForceModel):
     @property
     def is_described(self) -> bool:
         """Whether bodies and joints are those of a description; not of an axis."""
-        return self.block != AXIS_BLOCK
+        return self.block != AXIS
 
     @property
     def drives(self) -> tuple[str, ...]:
@@ -125,8 +138,8 @@ class MechanismModel(ForceModel):
 
     @property
     def block(self) -> str:
-        """Block of its file: `arm`, `robot` or `axis`."""
-        return mechanism_block(self.values) or AXIS_BLOCK
+        """Block of its file: `robot` or `axis`."""
+        return ROBOT if is_mechanism(self.values) else AXIS
 
     @cached_property
     def keys(self) -> dict[str, Key]:
@@ -146,12 +159,12 @@ class MechanismModel(ForceModel):
     @property
     def gain(self) -> tuple[float, ...] | None:
         """Torque, or force, per ampere of each drive [N m/A, N/A]; None of an axis."""
-        return self.values.get(self.block + GAIN)
+        return self.values.get(GAIN)
 
     @property
     def gear_ratios(self) -> tuple[float, ...]:
         """Turns of the motor per turn of each drive."""
-        ratios: tuple[float, ...] = self.values.get(f'{self.block}.gear_ratio', super().gear_ratios)
+        ratios: tuple[float, ...] = self.values.get('robot.gear_ratio', super().gear_ratios)
         return ratios
 
     @property
@@ -173,7 +186,7 @@ class MechanismModel(ForceModel):
     def efforts_in_amperes(self) -> bool:
         """Whether efforts of recordings are currents."""
         return (self.effort_kind == CURRENT
-                or self.values.get(f'{self.block}.effort_unit') == 'A')
+                or self.values.get('robot.effort_unit') == 'A')
 
     @property
     def rest_speed(self) -> float:
@@ -202,15 +215,13 @@ class MechanismModel(ForceModel):
     def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> MechanismModel:
         """Build the model from flat keys and values; see `ForceModel.from_parameters`."""
         with source_of_errors(source):
-            block = mechanism_block(parameters)
-            if not block and is_axis(parameters):
+            if is_axis(parameters):
                 return cls._axis(parameters, source)
-            if not block:
-                raise ModelError('arm.urdf', MISSING, 'be given: this needs a serial arm, a '
+            if not is_mechanism(parameters):
+                raise ModelError('robot.urdf', MISSING, 'be given: this needs a serial arm, a '
                                  'robot with loops or a single axis')
-            listed = drives_key(block)
-            if listed in parameters and not parameters[listed]:
-                raise ModelError(listed, parameters[listed], 'name at least one joint')
+            if DRIVES_KEY in parameters and not parameters[DRIVES_KEY]:
+                raise ModelError(DRIVES_KEY, parameters[DRIVES_KEY], 'name at least one joint')
             values = checked_values(parameters)
             structure = read_structure(values, Path(source).parent)
             values.update(described_values(structure, values))
@@ -261,14 +272,64 @@ class MechanismModel(ForceModel):
         With a state the loops close from where they were at its last sample, where that is near.
         """
         self._require_motion(motion)
+        structure, added = self.robot.structure, self._added
+        if isinstance(motion, JointMotion) and added is not None:
+            found = structure.evaluation.inverse_dynamics(
+                (motion.position, motion.velocity, motion.acceleration), self.robot.by_joint,
+                self.robot.gravity_row, self._joint_friction, self._actuators,
+                nearby=None if state is None else state.closed.get(structure))
+            if found is not None:
+                if state is not None and structure.loops and len(motion):
+                    state.closed[structure] = found.q[-1].copy()
+                if added:
+                    return self._with_effects(added, self._parts(found),
+                                              self._state(motion, found), state)
+                if state is not None:
+                    state.advance(motion.time, self.initial_state)
+                return Forces(found.efforts[TOTAL], lambda: self._parts(found),
+                              lambda: self._state(motion, found))
         if state is None:
             state = self.initial_state()
         with np.errstate(over='ignore', invalid='ignore'):
             mechanism = self.mechanism(motion, state.closed)
             forces = self.forces_at(mechanism, state)
-        if len(motion) and self.robot.structure.loops:
-            state.closed[self.robot.structure] = mechanism.closed[-1].copy()
+        if len(motion) and structure.loops:
+            state.closed[structure] = mechanism.closed[-1].copy()
         return forces
+
+    @cached_property
+    def _added(self) -> tuple[Effect, ...] | None:
+        """Effects beside the model's own friction; None where one of them changes the bodies."""
+        own = AxisFriction, AxisOffset, ModelJointFriction
+        added = tuple(effect for effect in self.effects if not isinstance(effect, own))
+        return None if any(isinstance(effect, BodyEffect) for effect in added) else added
+
+    @cached_property
+    def _actuators(self) -> Array:
+        """Rotors and friction of the drives, see `actuator_efforts`."""
+        actuators = np.zeros((OF_DRIVE, len(self.drives)))
+        actuators[ARMATURE] = self.robot.armature
+        actuators[WIDTH] = self.reversal.velocity
+        for effect in self.effects:
+            if isinstance(effect, AxisFriction):
+                actuators[VISCOUS], actuators[COULOMB] = effect.viscous, effect.coulomb
+            elif isinstance(effect, AxisOffset):
+                actuators[OFFSET] = effect.value
+        return actuators
+
+    def _parts(self, found: InverseDynamicsResult) -> dict[str, Array]:
+        """Return the parts of efforts by name, in the order of the effects."""
+        offset = self._actuators[OFFSET] + np.zeros_like(found.efforts[TOTAL])
+        own = {AxisFriction.name: found.efforts[DRIVE_FRICTION], AxisOffset.name: offset,
+               ModelJointFriction.name: found.efforts[JOINT_EFFORT]}
+        return {RIGID_BODY: found.efforts[RIGID],
+                **{effect.name: own[effect.name] for effect in self.effects if effect.name in own}}
+
+    def _state(self, motion: JointMotion, found: InverseDynamicsResult) -> MechanismState:
+        """Return the state of the mechanism whose efforts are known already."""
+        state = self.mechanism(motion)
+        vars(state).update(inverse_dynamics=found, rigid_force=found.efforts[RIGID])
+        return state
 
     def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
                          seed: JointMotion | None = None) -> JointMotion:
@@ -325,12 +386,7 @@ def inertial_values(inertial: Array) -> dict[str, tuple[float, ...]]:
 
 def _mechanism(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
     """Return the mechanism with its bodies, from the file where it has them."""
-    block = mechanism_block(values)
-    # Of an arm what each joint moves comes first, in the order of `joints`; then what follows them.
-    inert = np.flatnonzero(structure.inertial.any(axis=1)).tolist()
-    driven = [structure.rows[name] for name in structure.drives] if block == ARM_BLOCK else []
-    bodies = np.array(sorted(inert, key=lambda row: (
-        driven.index(row) if row in driven else len(driven), row)), dtype=np.int64)
+    bodies = np.flatnonzero(structure.inertial.any(axis=1))
     inertial = structure.inertial[bodies]
     for key, first, size in (('links.mass', 0, 1), ('links.moment', 1, 3),
                              ('links.inertia', 4, 6)):
@@ -346,14 +402,14 @@ def _mechanism(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
         if mass < 0 or (mass == 0 and any(moment)):
             name = next(name for name, at in structure.rows.items() if at == row)
             raise ModelError('links.mass', float(mass), f'be greater than 0 for what {name} moves')
-    robot = Mechanism(structure, bodies, inertial, np.array(values[f'{block}.armature']),
-                      gravity_in_efforts(values, f'{block}.gravity'), joint_radii(values),
+    robot = Mechanism(structure, bodies, inertial, np.array(values['robot.armature']),
+                      gravity_in_efforts(values, 'robot.gravity'), joint_radii(values),
                       motor_map(structure, values))
-    _require_driven_bodies(robot, block)
+    _require_driven_bodies(robot)
     return robot
 
 
-def _require_driven_bodies(robot: Mechanism, block: str) -> None:
+def _require_driven_bodies(robot: Mechanism) -> None:
     """Raise ModelError for a drive that moves no mass at home."""
     structure = robot.structure
     home = structure.home[None, structure.tables.drives]
@@ -364,7 +420,7 @@ def _require_driven_bodies(robot: Mechanism, block: str) -> None:
         with not_compiling_yet():
             moved, still = (robot.torques(home, rest, one)[0, d] for one in (pushed, rest))
         if not moved - still + robot.armature[d] > 0:
-            raise ModelError(drives_key(block), name,
+            raise ModelError(DRIVES_KEY, name,
                              'move a body: no link that it moves has a mass')
 
 

@@ -30,7 +30,7 @@ def build_model(parameters: Mapping[str, Any], source: str = '') -> Model:
     ----------
     parameters : mapping
         E.g. {'geometry.rod_length': 0.3, ...}; keys of nodes are ignored. With keys of `axis`
-        it is a single axis, with keys of `arm` a serial arm.
+        it is a single axis, with keys of `robot` an arm or a robot with loops.
     source : str
         Named in errors; the path of an arm's URDF counts from its folder.
 

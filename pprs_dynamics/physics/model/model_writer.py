@@ -30,12 +30,11 @@ from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.model.keys import (
+    DRIVES_KEY,
     FILES,
     Key,
     as_list,
-    drives_key,
     keys_of,
-    mechanism_block,
 )
 from pprs_dynamics.physics.model.ledger import BLOCK
 from pprs_dynamics.physics.model.model_file import build_model
@@ -47,7 +46,7 @@ from pprs_dynamics.physics.model.parameter_file import (
 )
 from pprs_dynamics.physics.model.reference_keys import moved
 from pprs_dynamics.physics.model.uncertainties import UNCERTAINTIES
-from pprs_dynamics.system.bounded_yaml import check_bounds, check_size
+from pprs_dynamics.system.bounded_yaml import check_size, parse
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.package_files import located
 
@@ -95,7 +94,7 @@ def write_model(path: str | PathLike[str], values: Mapping[str, Any],
                           {**kept_parameters(base), **values}, str(path))
     # What could not be read again is not written.
     check_size(text.encode('utf-8'), path)
-    check_bounds(text, path)
+    parse(text, path)
     write_text(path, text)
 
 
@@ -282,7 +281,7 @@ def _rank(key: str, values: Mapping[str, Any]) -> tuple[int, ...]:
     and a node takes no effect whose parameters it does not have.
     """
     active, drives = values.get('effects.active') or (), values.get(
-        drives_key(mechanism_block(values)), DRIVES)
+        DRIVES_KEY, DRIVES)
     block, name, *rest = key.split('.')
     if block == 'effects' and not rest:
         return (1,)

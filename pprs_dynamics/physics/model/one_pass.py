@@ -19,7 +19,12 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_sample import motion_sample
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.vectors import Vector
-from pprs_dynamics.physics.model.force_model import total_force
+from pprs_dynamics.physics.model.force_model import (
+    ACTIVE_FRICTION,
+    PASSIVE_FRICTION,
+    RIGID_BODY,
+    total_force,
+)
 from pprs_dynamics.physics.model.limits import Limits
 from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction, drive_friction
 from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
@@ -40,8 +45,10 @@ from pprs_dynamics.physics.three_pprs.joint_rates import turnover
 from pprs_dynamics.physics.three_pprs.kernel_parameters import Joints, RobotParameters
 from pprs_dynamics.physics.three_pprs.passive_friction import WholeMechanismFriction
 from pprs_dynamics.physics.three_pprs.passive_joints import (
+    LOAD_ROUNDS,
     JointResistance,
     friction_forces,
+    friction_loads,
     joint_resistances,
 )
 from pprs_dynamics.physics.three_pprs.rigid_body import ThreeForces, body_forces
@@ -116,17 +123,21 @@ class OnePass:
         the caller must check every sample then.
         """
         rows = motion.rows
-        samples = len(rows)
-        table = np.empty((7 if samples <= SHORT else FORCES, samples, 6))
-        doubtful = evaluate(forces_kernel, self.parameters, rows, table)
-        return table if doubtful < 0 else None
+        table = np.empty((FORCES + 3 if len(rows) <= SHORT else FORCES, len(rows), 6))
+        return table if evaluate(forces_kernel, self.parameters, rows, table) < 0 else None
+
+    @staticmethod
+    def parts(table: Array) -> dict[str, Array]:
+        """Return the parts in a table of `forces` by name."""
+        return {RIGID_BODY: table[1], ACTIVE_FRICTION: table[2], PASSIVE_FRICTION: table[3]}
 
     def mechanism(self, motion: PlatformMotion, table: Array) -> ThreePprsState:
         """Return the state of the mechanism, not yet solved, for a motion and its forces."""
         kinematics = MechanismKinematics(self._robot.geometry, motion, *self._bounds)
         if len(table) > FORCES:
             kinematics.__dict__['drive_motion'] = tuple(table[FORCES:])
-        return ThreePprsState(self._robot, motion, kinematics, self._reversal, self._printed)
+        return ThreePprsState(self._robot, motion, kinematics, self._reversal, self._printed,
+                              friction=(self.parameters.named.joints,))
 
 
 def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, parts: Any) -> Any:
@@ -141,12 +152,18 @@ def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, parts: Any) -> 
     zero = 0.0 * rods[0].cos_u
     nothing = Vector(zero, zero, zero)
     bodies = body_forces(p.robot, m, rods, inverse, Wrench(nothing, nothing), nothing, p.printed)
-    k = _joint_resistances(p, rods, bodies)
+    # Friction loads the joints, and the loads rub: the printed equations leave that out.
+    loaded = bodies
+    for _ in range(LOAD_ROUNDS):
+        load, hinges = friction_loads(geometry, rods, _joint_resistances(p, rods, loaded),
+                                      1.0 - p.printed)
+        loaded = body_forces(p.robot, m, rods, inverse, load, hinges, p.printed)
+    k = _joint_resistances(p, rods, loaded)
     passive = friction_forces(geometry, rods, inverse, k, p.printed_friction)
     for i in range(CHAINS):
-        c, f = rods[i], bodies[i]
-        _write_forces(i, p, parts, s, f.slide, c.slide_velocity, f.slide_load, passive.slides[i])
-        _write_forces(CHAINS + i, p, parts, s, f.lift, c.lift_velocity, f.lift_load,
+        c, f, by = rods[i], bodies[i], loaded[i]
+        _write_forces(i, p, parts, s, f.slide, c.slide_velocity, by.slide_load, passive.slides[i])
+        _write_forces(CHAINS + i, p, parts, s, f.lift, c.lift_velocity, by.lift_load,
                       passive.lifts[i])
     bound = condition_bound(inverse, rows, rods, p.platform_radius)
     return are_within_reach(rods, p.minimum_sine) & (bound <= p.bound)

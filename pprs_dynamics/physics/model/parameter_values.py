@@ -13,14 +13,12 @@ from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.model.effects_block import check_tolerances
 from pprs_dynamics.physics.model.keys import (
     ADDED,
-    MOTORS,
     NAMED_BLOCKS,
     NAMES,
     NODE_KEYS,
     NODE_PREFIXES,
-    ROBOT,
+    is_mechanism,
     keys_of,
-    mechanism_block,
 )
 from pprs_dynamics.physics.model.reference_keys import check_reference
 from pprs_dynamics.physics.model.uncertainties import check_uncertainties
@@ -57,8 +55,7 @@ def checked_values(parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 def _require_known(parameters: Mapping[str, Any]) -> None:
     keys = keys_of(parameters)
-    block = mechanism_block(parameters)
-    named: Iterable[str] = NAMED_BLOCKS if block == ROBOT else (MOTORS,) if block else ()
+    named: Iterable[str] = NAMED_BLOCKS if is_mechanism(parameters) else ()
     blocks = {prefix for key in (*keys, *ADDED, *named) for prefix in _prefixes(key)}
     for name, value in parameters.items():
         if name in keys or _is_for_others(name):

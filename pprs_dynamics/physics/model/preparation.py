@@ -13,9 +13,11 @@ from contextlib import suppress
 import numpy as np
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
 
+LOOPS_MODEL = 'config/hexapod.yaml'  # what it needs serves every mechanism
 SAMPLES = 3  # more than one, as for recordings
 
 
@@ -37,4 +39,5 @@ def prepare(model: ForceModel) -> None:
 
 
 if __name__ == '__main__':
-    prepare(DriveModel.load())
+    for file in DEFAULT_MODEL, LOOPS_MODEL:
+        prepare(load_model(file))

@@ -19,7 +19,7 @@ from typing import Any
 
 from pprs_dynamics.drives import CHANNELS, Column, DriveColumns, RecordedColumns
 from pprs_dynamics.errors import ModelError, UnknownNameError
-from pprs_dynamics.physics.model.keys import is_gain
+from pprs_dynamics.physics.model.keys import GAIN
 
 PREFIX, MAP, COLUMNS = 'joint_prefix', 'joint_map.', 'columns.'
 TIME, FILES = 'time', 'files.'
@@ -72,7 +72,7 @@ def effort_kind(values: Mapping[str, Any]) -> str:
     kind = values.get(EFFORT_KIND, MEASURED)
     if not isinstance(kind, str) or kind not in EFFORT_KINDS:
         raise ModelError(EFFORT_KIND, kind, f'be one of {", ".join(EFFORT_KINDS)}')
-    if kind == CURRENT and not any(is_gain(key) for key in values):
+    if kind == CURRENT and GAIN not in values:
         raise ModelError(EFFORT_KIND, kind, 'be another one: only an arm and a robot with loops '
                          'have a gain, by which currents become efforts')
     return kind

@@ -29,7 +29,7 @@ from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
-from pprs_dynamics.physics.model.keys import ARM, MOTORS, POSE, drives_key, mechanism_block
+from pprs_dynamics.physics.model.keys import DRIVES_KEY, FILES, LOCKED, MOTORS, POSE
 from pprs_dynamics.system.package_files import located
 
 AXIS = 'axis'  # the joint, and drive, of a single axis
@@ -48,10 +48,9 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
     UnreadableFileError
         Where its description cannot be read.
     """
-    block = mechanism_block(values)
-    given = [key for key in (f'{block}.urdf', f'{block}.mjcf') if values.get(key)]
+    given = [key for key in FILES if values.get(key)]
     if not given:
-        raise ModelError(f'{block}.urdf', MISSING, f'be given, or {block}.mjcf instead')
+        raise ModelError('robot.urdf', MISSING, 'be given, or robot.mjcf instead')
     if len(given) > 1:
         raise ModelError(given[1], values[given[1]], f'not stand beside {given[0]}')
     values[given[0]] = str(located(values[given[0]], folder))
@@ -60,11 +59,11 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
         description = read_mjcf(values[given[0]])
     else:
         description = read_urdf(values[given[0]])
-        _require_motors(description, values, block)
+        _require_motors(description, values)
     own = tuple((key, value) for key, value in values.items()
-                if key.startswith((f'{block}.home.', f'{block}.loops.')))
-    return _structure(description, block, values[f'{block}.base'], values[f'{block}.tool'],
-                      values[drives_key(block)], own)
+                if key.startswith(('robot.home.', 'robot.loops.', LOCKED)))
+    return _structure(description, values['robot.base'], values['robot.tool'],
+                      values[DRIVES_KEY], own)
 
 
 def axis_mechanism(mass: float, gravity: float) -> Mechanism:
@@ -98,16 +97,19 @@ def _slide(down: float) -> Structure:
 
 
 @lru_cache(maxsize=64)
-def _structure(description: Description, block: str, base: str, tool: str,
-               drives: tuple[str, ...], own: tuple[tuple[str, Any], ...]) -> Structure:
+def _structure(description: Description, base: str, tool: str, drives: tuple[str, ...],
+               own: tuple[tuple[str, Any], ...]) -> Structure:
     home: dict[str, float] = {}
     poses: dict[str, Frame] = {}
+    locked: dict[str, float] = {}
     loops: dict[str, dict[str, Any]] = {}
     for key, value in own:
-        kind, _, name = key.removeprefix(f'{block}.').partition('.')
+        kind, _, name = key.removeprefix('robot.').partition('.')
         if kind == 'loops':
             name, _, rest = name.partition('.')
             loops.setdefault(name, {})[rest] = value
+        elif kind == 'locked':
+            locked[name] = value
         elif name.endswith(POSE):
             if not np.linalg.norm(value[3:]) > 0:
                 raise ModelError(key, list(value), 'hold a quaternion that is not zero')
@@ -116,25 +118,20 @@ def _structure(description: Description, block: str, base: str, tool: str,
             home[name] = value
     for name in poses:
         if name not in description.links:
-            raise UnknownNameError('link', name, description.links, f'{block}.home')
-    if description.loops and block == ARM:
-        raise ModelError('arm.urdf', description.path, 'be of a robot without loops, but its '
-                         f'<constraint> {description.loops[0].name} closes one: write a block '
-                         '`robot`, with `drives` instead of `joints`')
+            raise UnknownNameError('link', name, description.links, 'robot.home')
     for loop in description.loops:
         if loop.name in loops:
-            raise ModelError(f'{block}.loops.{loop.name}', loop.kind, 'not stand in the file as '
+            raise ModelError(f'robot.loops.{loop.name}', loop.kind, 'not stand in the file as '
                              'well as in the description')
     closures = (*description.loops, *(Loop(
         name, one['type'], one['a.link'], Frame.of(one['a.xyz'], one['a.rpy']),
         one['b.link'], Frame.of(one['b.xyz'], one['b.rpy'])) for name, one in loops.items()))
-    return build_structure(description, base, tool, drives, closures, home, poses, block=block,
-                           lock_others=block == ARM)
+    return build_structure(description, base, tool, drives, closures, home, poses, locked)
 
 
-def _require_motors(description: Description, values: Mapping[str, Any], block: str) -> None:
+def _require_motors(description: Description, values: Mapping[str, Any]) -> None:
     """Raise ModelError where joints share a transmission, and the file does not say how."""
-    drives = set(values[drives_key(block)])
+    drives = set(values[DRIVES_KEY])
     mapped = {key.removeprefix(MOTORS).partition('.')[2] for key in values
               if key.startswith(MOTORS)}
     for each in coupled(description):
@@ -142,7 +139,7 @@ def _require_motors(description: Description, values: Mapping[str, Any], block: 
         if set(shared) - mapped:
             turns = ', '.join(f'{name}: 1.0' for name in shared)
             raise ModelError(
-                drives_key(block), list(each.joints), 'have a motor each, but share a transmission '
+                DRIVES_KEY, list(each.joints), 'have a motor each, but share a transmission '
                 f'{each.kind.lower()} in the URDF: write friction: {{motors: {{MOTOR: {{{turns}}}'
                 '}}, turns of each motor per turn of its joints')
 
@@ -161,12 +158,12 @@ def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[st
     ModelError
         For what a description holds of a joint that has no place in a model.
     """
-    block, joints = mechanism_block(values), structure.description.joints
+    joints = structure.description.joints
     drives = [joints[name] for name in structure.drives]
     found: dict[str, Any] = {
-        f'{block}.gear_ratio': tuple(joint.reduction or 1.0 for joint in drives),
-        f'{block}.gravity': _gravity(structure),
-        f'{block}.armature': tuple(joint.armature for joint in drives),
+        'robot.gear_ratio': tuple(joint.reduction or 1.0 for joint in drives),
+        'robot.gravity': described_gravity(structure),
+        'robot.armature': tuple(joint.armature for joint in drives),
         'friction.viscous': tuple(joint.damping for joint in drives),
         'friction.coulomb': tuple(joint.dry for joint in drives)}
     found = {key: described for key, described in found.items() if not values[key]}
@@ -176,13 +173,13 @@ def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[st
             stiffness, relaxed = joint.spring
             block_of_effect = f'{name}: {{stiffness: {stiffness:g}, position: {relaxed:g}}}'
             effect = 'drive_spring' if name in structure.drives else 'joint_spring'
-            raise ModelError(f'{block}.mjcf', name, f'have no spring ({stiffness:g}): take its '
+            raise ModelError('robot.mjcf', name, f'have no spring ({stiffness:g}): take its '
                              f'stiffness off, and write effects: {{active: [{effect}], '
                              f'{effect}: {{{block_of_effect}}}}}')
         if name in structure.drives:
             continue
         if joint.armature:
-            raise ModelError(f'{block}.mjcf', name, f'have no armature ({joint.armature:g}), as a '
+            raise ModelError('robot.mjcf', name, f'have no armature ({joint.armature:g}), as a '
                              'joint without a motor: set its armature to 0')
         given = f'friction.joints.{name}.'
         if (joint.damping or joint.dry) and not any(key.startswith(given) for key in values):
@@ -191,7 +188,7 @@ def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[st
     return found
 
 
-def _gravity(structure: Structure) -> tuple[float, ...]:
+def described_gravity(structure: Structure) -> tuple[float, ...]:
     """Return gravity in the base, turned from the frame of the description's root."""
     description = structure.description
     hung = {joint.child for joint in description.joints.values()}

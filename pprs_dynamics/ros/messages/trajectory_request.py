@@ -352,7 +352,7 @@ def readers_for(model: ForceModel, names: RobotNames | None = None) -> dict[str,
             tool = model.tool_pose.structure.tool
         except ModelError:
             return readers
-        readers[POSES] = _poses((names and names.frame) or str(model.values[f'{model.block}.base']),
+        readers[POSES] = _poses((names and names.frame) or str(model.values['robot.base']),
                                 tool)
     return readers
 

@@ -15,6 +15,8 @@ from rclpy.timer import Timer
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS
 
 IDLE = 3600.0  # [s] period of a timer that is cancelled
+LOOKS = 4  # within a timeout, at whether ROS time still advances
+SHORTEST_LOOK = 1_000_000  # [ns]
 MISSING_CLOCK = ('use_sim_time is true and nothing has come on /clock: stamps count from 0, and '
                  'what goes by the time of the simulation stands still')
 
@@ -36,10 +38,11 @@ def clock_is_missing(node: Node) -> bool:
 
 
 class CommandWatchdog:
-    """Calls back once when nothing has been commanded for a while after the last trajectory.
+    """Calls back once when the command of the last trajectory has gone stale.
 
-    Runs on the steady clock: a simulation that stands still, or whose clock never comes, must not
-    keep a command in force.
+    It is stale when ROS time has passed the end of the trajectory by the timeout, or when ROS time
+    has not advanced for the timeout of steady time: a simulation may be slower than real time, may
+    stand still, and its clock may never come. Time that is set back counts as no advance.
 
     Parameters
     ----------
@@ -47,66 +50,66 @@ class CommandWatchdog:
     timeout : callable
         Returns how long commands stay fresh after a trajectory's end [s]; 0: for ever.
     stale : callable
-        Called once, until `feed` is called again.
+        Called once, until `feed` is called again, with whether ROS time stands still.
     """
 
     def __init__(
-        self, node: Node, timeout: Callable[[], float], stale: Callable[[], None],
+        self, node: Node, timeout: Callable[[], float], stale: Callable[[bool], None],
     ) -> None:
         self._node, self._timeout, self._stale = node, timeout, stale
-        self._clock = steady_clock()
-        self._end: int | None = None
-        self._end_looked_at = 0
-        self._timer = node.create_timer(IDLE, self._look, clock=self._clock)
+        self._steady = steady_clock()
+        self.fresh = False  # whether a command is in force that has not gone stale
+        self._left = self._seen = self._advanced = 0  # [ns], the last on the steady clock
+        self._timer = node.create_timer(IDLE, self._look, clock=self._steady)
         self._timer.cancel()
 
     @property
-    def fresh(self) -> bool:
-        """Whether a command is in force that has not gone stale."""
-        return self._end is not None
-
-    @property
     def left(self) -> int:
-        """Until the end of the last trajectory [ns]; 0 where it has passed."""
-        return 0 if self._end is None else max(0, self._end - self._clock.now().nanoseconds)
+        """ROS time until the end of the last trajectory [ns]; 0 where it has passed."""
+        self._note_time()
+        return max(0, self._left)
 
     def feed(self, ahead: int) -> None:
-        """Tell of a trajectory that ends that much from now [ns]; one in the past ends now."""
-        end = self._clock.now().nanoseconds + max(ahead, 0)
-        # A timer that runs finds a later end by itself; one a cycle need not be set.
-        earlier = self._end is None or end < self._end_looked_at
-        self._end = end
-        if earlier:
+        """Take note of a trajectory that ends that much ROS time from now [ns]."""
+        self._note_time()
+        self._left, self._advanced = max(ahead, 0), self._steady.now().nanoseconds
+        if not self.fresh:
+            self.fresh = True
             self.rearm()
 
     def rearm(self) -> None:
         """Take a changed timeout into account."""
-        timeout = self._timeout()
-        if self._end is None or not timeout:
+        timeout = round(self._timeout() * NANOSECONDS)
+        if not self.fresh or not timeout:
             self._timer.cancel()
             return
-        self._end_looked_at = self._end
-        left = self._end + round(timeout * NANOSECONDS) - self._clock.now().nanoseconds
-        self._timer.timer_period_ns = max(left, 1)
+        # A trajectory that comes before the next look can go stale only after it.
+        self._timer.timer_period_ns = max(
+            min(self._left + timeout, timeout // LOOKS), SHORTEST_LOOK)
         self._timer.reset()
 
     def stop(self) -> None:
         """Expect nothing more."""
-        self._end = None
+        self.fresh = False
         self._timer.cancel()
 
     def destroy(self) -> None:
         """Give the timer back."""
         self._node.destroy_timer(self._timer)
 
+    def _note_time(self) -> None:
+        now = self._node.get_clock().now().nanoseconds
+        if now > self._seen:
+            self._left -= now - self._seen
+            self._advanced = self._steady.now().nanoseconds
+        self._seen = now
+
     def _look(self) -> None:
-        if self._end is None:
-            self._timer.cancel()
-            return
-        due = self._end + round(self._timeout() * NANOSECONDS)
-        if self._clock.now().nanoseconds < due:
-            # The next look is when the present trajectory would go stale, and not before.
+        self._note_time()
+        timeout = round(self._timeout() * NANOSECONDS)
+        stands = self._steady.now().nanoseconds - self._advanced >= timeout
+        if timeout and self.fresh and (stands or self._left + timeout <= 0):
+            self.stop()
+            self._stale(stands)
+        else:
             self.rearm()
-            return
-        self.stop()
-        self._stale()

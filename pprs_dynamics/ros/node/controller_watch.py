@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.ros.force_command import STILL
 
 STATE_TOPIC = 'controller_state'  # beside the controller's joint_trajectory
 LOOKED_BACK = 1.0  # [s] of what was sent and of where the controller went
@@ -25,6 +26,7 @@ PATIENCE = 0.5
 # whose reference makes less of the way stands.
 NEAR, STANDS = 0.25, 0.05
 MOVES = 0.1  # joints that make at least that share of the longest way are looked at
+SLOW = 3.0  # usual steps between states: longer ones are silence
 LEAST_WAY = 1e-5  # [m, rad] in LOOKED_BACK; less is standing still
 # [s] from sending to the end of a trajectory: messages were dropped that had been 11.5 ms on the
 # way at the median, and a busy machine takes longer.
@@ -65,7 +67,7 @@ class ControllerWatch:
         self._joints, self._clock = tuple(joints), clock
         self._sent: deque[SentPoints] = deque()
         self._went: deque[tuple[float, Array]] = deque()
-        self._heard = -np.inf
+        self._heard, self._step, self._stands = -np.inf, 0.0, False
         self._first_sent = np.inf  # of a stream without a pause
         self._strays_since: float | None = None
         self._names: tuple[str, ...] = ()
@@ -84,7 +86,7 @@ class ControllerWatch:
         self._sent.append(SentPoints(now, np.array(position), left, moves_at_end))
         _forget(self._sent, now - LOOKED_BACK)
 
-    def heard(self, state: Any) -> Array | None:
+    def heard(self, state: Any) -> bool:
         """Take note of a controller's state.
 
         Parameters
@@ -93,27 +95,39 @@ class ControllerWatch:
 
         Returns
         -------
-        (D,) array or None
-            Its reference positions, where it was silent before: it has just become active.
+        bool
+            Whether it was silent before: it has just become active.
         """
-        now = self._clock()
+        now, reference = self._clock(), state.reference
         self._names = tuple(state.joint_names)
         self._has_efforts = bool(len(state.output.effort))
-        was_silent, self._heard = now - self._heard > LOOKED_BACK, now
-        values = dict(zip(state.joint_names, state.reference.positions, strict=False))
+        silence, self._heard = now - self._heard, now
+        # States may come less often than once a second.
+        was_silent = silence > max(LOOKED_BACK, SLOW * self._step)
+        self._step = silence if np.isfinite(silence) else 0.0
+        values = dict(zip(state.joint_names, reference.positions, strict=False))
+        if was_silent or any(joint not in values for joint in self._joints):
+            self._went.clear()
+        self._stands = not np.any(np.abs(reference.velocities) > STILL)
         if any(joint not in values for joint in self._joints):
-            self._went.clear()
-            return None
-        reference = np.array([values[joint] for joint in self._joints])
-        if was_silent:
-            self._went.clear()
-        self._went.append((now, reference))
-        _forget(self._went, now - LOOKED_BACK)
-        if not self._strays(reference):
+            return was_silent
+        place = np.array([values[joint] for joint in self._joints])
+        self._went.append((now, place))
+        while len(self._went) > 2 and self._went[0][0] < now - LOOKED_BACK:
+            self._went.popleft()
+        if not self._strays(place):
             self._strays_since = None
         elif self._strays_since is None:
             self._strays_since = now
-        return reference if was_silent else None
+        return was_silent
+
+    @property
+    def at_rest(self) -> Array | None:
+        """Reference positions (D,), where the last two are the same and have no velocity."""
+        if not self._stands or len(self._went) < 2:
+            return None
+        (_, before), (_, now) = list(self._went)[-2:]
+        return now if (before == now).all() else None
 
     def complaint(self) -> str:
         """Return that the controller does not follow, and the likely reason; '' where it does."""

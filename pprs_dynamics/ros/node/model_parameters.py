@@ -16,13 +16,12 @@ from rclpy.parameter import Parameter
 from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
+    DRIVES_KEY,
     KEYS,
     NAMES,
     NODE_KEYS,
     NODE_PREFIXES,
-    drives_key,
     is_mechanism,
-    mechanism_block,
 )
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.ros.node.parameters import (
@@ -187,7 +186,7 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
 
     def _staying(self, model: NodeModel, node_values: Mapping[str, Any]) -> dict[str, Any]:
         """Return what holds as long as the node runs, its topics were made by it."""
-        names = {drives_key(mechanism_block(model.values)): model.drives,
+        names = {DRIVES_KEY: model.drives,
                  'joint_prefix and joint_map': model.recorded.joints}
         return {**{name: ', '.join(value) for name, value in names.items()},
                 **{each.name: node_values[each.name] for each in self._declared if each.stays}}

@@ -22,6 +22,7 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
     ADDED,
     ANY,
+    DRIVES_KEY,
     FILES,
     KEYS,
     LARGEST,
@@ -29,11 +30,9 @@ from pprs_dynamics.physics.model.keys import (
     NODE_KEYS,
     Key,
     as_list,
-    drives_key,
     is_axis,
     is_mechanism,
     keys_of,
-    mechanism_block,
 )
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.model.parameter_values import is_known
@@ -136,8 +135,7 @@ def declare_node_parameters(node: Node, parameters: Iterable[NodeParameter]) -> 
 def drive_count(node: Node) -> int:
     """Return how many drives the model has that a node was given."""
     given = overrides(node)
-    block = mechanism_block(given)
-    joints = given.get(drives_key(block)) if block else None
+    joints = given.get(DRIVES_KEY)
     return len(joints) if isinstance(joints, list) and joints else len(DRIVES)
 
 

@@ -47,7 +47,7 @@ def check_files(arguments: Sequence[str]) -> None:
     """
     for path in _paths(arguments):
         if path.is_file():  # what is not, ROS 2 refuses; a pipe can be read only once
-            read_text(path)
+            parse(read_text(path), path)
 
 
 def _paths(arguments: Sequence[str]) -> list[Path]:

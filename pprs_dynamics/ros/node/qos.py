@@ -22,10 +22,9 @@ from pprs_dynamics.ros.node.parameters import overrides
 # every message.
 EVERY_MESSAGE = QoSProfile(depth=100)
 # The same for measurements that wait for a node that has work to do on them: a machine that is
-# busy with other things for a second loses no sample at 1 kHz.
-MEASURED = QoSProfile(depth=1000)
-# The same of a publisher that offers no more than best effort.
-OFFERED = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+# busy with other things for a second loses no sample at 1 kHz. Best effort hears every publisher:
+# drivers over a network offer no more.
+MEASURED = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 # Of setpoints the latest count: after a standstill those that waited would be executed in one
 # burst, seconds late. A hiccup of 20 ms at 500 Hz loses none.
 SETPOINTS = QoSProfile(depth=10)

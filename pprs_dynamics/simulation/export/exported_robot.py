@@ -38,7 +38,7 @@ from pprs_dynamics.physics.mechanism.description import (
 )
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.structure import build_structure
-from pprs_dynamics.physics.mechanism.tree_evaluation import survey
+from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.three_pprs.robot import Robot
@@ -150,7 +150,7 @@ def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
 
 def _bodies(mechanism: Mechanism) -> Iterator[Body]:
     structure, t = mechanism.structure, mechanism.structure.tables
-    _, _, home = survey(t, structure.home, np.arange(len(structure.home)))
+    _, _, home = constraint_jacobian(t, structure.home, np.arange(len(structure.home)))
     found: dict[int, tuple[str, str, int]] = {}
     for joint in structure.description.joints.values():
         row = structure.links[joint.child][0]
@@ -285,7 +285,7 @@ class TreePositions:
     names : tuple of J str
         Joints.
     base : str
-        The link that free bodies are told on.
+        The link to which free bodies are attached.
     bodies : tuple of F str
         Links of the free bodies.
 

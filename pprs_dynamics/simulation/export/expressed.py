@@ -203,7 +203,7 @@ def _sort_arm(model: MechanismModel, sorting: _Sorting) -> None:
     sorting.keep(f'{friction}.coulomb', model.drives, FRICTION)
     sorting.drop(f'{friction}.offset')
     if model.is_described:
-        sorting.keep(f'{model.block}.armature', model.drives, ARMATURE)
+        sorting.keep('robot.armature', model.drives, ARMATURE)
     for key in model.values:
         name, _, parameter = key.removeprefix('friction.joints.').rpartition('.')
         if not key.startswith('friction.joints.') or parameter == 'radius':
@@ -217,7 +217,7 @@ def _sort_arm(model: MechanismModel, sorting: _Sorting) -> None:
 def _under_standard_gravity(model: ForceModel, sorting: _Sorting) -> None:
     """Take the gravity that is assumed where a file has none."""
     if model.is_described:
-        sorting.exchange(f'{model.block}.gravity', STANDARD_GRAVITY)
+        sorting.exchange('robot.gravity', STANDARD_GRAVITY)
     elif isinstance(model, MechanismModel):
         # The axis is put at a slope that gives its share of it.
         most, along = -STANDARD_GRAVITY[2], model.values['axis.gravity']

@@ -9,25 +9,21 @@ and dry friction are evaluated exactly here, not by the engine's soft constraint
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
-from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
-from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.files.samples import Progress
 from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel, Forces
+from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.simulation.arm_run import draw_motion
 from pprs_dynamics.simulation.engine_model import load_engine
-from pprs_dynamics.simulation.engine_state import EngineState, couplings
+from pprs_dynamics.simulation.engine_state import EngineState
 from pprs_dynamics.simulation.export.exported_robot import ExportedRobot
 from pprs_dynamics.simulation.export.expressed import AT_ONCE, MJCF, Expressed
 from pprs_dynamics.simulation.export.writers import closures
@@ -109,8 +105,6 @@ class Replayed:
         The same by the model's own equations: of what the file does not express.
     effort : (D,) array
         Root mean square of the model's efforts.
-    recorded : tuple of two floats, optional
-        Root mean squares of measured efforts less the file's, and less the model's, treated alike.
     """
 
     drives: tuple[str, ...]
@@ -118,23 +112,18 @@ class Replayed:
     error: Array
     expected: Array
     effort: Array
-    recorded: tuple[float, float] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as data for JSON."""
         by_drive = zip(self.drives, self.units, self.error.tolist(), self.expected.tolist(),
                        self.effort.tolist(), strict=True)
-        found: dict[str, Any] = {
+        return {
             'replay_error': root_mean_square(self.error),
             'expected_error': root_mean_square(self.expected),
             'effort': root_mean_square(self.effort),
             'drives': {name: {'unit': unit, 'replay_error': error, 'expected_error': expected,
                               'effort': effort}
                        for name, unit, error, expected, effort in by_drive}}
-        if self.recorded is not None:
-            found |= {'measured_error': self.recorded[0], 'measured_error_of_model':
-                      self.recorded[1]}
-        return found
 
 
 def replay_excitation(model: ForceModel, replay: Replay) -> Replayed:
@@ -142,42 +131,10 @@ def replay_excitation(model: ForceModel, replay: Replay) -> Replayed:
     state = model.initial_state()
     forces = model.measured(model.drive_forces(_excitation(model), state), state)
     replay.add(forces)
-    return _replayed(model, replay, np.sum(forces.total ** 2, axis=0), None)
-
-
-def replay_recordings(model: ForceModel, replay: Replay, recordings: Sequence[Recording],
-                      progress: Progress | None = None) -> Replayed:
-    """Replay recordings.
-
-    Raises
-    ------
-    PprsError
-        As `measure_residuals`.
-    """
-    squares = np.zeros(len(model.drives))
-    errors: dict[str, list[Array]] = {'replayed': [], 'total': []}
-    for recording in recordings:
-        reconstruction = reconstruct(model, recording)
-        share = reconstruction.recorded_share(model)
-
-        def replayed(forces: Forces, share: Array = share) -> dict[str, Array]:
-            squares[:] += np.sum(forces.total ** 2, axis=0)
-            return {'replayed': replay.add(forces) * share}
-
-        table = treated_forces(model, reconstruction, progress, replayed)
-        measured = reconstruction.treat(reconstruction.effort)
-        for name, those in errors.items():
-            those.append(measured - table[name])
-    by_file, by_model = (root_mean_square(np.concatenate(those)) for those in errors.values())
-    return _replayed(model, replay, squares, (by_file, by_model))
-
-
-def _replayed(model: ForceModel, replay: Replay, effort: Array,
-              recorded: tuple[float, float] | None) -> Replayed:
-    error, expected, own = (np.sqrt(sums / replay.samples)
-                            for sums in (*replay.squares, effort))
+    error, expected, effort = (np.sqrt(sums / replay.samples) for sums in (
+        *replay.squares, np.sum(forces.total ** 2, axis=0)))
     return Replayed(model.drives, tuple(unit.effort for unit in model.units), error, expected,
-                    own, recorded)
+                    effort)
 
 
 def _excitation(model: ForceModel) -> Any:
@@ -202,7 +159,7 @@ def _close(mujoco: Any, spec: Any, robot: ExportedRobot) -> None:
         equality.type = mujoco.mjtEq.mjEQ_WELD if weld else mujoco.mjtEq.mjEQ_CONNECT
         equality.objtype = mujoco.mjtObj.mjOBJ_SITE
     known = {equality.name1 for equality in spec.equalities}
-    for name, leader, ratio, offset in couplings(structure):
+    for name, leader, ratio, offset in structure.couplings:
         if name not in known:
             equality = spec.add_equality(name1=name, name2=leader)
             equality.type, equality.objtype = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT

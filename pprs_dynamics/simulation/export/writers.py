@@ -16,7 +16,6 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.description import Frame, Loop
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.simulation.engine_state import couplings
 from pprs_dynamics.simulation.export.exported_robot import (
     FREE,
     HINGE,
@@ -160,7 +159,7 @@ def _close(robot: ExportedRobot, elements: Mapping[int, Element], equality: Elem
             _add(elements[row], 'site', name=site, pos=frame.p, quat=_quaternion(frame.R))
         _add(equality, 'weld' if weld else 'connect', name=name, site1=sites[0][0],
              site2=sites[1][0])
-    for name, leader, ratio, offset in couplings(structure):
+    for name, leader, ratio, offset in structure.couplings:
         _add(equality, 'joint', name=f'{name}_mimic', joint1=name, joint2=leader,
              polycoef=(offset, ratio, 0, 0, 0))
 
@@ -203,7 +202,7 @@ def _urdf(robot: ExportedRobot) -> Element:
     names = {0: base, **{body.row: body.name for body in robot.bodies}}
     drawn, width = _drawn(robot), THICKNESS * structure.size
     _add(root, 'link', name=base)
-    mimics = {name: coupling for name, *coupling in couplings(structure)}
+    mimics = {name: coupling for name, *coupling in structure.couplings}
     for body in robot.bodies:
         link = _add(root, 'link', name=body.name)
         inertial = _add(link, 'inertial')

@@ -19,7 +19,7 @@ import numpy as np
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
@@ -75,13 +75,14 @@ def application(hub: Hub, keys: Keys, used: Callable[[], None] = lambda: None) -
               *(Route(f'/api/{path}', with_body(work), methods=['POST'])
                 for path, work in api.changes().items())]
     app = Starlette(routes=routes, lifespan=lifespan, exception_handlers={
-        StaleError: _status(409), PprsError: _status(400), TooLongError: _status(413)})
+        StaleError: _status(409), PprsError: _status(400), TooLongError: _status(413),
+        ClientDisconnect: _status(400)})
     return AccessControl(app, keys, {UPLOAD: MOST_UPLOADED}, used)
 
 
 def _status(status: int) -> Callable[[Request, Exception], Response]:
     def answer(request: Request, error: Exception) -> Response:
-        return JSONResponse({'error': str(error) or 'the body is too long'}, status)
+        return JSONResponse({'error': str(error) or 'the body is too long or incomplete'}, status)
     return answer
 
 
@@ -153,7 +154,7 @@ class Api:
             session, version = hub.session, hub.log.version
             state = {'failure': hub.failure,
                      'is_beginning': hub.is_beginning, 'has_live': hub.live is not None,
-                     'has_folders': bool(hub.offered.folders or hub.offered.surveyed),
+                     'has_folders': bool(hub.offered.folders),
                      'is_empty': session is None,
                      **(session.to_dict() if session else units_to_dict(hub.inputs.model))}
             state['drawn'] = [state.get(key) for key in ('fitted_since', 'revision', 'stage')]
@@ -255,11 +256,10 @@ class Api:
 
     def files(self, query: Any) -> Response:
         """Answer what may be opened."""
-        return JSONResponse({'files': self.hub.offered.in_folders(),
-                             'surveyed': self.hub.offered.in_surveys()})
+        return JSONResponse({'files': self.hub.offered.in_folders()})
 
     def open(self, body: Fields) -> Response:
-        """Open a recording of the folders and surveys that were given."""
+        """Open a recording of the folders that were given."""
         self.hub.open(self.hub.offered.path(body.text('name')), body.get('is_held_out') is True)
         return self.screen(body)
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Recordings that browsers may open: of folders and surveys of the command line, and no others."""
+"""Recordings that browsers may open: in folders of the command line, and no others."""
 
 from __future__ import annotations
 
@@ -10,9 +10,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from pprs_dynamics.app.fleet.store import Store
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.system.numbers import parse_whole
 from pprs_dynamics.system.plain_text import displayed
@@ -20,29 +18,10 @@ from pprs_dynamics.system.plain_text import displayed
 ENDINGS = ('.csv', '.mcap', '.db3')
 METADATA = 'metadata.yaml'  # makes a folder a rosbag2 recording
 MOST_LISTED, DEEPEST = 2000, 6
-PREFIX = 'survey'  # of names of recordings that a survey knows
 
 
 class NotOfferedError(PprsError, ValueError):
-    """A recording that is in no folder and no survey of the command line."""
-
-
-@dataclass(frozen=True)
-class Surveyed:
-    """One recording of a survey.
-
-    Parameters
-    ----------
-    path : Path
-    robot, recording, time, verdict : str
-        As the store has them.
-    """
-
-    path: Path
-    robot: str
-    recording: str
-    time: str
-    verdict: str
+    """A recording that is in no folder of the command line."""
 
 
 @dataclass(frozen=True)
@@ -53,32 +32,14 @@ class Offered:
     ----------
     folders : tuple of Path
         With all recordings in them.
-    surveyed : tuple of Surveyed
-        Recordings that surveys name, as far as they are there; by robot, the latest first.
     """
 
     folders: tuple[Path, ...] = ()
-    surveyed: tuple[Surveyed, ...] = ()
 
     @classmethod
     def of(cls, paths: Sequence[str]) -> Offered:
-        """Return what is in those of the paths that are folders and no recordings themselves.
-
-        Raises
-        ------
-        PprsError
-            Where a store of `pprs survey` cannot be read.
-        """
-        found: dict[Path, Surveyed] = {}
-        for path in filter(is_store, paths):
-            rows = Store(path).read(['robot', 'recording', 'path', 'time', 'verdict']).to_pylist()
-            for row in sorted(rows, key=lambda row: str(row['time']), reverse=True):
-                there = Path(row['path'] or '')
-                if row['path'] and there.exists() and there not in found:
-                    found[there] = Surveyed(there, row['robot'] or '', row['recording'] or '',
-                                            str(row['time'] or '')[:19], row['verdict'] or '')
-        return cls(tuple(Path(path) for path in paths if is_folder(path)),
-                   tuple(sorted(found.values(), key=lambda one: one.robot))[:MOST_LISTED])
+        """Return what is in the folders among the paths that are no recordings themselves."""
+        return cls(tuple(Path(path) for path in paths if is_folder(path)))
 
     def in_folders(self) -> list[str]:
         """Return what may be opened, each as `number/path within its folder`."""
@@ -99,14 +60,8 @@ class Offered:
                     return found[:MOST_LISTED]
         return found
 
-    def in_surveys(self) -> list[dict[str, Any]]:
-        """Return what may be opened, each with a name for it."""
-        return [{'name': f'{PREFIX}/{number}', 'robot': displayed(one.robot),
-                 'recording': displayed(one.recording), 'time': one.time, 'verdict': one.verdict}
-                for number, one in enumerate(self.surveyed)]
-
     def path(self, name: str) -> Path:
-        """Return the path of a name of `in_folders` or `in_surveys`.
+        """Return the path of a name of `in_folders`.
 
         Raises
         ------
@@ -114,11 +69,6 @@ class Offered:
             For any other, by whatever way it leads outside: `..`, an absolute path, a link.
         """
         number, _, inside = name.partition('/')
-        if number == PREFIX:
-            at = index_of(inside, len(self.surveyed))
-            if at is not None:
-                return self.surveyed[at].path
-            raise NotOfferedError(f'{displayed(name)!r} is not among the recordings of the surveys')
         at = index_of(number, len(self.folders))
         if at is not None and inside:
             root = self.folders[at].resolve()
@@ -144,8 +94,3 @@ def is_folder(path: str) -> bool:
     # An empty name would be the present folder, which nobody named.
     return bool(path) and Path(path).is_dir() and not (
         (Path(path) / METADATA).exists() or any(Path(path).glob('*.db3')))
-
-
-def is_store(path: str) -> bool:
-    """Return whether a path is a store of `pprs survey`."""
-    return Path(path).is_dir() and any(Path(path).glob('robot=*'))

@@ -69,7 +69,7 @@ class Counterbalance(DriveEffect):
 
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
-        """Return what the bend of a gas's law adds: its pressure rises ever faster."""
+        """Return the nonlinear part of a gas's law: its pressure rises ever faster."""
         length, _ = _length(drive.position, shape['ratio'], shape['position'])
         share = (length - 1) / shape['ratio']  # -1 at the shortest, near 1 at the longest
         force, stiffness, measured = cls.columns(drive, **shape)

@@ -34,7 +34,7 @@ class DriveInertia(DriveEffect):
         'm q_ddot',
         'an error that follows the acceleration of this joint alone',
         'the rotor: its inertia times the square of the gear ratio acts at the joint, often more '
-        'than that of the links; arm.armature holds it',
+        'than that of the links; robot.armature holds it',
         'take it from the data sheet of the motor; move this joint alone, fast: the error must '
         'grow with the square of the frequency',
         'Khalil, Dombre, Modeling, Identification and Control of Robots, 2002')

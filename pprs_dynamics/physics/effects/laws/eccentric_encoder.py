@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""An encoder whose disc or ring sits beside its axis: it reads q + A sin(2 pi q / p + phi).
+"""An encoder whose disc or ring is off its axis: it reads q + A sin(2 pi q / p + phi).
 
 Once a turn of what it sits on: of the joint, or of the motor before its gear. Linear in
 A cos(phi) and A sin(phi); velocities and accelerations have the wave's own.

@@ -74,7 +74,7 @@ class ElasticJoint(MeasurementEffect):
 
 
 def told_by_windup(load: Array, windup: Array) -> tuple[float, float, Array]:
-    """Return stiffness, damping, and the load that a second encoder tells, (N,).
+    """Return stiffness, damping, and the load that a second encoder shows, (N,).
 
     Parameters
     ----------

@@ -105,7 +105,7 @@ class ForceRipple(DriveEffect):
 
     @classmethod
     def alternatives(cls, shape: Mapping[str, float]) -> Sequence[Mapping[str, float]]:
-        """Return twice and half the pitch: the harmonic may stand out more than the wave."""
+        """Return twice and half the pitch: the harmonic may be larger than the wave."""
         return ({'pitch': 2 * shape['pitch']}, {'pitch': shape['pitch'] / 2})
 
     @classmethod

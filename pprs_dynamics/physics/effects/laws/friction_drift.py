@@ -64,7 +64,7 @@ class FrictionDrift(DriveEffect):
         memory = cls.drive_memory() if drive.memory is None else drive.memory
         if memory['start'] is None:
             memory['start'] = float(drive.time[0])
-        faded = np.exp(-(drive.time - memory['start']) / shape['time'])
+        faded = np.exp(-np.maximum(drive.time - memory['start'], 0.0) / shape['time'])
         work = _worked(drive.time, np.abs(drive.velocity), shape['time'], memory)
         return (faded * drive.direction, work * drive.direction, work * drive.velocity)
 

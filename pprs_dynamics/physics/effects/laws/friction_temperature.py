@@ -3,7 +3,7 @@
 
 """Friction that follows a measured temperature: F_T (T - T_0) sgn(q_dot) + c_T w q_dot.
 
-w = T_d (1 - exp(-(T - T_0) / T_d)) is T - T_0 near the reference, and bends as oils thin.
+w = T_d (1 - exp(-(T - T_0) / T_d)) is T - T_0 near the reference, and saturates as oils thin.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class FrictionTemperature(DriveEffect):
 
     @classmethod
     def deviations(cls, drive: DriveSamples, **shape: float) -> tuple[tuple[Array, ...], ...]:
-        """Return what a bend of dry friction adds, and another exponent of the speed."""
+        """Return a quadratic term of dry friction, and another exponent of the speed."""
         dry, viscous = cls.columns(drive, **shape)
         bend = warmer_than(drive, shape['reference']) / (2 * THINNING[-1])
         return ((bend * dry, np.zeros_like(dry)),

@@ -69,11 +69,18 @@ class JointFrictionEffect(PassiveJointEffect):
 
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
+        force: Array = state.against_friction(self._table(state))
+        return force
+
+    def rubbing(self, state: Any) -> Any:
+        """Return the state whose joints carry this friction as well."""
+        return state.with_friction(self._table(state))
+
+    def _table(self, state: Any) -> Any:
         blocks: dict[str, dict[str, float]] = self.to_file()
         for name, block in blocks.items():
             block['radius'] = self.radii[name]
-        force: Array = state.against_friction(state.robot.friction_table(blocks, state.reversal))
-        return force
+        return state.robot.friction_table(blocks, state.reversal)
 
 
 @cache
@@ -81,7 +88,7 @@ def _in_joints(joints: tuple[tuple[str, float], ...], alike: tuple[tuple[str, ..
                ) -> type[JointFrictionEffect]:
     """Return the effect in joints with the radii at which the load rubs [m].
 
-    Of joints that are alike the first stands for all, whatever the load; a drive for friction
+    Of joints that are alike the first represents all, whatever the load; a drive for friction
     of its own.
     """
     linear, variants, bounds = [], [], {}

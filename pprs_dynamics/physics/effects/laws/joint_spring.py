@@ -61,7 +61,7 @@ class JointSpring(BodyEffect):
 
     @classmethod
     def at(cls, coefficients: Mapping[str, float]) -> Self:
-        """Return the effect with exactly these coefficients, which no q_0 may stand for."""
+        """Return the effect with exactly these coefficients, for which there may be no q_0."""
         effect = super().at(coefficients)
         effect.exact = {c.name: float(coefficients.get(c.name, 0.0)) for c in cls.coefficients}
         return effect

@@ -27,9 +27,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
 
-# On either side of the travel through the play, of its length: there the link may part from the
-# flank. What lies as long beside that tells its motion, by a polynomial that is as good as the
-# smoothing's for accelerations.
+# On either side of the travel through the play, of its length: there the link may separate from the
+# flank. A polynomial through its motion before and after, as long as that, determines it.
 MARGIN, ORDER = 0.5, 5
 # Of the play: flanks give way, and a link turns over that has nearly come to the other.
 CROSSED = 0.9
@@ -95,9 +94,8 @@ class LostMotion(MeasurementEffect):
 def behind_play(position: Array, play: float) -> Array:
     """Return where a link is that an encoder moves through a play, (N,).
 
-    While the encoder travels through the play, and a little before and after it, the link's motion
-    is that of a polynomial through its motion beside it. Of a negative play, in the encoder's own
-    coupling, the link leads the encoder.
+    While the encoder travels through the play, the link's motion is a polynomial through its motion
+    before and after. With a negative play, in the encoder's coupling, the link leads the encoder.
 
     Parameters
     ----------
@@ -126,7 +124,7 @@ def behind_play(position: Array, play: float) -> Array:
 
 
 def _bridge(link: Array, beside: np.ndarray, first: int, until: int) -> None:
-    """Have a link go from a sample to another by a polynomial through those known beside them.
+    """Fill the samples of a link between two by a polynomial through the known ones around them.
 
     Through as many of these on either side as are between; where a recording ends before, a
     straight line.
@@ -147,9 +145,9 @@ def _bridge(link: Array, beside: np.ndarray, first: int, until: int) -> None:
 
 
 def reversals(position: Array, width: float) -> list[tuple[int, int, float]]:
-    """Return the reversals of a position (N,) that come back by at least a width.
+    """Return the reversals of a position (N,) that return by at least a width.
 
-    Each as the sample at which it turns, the first at which it has come back by the width, and
+    Each as the sample at which it turns, the first at which it has returned by the width, and
     the direction afterwards.
     """
     step = np.sign(np.diff(position))

@@ -135,7 +135,7 @@ class MeasuredCurve(DriveEffect):
         return force
 
     def left(self, state: DriveStates) -> str | None:
-        """Return which measured range a state leaves, as a sentence, or None."""
+        """Return which measured range a state is outside of, as a sentence, or None."""
         for drive, curve in self.curves.items():
             x = variable_of(state, drive, curve.variable)
             outside = curve.outside(x)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Dry friction that falls as a drive leaves rest: (F_s + mu_s N) exp(-|q_dot / v_s|^d) sgn(q_dot).
+"""Dry friction that falls with the speed: (F_s + mu_s N) exp(-|q_dot / v_s|^d) sgn(q_dot).
 
 No load changes its size, or it follows the load.
 """

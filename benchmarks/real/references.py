@@ -1,0 +1,138 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Results since reference runs: python -m benchmarks.real.references FOLDER [--as-far].
+
+Each recording of the da Vinci arm and of the UR10e is diagnosed without a reference and since one.
+What is in FOLDER already is not done again; with --as-far nothing is run.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.real import davinci, ur10e
+from benchmarks.real.recorded_data import need_data
+from benchmarks.real.ur10e import Bench, file, table
+from benchmarks.results import write_results
+from pprs_dynamics.measurement.files.recording import read_recording, write_recording
+from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.model_writer import write_model
+
+FREE, SAME_DAY = 'free_one_b', 'free_50s_14harm'
+# [kg m] about pitch: 105 g at 0.535 m, and at the height of the lower bar's hinges.
+MOMENTS = {'insertion': 0.0562, 'parallel': 0.0152}
+BODIES = ('link_mass', 'payload_mass')
+HIDDEN = ('--effect', 'hysteresis', '--effect', 'force_ripple')
+# Changes of the simulated arm: name, key, joint, factor of its number.
+CHANGES = (('nothing', '', 0, 1.0), ('Coulomb wrist_2 + 10 %', 'friction.coulomb', 4, 1.1),
+           ('Coulomb wrist_2 + 5 %', 'friction.coulomb', 4, 1.05),
+           ('viscous elbow + 30 %', 'friction.viscous', 2, 1.3),
+           ('viscous elbow + 10 %', 'friction.viscous', 2, 1.1))
+
+
+def told(found: dict[str, Any]) -> str:
+    """Return what a diagnosis tells first, beside it, and how sure."""
+    if not found:
+        return 'not measured'
+    effects = found['effects']
+    if not effects:
+        return f'{found["verdict"]}: nothing, {len(found["depends_on"])} patterns'
+    first, *others = effects
+    known = {**first['parameters'], **(first.get('moments') or {})}
+    values = ', '.join(f'{key} {one["value"]:.3g} ± {2 * one["std"]:.2g}'
+                       for key, one in list(known.items())[:4] if one.get('std') is not None)
+    rivals = sorted({name for one in found['indistinguishable'] for name in one[1:]})
+    return (f'{found["verdict"]}: **{first["name"]}** ({values})'
+            + (f'; beside it {", ".join(one["name"] for one in others)}' if others else '')
+            + (f'; rivals {", ".join(rivals)}' if rivals else '')
+            + f'; {len(found["depends_on"])} patterns; {found["processor_seconds"]:.0f} s')
+
+
+def since(bench: Bench, name: str, recording: str, model: str, old: str, *reference: str,
+          ) -> list[str]:
+    """Return a row: what is told without a reference, by the model `old`, and since it."""
+    before = bench.run(f'{name}_old', 'diagnose', recording, '--model', old)
+    after = bench.run(f'{name}_new', 'diagnose', recording, '--model', model,
+                      '--reference', *reference)
+    return [name.replace('_', ' '), told(before), told(after)]
+
+
+def surgical_arm(bench: Bench) -> list[list[str]]:
+    """Return rows of the da Vinci arm with its weight."""
+    (bench.folder / 'psm.yaml').write_text(davinci.model_text())
+    bench.run('psm_fit', 'fit', file(FREE), '--model', 'psm.yaml', '--output', 'psm_base.yaml')
+    bench.run('psm_full', 'diagnose', file(FREE), '--model', 'psm_base.yaml', '--adopt-all',
+              '--output', 'psm_full.yaml')
+    return [since(bench, name.removeprefix('load_'), file(name), 'psm_base.yaml', 'psm_full.yaml')
+            for name in davinci.LOADED]
+
+
+def loaded_arm(bench: Bench) -> list[list[str]]:
+    """Return rows of the UR10e with its load, since a run of the same day and since others."""
+    (bench.folder / 'arm.yaml').write_text(ur10e.MODEL)
+    bench.run('ur_fit', 'fit', file(SAME_DAY), '--model', 'arm.yaml', '--output', 'ur_same.yaml')
+    bench.run('ur_fit_other', 'fit', *map(file, ur10e.FITTED), '--model', 'arm.yaml', '--output',
+              'ur_other.yaml')
+    return [since(bench, 'UR10e_same_day', file(ur10e.LOADED), 'ur_same.yaml', 'ur_same.yaml'),
+            since(bench, 'UR10e_other_path', file(ur10e.LOADED), 'ur_other.yaml', 'ur_other.yaml')]
+
+
+def add_noise(model: ForceModel, clean: Path, noisy: Path, seed: int) -> None:
+    """Write a recording with white noise of half a percent of each joint's largest effort."""
+    if noisy.exists():
+        return
+    one = read_recording(clean, model.recorded)
+    size = 0.005 * np.abs(one.effort).max(axis=0)
+    effort = one.effort + size * np.random.default_rng(seed).normal(size=one.effort.shape)
+    write_recording(noisy, replace(one, effort=effort))
+
+
+def simulated_arm(bench: Bench) -> list[list[str]]:
+    """Return rows of a simulated UR10e with hysteresis and ripple that were there before."""
+    base, rows = load_model(bench.folder / 'ur_same.yaml'), []
+    keys = [key for key in base.values if key.startswith('reference')]
+    plain = {key: value for key, value in base.values.items() if key not in keys}
+    for number, (name, key, joint, factor) in enumerate((('', '', 0, 1.0), *CHANGES)):
+        values, run = dict(plain), f'sim_{number}'
+        if key:
+            numbers = list(values[key])
+            numbers[joint] *= factor
+            values[key] = tuple(numbers)
+        write_model(bench.folder / f'{run}.yaml', values)
+        # The same hidden effects on each day, as they are of the seed; and other noise.
+        bench.run(f'{run}_clean', 'simulate', '--model', f'{run}.yaml', '--output',
+                  f'{run}_clean.csv', '--seed', '1', '--noise', '0', '--duration', '30',
+                  '--path-seed', '1', *HIDDEN)
+        if not bench.as_far:
+            add_noise(base, bench.folder / f'{run}_clean.csv',
+                      bench.folder / f'{run}.csv', number)
+        if number:
+            row = since(bench, run, f'{run}.csv', 'sim_0.yaml', 'sim_0.yaml', 'sim_0.csv')
+            rows.append([f'simulated, {name}', *row[1:]])
+    return rows
+
+
+def run(folder: Path, as_far: bool) -> None:
+    """Run all that is missing and write the results."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, known in (('dvrk', file(FREE)), ('ur10e', file(SAME_DAY))):
+        for source in need_data(name, known).iterdir():
+            if not (folder / source.name).exists():
+                shutil.copyfile(source, folder / source.name)
+    bench = Bench(folder, as_far)
+    rows = [*surgical_arm(bench), *loaded_arm(bench), *simulated_arm(bench)]
+    write_results('references', 'What has changed since a reference run',
+                  'python -m benchmarks.real.references FOLDER',
+                  table(('run', 'without a reference', 'since it'), rows))
+
+
+if __name__ == '__main__':
+    run(Path(sys.argv[1]).resolve(), '--as-far' in sys.argv)

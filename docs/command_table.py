@@ -1,0 +1,59 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Write the table of commands and options in docs/commands.md: python docs/command_table.py."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+
+from pprs_dynamics.app.commands.pprs import COMMANDS
+
+PAGE = Path(__file__).parent / 'commands.md'
+BEGIN, END = '<!-- options: written by docs/command_table.py -->', '<!-- end of options -->'
+
+
+def parser_of(command: str) -> argparse.ArgumentParser:
+    """Return the parser of one command."""
+    module = import_module(f'pprs_dynamics.app.commands.{command.replace("-", "_")}')
+    parser = argparse.ArgumentParser(prog=f'pprs {command}', description=module.__doc__)
+    module.add_arguments(parser)
+    return parser
+
+
+def rows(command: str) -> Iterator[str]:
+    """Yield one row for each argument of a command."""
+    for action in parser_of(command)._actions:
+        if isinstance(action, argparse._HelpAction) or action.help == argparse.SUPPRESS:
+            continue
+        name = ', '.join(action.option_strings) or action.metavar or action.dest
+        if action.option_strings and action.nargs != 0:
+            name += f' {action.metavar or action.dest.upper()}'
+        text = re.sub(r'\s+', ' ', action.help or '').replace('|', r'\|')
+        yield f'| `{name}` | {text % vars(action) if "%(" in text else text} |'
+
+
+def table() -> str:
+    """Return a section for each command, in Markdown."""
+    sections = []
+    for command in COMMANDS:
+        first = (parser_of(command).description or '').partition('\n')[0]
+        sections.append('\n'.join([f'### pprs {command}', '',
+                                   first.partition(': ')[2].capitalize(), '',
+                                   '| argument | meaning |', '|---|---|', *rows(command)]))
+    return '\n\n'.join(sections)
+
+
+def main() -> None:
+    """Replace the table in the page."""
+    before, _, rest = PAGE.read_text(encoding='utf-8').partition(BEGIN)
+    PAGE.write_text(f'{before}{BEGIN}\n\n{table()}\n\n{END}{rest.partition(END)[2]}',
+                    encoding='utf-8')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,119 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Recordings of a survey: from files, folders and globs, or from a manifest."""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from pprs_dynamics.errors import MissingLibraryError, PprsError, UnreadableFileError
+
+ENDINGS = ('.csv', '.mcap', '.db3')
+BAG = 'metadata.yaml'  # in the folder of a rosbag2 recording
+
+
+class ManifestError(PprsError, ValueError):
+    """A manifest with an impossible entry."""
+
+
+@dataclass(frozen=True)
+class SurveyedRecording:
+    """A recording, its robot, its time (None: its first stamp), its model file (None: as given)."""
+
+    path: str
+    robot: str
+    time: datetime | None = None
+    model: str | None = None
+
+
+def pandas() -> Any:
+    """Return pandas with pyarrow, or raise MissingLibraryError."""
+    try:
+        import pandas as pd
+        import pyarrow  # noqa: F401
+    except ImportError:
+        raise MissingLibraryError('pandas and pyarrow', 'a survey', 'fleet') from None
+    return pd
+
+
+def find_recordings(patterns: Sequence[str]) -> Iterator[SurveyedRecording]:
+    """Yield the recordings in files, folders and globs; a robot has the name of its folder.
+
+    Raises
+    ------
+    UnreadableFileError
+        If a pattern matches no recording.
+    """
+    for pattern in patterns:
+        places = [pattern] if os.path.exists(pattern) else sorted(glob.glob(pattern))
+        found = [path for place in places for path in _in_folder(Path(place))]
+        if not found:
+            raise UnreadableFileError(pattern or "''", 'there is no recording: no file, no '
+                                      f'folder with {", ".join(ENDINGS)} or bags, and no match')
+        for path in found:
+            yield SurveyedRecording(str(path), path.absolute().parent.name or 'robot')
+
+
+def _in_folder(place: Path) -> Iterator[Path]:
+    if not place.is_dir():
+        yield place
+        return
+    if (place / BAG).exists():
+        yield place
+        return
+    for path in sorted(place.iterdir()):
+        if path.is_dir() or path.suffix in ENDINGS:
+            yield from _in_folder(path)
+
+
+def read_manifest(path: str) -> Iterator[SurveyedRecording]:
+    """Yield the recordings of a CSV with the columns path, robot and optionally time, model.
+
+    Relative paths start at the manifest's folder.
+
+    Raises
+    ------
+    UnreadableFileError
+        If it cannot be read as a table.
+    ManifestError
+        For a missing column or value, or an impossible time.
+    """
+    pd = pandas()
+    try:
+        table = pd.read_csv(path, dtype=str, keep_default_na=False, skipinitialspace=True)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, 'strerror', None) or str(error).splitlines()[0]
+        raise UnreadableFileError(path, f'cannot be read as a table: {reason}') from None
+    for name in ('path', 'robot'):
+        if name not in table:
+            raise ManifestError(f'{path}: there is no column {name}, must have the columns path '
+                                'and robot')
+    for number, row in enumerate(table.to_dict('records'), start=2):
+        for name in ('path', 'robot'):
+            if not row[name].strip():
+                raise ManifestError(f'{path}, line {number}: {name} is empty, must be given')
+        text, model = row.get('time', '').strip(), row.get('model', '').strip()
+        folder = Path(path).parent
+        yield SurveyedRecording(
+            str(folder / row['path'].strip()), row['robot'].strip(),
+            _time(path, number, text) if text else None, str(folder / model) if model else None)
+
+
+def _time(path: str, line: int, text: str) -> datetime:
+    pd = pandas()
+    try:
+        moment = pd.to_datetime(float(text), unit='s', utc=True)
+    except ValueError:
+        moment = pd.to_datetime(text, utc=True, errors='coerce')
+    if pd.isna(moment) or moment.year < 1970:
+        raise ManifestError(f'{path}, line {line}: time {text!r}, must be an ISO 8601 date such as '
+                            '2026-03-04T10:00:00Z, or seconds since 1970')
+    found: datetime = moment.to_pydatetime()
+    return found

@@ -1,0 +1,354 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What coefficients of a set may be: one list of inequalities, solved at once.
+
+- Each parameter is within the bounds of its effect.
+- No drive has less than no inertia, viscous or dry friction, the model's own included.
+- An added body is a body, and a link from which one is taken away remains one.
+
+Inequalities of the first two kinds are linear. Possible bodies form a convex set, which tangent
+planes enclose (Wensing et al.).
+
+References
+----------
+P. M. Wensing, S. Kim, J.-J. E. Slotine, Linear matrix inequalities for physically consistent
+inertial parameter identification, IEEE Robotics and Automation Letters 3 (2018).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.base_columns import units_of
+from pprs_dynamics.inference.regression.constrained import Constrained, Inequalities, nearest
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
+from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.search.body_centres import REACH, reach_of
+from pprs_dynamics.inference.search.candidates import CandidateSet, Component
+from pprs_dynamics.physics.effects.added_body import KEPT, MOMENTS, AddedBody
+from pprs_dynamics.physics.effects.laws.asymmetric_friction import (
+    FORCES,
+    VISCOUS,
+    AsymmetricFriction,
+)
+from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
+from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
+from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
+from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
+from pprs_dynamics.physics.effects.structure_effect import with_bodies
+from pprs_dynamics.physics.mechanism.description import body_at, inertial_in, pseudo_inertia
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.force_model import RIGID_BODY
+from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
+
+if TYPE_CHECKING:
+    from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+
+# What coefficients add to in a drive: its inertia, or its friction in some directions.
+INERTIA, VISCOUS_FRICTION, DRY_FRICTION = 'inertia', 'viscous friction', 'dry friction'
+FORWARD, BACKWARD = 'forward', 'backward'
+BOTH = (FORWARD, BACKWARD)
+Total = tuple[str, str]  # of what, in which direction
+ADDS_TO: Mapping[tuple[str, str], tuple[Total, ...]] = {
+    (DriveInertia.name, 'mass'): ((INERTIA, ''),),
+    (ViscousFriction.name, 'coefficient'): tuple((VISCOUS_FRICTION, way) for way in BOTH),
+    (CoulombFriction.name, 'force'): tuple((DRY_FRICTION, way) for way in BOTH),
+    **{(AsymmetricFriction.name, name): ((VISCOUS_FRICTION, way),)
+       for name, way in zip(VISCOUS, BOTH, strict=True)},
+    **{(AsymmetricFriction.name, name): ((DRY_FRICTION, way),)
+       for name, way in zip(FORCES, BOTH, strict=True)}}
+MASSES = ('masses.platform', 'masses.payload', 'masses.slides', 'masses.lifts', 'masses.rods')
+
+# Of a body's size: how far inside the set of possible bodies a plane is, so that few planes
+# suffice; and what rounding may violate.
+MARGIN, ROUNDING = 1e-4, 1e-9
+NEAR = 0.3  # radius of gyration of a small body, of the distance between joints
+THIN = 1e-6  # of a link's largest second moment, which its least is taken to have
+LEAST_MASS = 1e-6  # [kg] of a body
+DOUBTED = 2.0  # standard deviations of a mass within which it may be added or taken away
+
+
+class Constraints:
+    """What coefficients of the effects of a design may be.
+
+    Parameters
+    ----------
+    design : Design
+    """
+
+    def __init__(self, design: Design) -> None:
+        self.design = design
+        self._bounds: dict[Component, Array] = {}
+        self._totals: dict[tuple[int, str], float] = {}
+        self._planes: dict[tuple[Component, float], BodyPlanes] = {}
+
+    def applied(self, regression: Regression, fit: JointFit, blocks: Mapping[Component, Block],
+                ) -> JointFit | None:
+        """Return a fit moved to the nearest possible coefficients; None where none are possible.
+
+        The fit itself where its coefficients are possible. The noise does not change, so that it
+        cannot absorb an impossible value.
+
+        Parameters
+        ----------
+        regression : Regression
+        fit : JointFit
+        blocks : mapping of Component to Block
+            Columns of its effects.
+        """
+        places, first = dict[Component, slice](), 0
+        index = list[int]()
+        for component, block in blocks.items():
+            if count := len(component.names):
+                start = fit.places[block].start
+                index += range(start, start + count)
+                places[component] = slice(first, first + count)
+                first += count
+        if not index:
+            return fit
+        at = np.array(index)
+        found = self._nearest(places, fit.coefficients[at], fit.covariance[np.ix_(at, at)])
+        if found is None:
+            return None
+        return regression.conditioned(fit, at, found.active) if len(found.active.b) else fit
+
+    def _nearest(self, places: Mapping[Component, slice], mean: Array, covariance: Array,
+                 ) -> Constrained | None:
+        """Return the nearest possible coefficients, for each sign that a doubtful mass may have."""
+        linear = self._linear(places, len(mean))
+        bodies = [component for component in places if issubclass(component.effect, AddedBody)
+                  and component.effect.has_extent]
+        signs = []
+        for component in bodies:
+            at = places[component].start
+            mass = mean[at] + _given(component)[0]
+            sign = 1.0 if mass >= 0 else -1.0
+            doubted = abs(mass) < DOUBTED * covariance[at, at] ** 0.5
+            signs.append((sign, -sign) if doubted else (sign,))
+        best: Constrained | None = None
+        for choice in product(*signs):
+            sets = [(places[component], _given(component), self._planes_of(component, sign))
+                    for component, sign in zip(bodies, choice, strict=True)]
+
+            def planes(c: Array, sets: list[tuple[slice, Array, BodyPlanes]] = sets,
+                       ) -> Inequalities:
+                found = Inequalities.none(len(c))
+                for place, given, of_body in sets:
+                    more = of_body(c[place] + given)
+                    A = np.zeros((len(more.b), len(c)))
+                    A[:, place] = more.A
+                    found = found.and_also(Inequalities(A, more.b - more.A @ given))
+                return found
+            found = nearest(mean, covariance, linear, planes)
+            if found is not None and (best is None or found.rise < best.rise):
+                best = found
+            if best is not None and best.rise == 0:
+                break
+        return best
+
+    def _planes_of(self, component: Component, sign: float) -> BodyPlanes:
+        key = (component, sign)
+        if key not in self._planes:
+            # What is changed of a body of the input model is no body: all of it has to be one.
+            robot = with_bodies(self.design.given.robot, [
+                effect for effect in self.design.given.effects
+                if not (component.given and effect.name == component.effect.name)])
+            self._planes[key] = body_planes(robot, component, sign)
+        return self._planes[key]
+
+    def _linear(self, places: Mapping[Component, slice], size: int) -> Inequalities:
+        """Return the bounds of parameters and of the totals of every drive."""
+        unit = np.eye(size)
+        bounds = np.concatenate([self._bounds_of(component) for component in places], axis=1)
+        rows, least = [unit, -unit], [bounds[0], -bounds[1]]
+        totals: dict[tuple[int, Total], tuple[Array, float]] = {}
+        for component, place in places.items():
+            if (d := component.drive) is None:
+                continue
+            for k, name in enumerate(component.names):
+                for total in ADDS_TO.get((component.effect.name, name), ()):
+                    row, own = totals.get((d, total), (np.zeros(size), self.own(d, total[0])))
+                    totals[d, total] = (row + unit[place.start + k], own + _given(component)[k])
+        for row, own in totals.values():
+            rows.append(row[None])
+            least.append(np.array([-own]))
+        b = np.concatenate(least)
+        finite = np.isfinite(b)
+        return Inequalities(np.concatenate(rows)[finite], b[finite])
+
+    def _bounds_of(self, component: Component) -> Array:
+        """Return the least and largest of each coefficient beside the input model's, (2, k)."""
+        if component not in self._bounds:
+            turns = units_of(self.design.given, component.drive).turns
+            kinds = {p.name: p.of(turns) for p in (*component.effect.coefficients,
+                                                   *component.effect.linear)}
+            self._bounds[component] = np.array(
+                [(kinds[name].lower, kinds[name].upper) for name in component.names],
+            ).T - _given(component)
+        return self._bounds[component]
+
+    def own(self, drive: int, of: str) -> float:
+        """Return the inertia or friction that the input model has in a drive, without effects."""
+        if (drive, of) not in self._totals:
+            self._totals[drive, of] = own_total(self.design, drive, of)
+        return self._totals[drive, of]
+
+
+def _given(component: Component) -> Array:
+    """Return the input model's values of a component's coefficients, (k,)."""
+    known = dict(zip((c.name for c in component.effect.coefficients), component.given,
+                     strict=False))
+    return np.array([known.get(name, 0.0) for name in component.names])
+
+
+def empty_totals(design: Design, fitted: CandidateSet, component: Component) -> tuple[str, ...]:
+    """Return what a drive has none of, by a set with a component: inertia or a friction.
+
+    Parameters
+    ----------
+    design : Design
+    fitted : CandidateSet
+    component : Component
+        Of the set.
+    """
+    if component.drive is None:
+        return ()
+    found = dict[str, None]()
+    for name in component.names:
+        for of, way in ADDS_TO.get((component.effect.name, name), ()):
+            own = own_total(design, component.drive, of)
+            total, size = own, abs(own)
+            for other in fitted.blocks:
+                if other.drive == component.drive:
+                    for k, one in enumerate(other.names):
+                        if (of, way) in ADDS_TO.get((other.effect.name, one), ()):
+                            value = fitted.coefficients(other)[k] + _given(other)[k]
+                            total, size = total + value, size + abs(value)
+            value = fitted.coefficients(component)[component.names.index(name)]
+            if value < 0 and abs(total) <= 1e-9 * size:
+                found[of] = None
+    return tuple(found)
+
+
+def own_total(design: Design, drive: int, of: str) -> float:
+    """Return the inertia or friction that the input model has in a drive without its effects."""
+    if of == INERTIA:
+        return _own_inertia(design, drive)
+    friction = next((effect for effect in design.given.effects
+                     if isinstance(effect, ActiveFriction | AxisFriction)), None)
+    if friction is None:
+        return 0.0
+    if of == VISCOUS_FRICTION:
+        return float(np.broadcast_to(friction.viscous, len(design.drives))[drive])
+    usual = np.zeros(len(design.drives))
+    if 'load' in design.residuals.variables:
+        usual = np.median(np.abs(design.residuals.variables['load']), axis=0)
+    return float(friction.dry(usual)[drive])
+
+
+def _own_inertia(design: Design, drive: int) -> float:
+    """Return the largest inertia of a drive that moves alone [kg, kg m^2]."""
+    model = design.given
+    if isinstance(model, DriveModel):  # at most all of its masses
+        return float(sum(np.sum(model.values[key]) for key in MASSES))
+    position = design.residuals.variables['position']
+    still, pushed = np.zeros_like(position), np.zeros_like(position)
+    pushed[:, drive] = 1.0
+    moved, at_rest = (model.drive_forces(JointMotion(position, still, acceleration)).parts[
+        RIGID_BODY] for acceleration in (pushed, still))
+    return float(np.max((moved - at_rest)[:, drive]))
+
+
+BodyPlanes = Callable[[Array], Inequalities]
+
+
+def body_planes(robot: Mechanism, component: Component, sign: float) -> BodyPlanes:
+    """Return a function from coefficients (k,) to the inequalities of a body that they violate.
+
+    Parameters
+    ----------
+    robot : Mechanism
+        To which the body is added.
+    component : Component
+        Of an `AddedBody`: mass, and perhaps first moment and inertia about the centre.
+    sign : {1, -1}
+        Added, or taken away.
+
+    Notes
+    -----
+    With m the mass, h the first moment and S the second moments about the centre of what is added
+    or taken away, m > 0, ||h|| <= m reach, and S is positive semidefinite. These are convex. What
+    is taken away, S + h h^T / m, is convex in (m, h, S) as well, so that a link that retains a
+    share in every direction is a convex constraint.
+    """
+    kind = component.effect
+    assert issubclass(kind, AddedBody)
+    names = [name.rpartition('.') for name in component.names]
+    prefix, count = ''.join(names[0][:2]), len(names)
+    link, centre = next((link, np.array(centre)) for before, link, centre, *_ in kind.places
+                        if before == prefix)
+    reach, usual = reach_of(robot), float(np.abs(robot.inertial[:, 0]).mean())
+    steps = np.repeat([1.0, reach, reach ** 2], [1, 3, 6])
+    row, frame = robot.structure.links[link]
+    values, axes = np.linalg.eigh(pseudo_inertia(robot.by_joint[row]))
+    scaled = axes / np.sqrt(np.maximum(values, THIN * values[-1]))
+    order = [name for _, _, name in names]
+    tensor = [order.index(name) if name in order else count
+              for name in ('xx', 'xy', 'xz', 'xy', 'yy', 'yz', 'xz', 'yz', 'zz')]
+    has_extent = any(name in MOMENTS for name in order)
+
+    def inertia(c: Array) -> Array:
+        return np.append(c, 0.0)[tensor].reshape(3, 3)
+
+    def second_moments(c: Array) -> Array:
+        found: Array = sign * (np.trace(inertia(c)) / 2 * np.eye(3) - inertia(c))
+        return found
+
+    def taken(c: Array) -> Array:
+        away = c[1:4] / c[0] if count > 1 else np.zeros(3)
+        body = inertial_in(frame, body_at(c[0], tuple(centre + away), inertia(c)))
+        found: Array = -scaled.T @ pseudo_inertia(body) @ scaled
+        return found
+
+    def violated(c: Array) -> Iterator[tuple[Array, float]]:
+        unit = np.eye(count)
+        if not sign * c[0] >= LEAST_MASS / 2:
+            yield sign * unit[0], LEAST_MASS
+        moment = np.linalg.norm(c[1:4])
+        if count > 1 and moment > (1 + ROUNDING) * reach * max(sign * c[0], LEAST_MASS / 2):
+            yield ((1 - MARGIN) * reach * sign * unit[0]
+                   - np.concatenate(([0.0], c[1:4] / moment, np.zeros(count - 4)))), 0.0
+        if has_extent:
+            extents, directions = np.linalg.eigh(second_moments(c))
+            size = max(float(np.abs(extents).sum()),
+                       max(abs(c[0]), usual) * (NEAR * reach / REACH) ** 2)
+            for extent, v in zip(extents, directions.T, strict=True):
+                if extent < -ROUNDING * size:
+                    yield np.array([v @ second_moments(one) @ v for one in unit]), MARGIN * size
+
+    def planes(c: Array) -> Inequalities:
+        found = list(violated(c))
+        if not found and sign < 0:
+            # By how much a direction of the link would be taken away; homogeneous in c.
+            shares, directions = np.linalg.eigh(taken(c))
+            for share, v in zip(shares, directions.T, strict=True):
+                if share > 1 - KEPT + ROUNDING:
+                    slope = np.zeros(count)
+                    for k, size in enumerate(steps[1:count], 1):  # exact: a quadratic form
+                        step = abs(c[0]) * size * np.eye(count)[k]
+                        slope[k] = v @ (taken(c + step) - taken(c - step)) @ v / (
+                            2 * abs(c[0]) * size)
+                    slope[0] = (v @ taken(c) @ v - slope @ c) / c[0]  # Euler's theorem
+                    found.append((-slope, -(1 - KEPT - MARGIN)))
+        if not found:
+            return Inequalities.none(count)
+        return Inequalities(*map(np.array, zip(*found, strict=True)))
+    return planes

@@ -1,0 +1,157 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""What is true of every diagnosis: on a single axis and on an arm, for effects of each kind."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from planar_arm import planar_arm
+
+from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.model.model_file import build_model, load_model
+from pprs_dynamics.physics.model.robot_block import AXIS
+
+RATE, DURATION = 200.0, 8.0  # [Hz, s]
+NOISE = 0.1  # [N]
+LATER = 4321.0  # [s] on the recording's clock
+# In units of effort: all of them are multiplied where the unit of effort is another.
+EFFORTS = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0}
+OTHERS = {'friction.reversal_velocity': 0.001}
+HIDDEN = {
+    'nothing': {}, 'coulomb_friction': {'force': 1.2}, 'viscous_friction': {'coefficient': 12.0},
+    'drive_spring': {'stiffness': 60.0, 'position': 0.02}, 'drive_inertia': {'mass': 2.0},
+    'effort_offset': {'force': 0.8}, 'effort_gain': {'gain': 0.1}, 'time_delay': {'delay': 0.02}}
+EFFECTS = [name for name in HIDDEN if name != 'nothing']
+
+
+def axis_model(scale: float = 1.0) -> MechanismModel:
+    model = build_model({**OTHERS, **{key: scale * one for key, one in EFFORTS.items()}})
+    assert isinstance(model, MechanismModel)
+    return model
+
+
+@cache
+def recorded(name: str, seed: int) -> Recording:
+    """Return a recording of an axis with an effect, which differs by motion and noise."""
+    effect = {f'effects.{name}.{AXIS}.{key}': one for key, one in HIDDEN[name].items()}
+    model = build_model({**EFFORTS, **OTHERS, **effect,
+                         'effects.active': [name] if effect else []})
+    assert isinstance(model, MechanismModel)
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, DURATION, 1 / RATE)
+    omega = 2 * np.pi * np.array([0.25, 0.5, 1.0])[:, None]
+    phase = omega * time + rng.uniform(0, 2 * np.pi, (3, 1))
+    size = np.array([0.08, 0.04, 0.015])[:, None]
+    moved = JointMotion(*((each).sum(axis=0)[:, None] for each in (
+        size * np.sin(phase), size * omega * np.cos(phase), -size * omega ** 2 * np.sin(phase))),
+        time=time)
+    effort = model.measured(model.drive_forces(moved)).total
+    return Recording.from_arrays(f'run_{seed}', time, moved.position, None,
+                                 effort + NOISE * rng.normal(size=effort.shape), (AXIS,))
+
+
+@cache
+def diagnosed(name: str, *seeds: int) -> Diagnosis:
+    return diagnose(axis_model(), [recorded(name, seed) for seed in seeds])
+
+
+def answer(found: Diagnosis) -> tuple[str, list[tuple[str, tuple[str, ...] | None]]]:
+    return found.verdict, [(one.name, one.drives) for one in found.effects]
+
+
+@pytest.mark.parametrize('name', HIDDEN)
+def test_what_is_hidden_is_reported_and_nothing_where_nothing_is(name: str) -> None:
+    found = diagnosed(name, 1)
+    possible = {one.name for one in found.effects}.union(*found.indistinguishable)
+    assert name in possible if name in EFFECTS else not possible
+
+
+@pytest.mark.parametrize('name', EFFECTS)
+def test_a_reported_effect_lowers_the_held_out_error(name: str) -> None:
+    found = diagnosed(name, 1)
+    assert found.verdict in ('effect', 'ambiguous')
+    for one in found.effects:
+        assert one.held_out_after < one.held_out_before
+        assert one.error_after < one.error_before
+    # On another motion, which no part of the search has seen.
+    other = diagnose(axis_model(), [recorded(name, 1)], [recorded(name, 2)])
+    assert other.effects
+    for one in other.effects:
+        assert one.held_out_after < one.held_out_before
+
+
+@pytest.mark.parametrize('name', HIDDEN)
+def test_costs_add_up_and_the_best_set_is_first(name: str) -> None:
+    found = diagnosed(name, 1)
+    costs = [one.cost for one in found.sets]
+    assert costs == sorted(costs)
+    assert costs[0] == 0
+    for one in found.sets:
+        assert sum(one.terms.to_dict().values()) == pytest.approx(one.cost, abs=1e-6)
+    for effect in found.effects:
+        assert effect.evidence > 0
+        assert effect.without is not None
+        assert effect.without.cost == pytest.approx(effect.evidence, abs=1e-6)
+
+
+@pytest.mark.parametrize('name', HIDDEN)
+def test_the_answer_does_not_depend_on_the_origin_of_time(name: str) -> None:
+    run = recorded(name, 1)
+    later = diagnose(axis_model(), [replace(run, time=run.time + LATER)])
+    assert answer(later) == answer(diagnosed(name, 1))
+    for one, other in zip(later.effects, diagnosed(name, 1).effects, strict=True):
+        assert one.evidence == pytest.approx(other.evidence, rel=1e-3, abs=0.1)
+
+
+@pytest.mark.parametrize('name', HIDDEN)
+def test_the_answer_does_not_depend_on_the_unit_of_effort(name: str) -> None:
+    run, scale = recorded(name, 1), 1e3  # mN
+    found = diagnose(axis_model(scale), [replace(run, effort=scale * run.effort)])
+    assert answer(found) == answer(diagnosed(name, 1))
+    assert found.noise_floor == pytest.approx(scale * diagnosed(name, 1).noise_floor, rel=1e-3)
+
+
+@pytest.mark.parametrize('name', ['coulomb_friction', 'effort_offset', 'time_delay'])
+def test_the_answer_does_not_depend_on_the_order_of_drives(tmp_path: Path, name: str) -> None:
+    """One arm and one recording, whose drives are listed from the base and from the tool."""
+    planar_arm(tmp_path, 2)
+    path = tmp_path / 'arm.yaml'
+    model = load_model(path)
+    hidden = build_model({**model.values, 'effects.active': [name], **{
+        f'effects.{name}.j2.{key}': one for key, one in HIDDEN[name].items()}}, model.source)
+    time = np.arange(0.0, DURATION, 1 / RATE)
+    size, omega = np.array([0.6, 0.8]), 2 * np.pi * np.array([0.5, 0.75])
+    phase = time[:, None] * omega + [0.3, 1.1]
+    moved = JointMotion(size * np.sin(phase), size * omega * np.cos(phase),
+                        -size * omega ** 2 * np.sin(phase), time=time)
+    effort = hidden.measured(hidden.drive_forces(moved)).total
+    effort = effort + 0.02 * np.random.default_rng(0).normal(size=effort.shape)
+    found = []
+    for order in ([0, 1], [1, 0]):
+        drives = tuple(('j1', 'j2')[k] for k in order)
+        path.write_text(path.read_text().replace('[j1, j2]', f'[{", ".join(drives)}]'))
+        found.append(diagnose(load_model(path), [Recording.from_arrays(
+            'run', time, moved.position[:, order], None, effort[:, order], drives)]))
+    assert answer(found[0]) == answer(found[1])
+    assert (name, ('j2',)) in answer(found[0])[1]
+    for one, other in zip(found[0].effects, found[1].effects, strict=True):
+        assert one.evidence == pytest.approx(other.evidence, rel=1e-3, abs=0.1)
+
+
+@pytest.mark.parametrize('name', EFFECTS)
+def test_twice_the_data_never_removes_an_effect_and_makes_its_size_surer(name: str) -> None:
+    once, twice = diagnosed(name, 1), diagnosed(name, 1, 2)
+    assert name in {one.name for one in twice.effects}.union(*twice.indistinguishable)
+    before, after = ({f'{one.name}.{key}': each.std for one in found.effects
+                      for key, each in one.parameters.items()} for found in (once, twice))
+    for key in before.keys() & after.keys():
+        assert after[key] < before[key], key

@@ -1,0 +1,111 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The simulated robot has MuJoCo's own reading of a description: it exposes faults of ours."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import robots_with_loops as robots
+
+from pprs_dynamics import MechanismModel
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.mechanism import structure
+from pprs_dynamics.physics.model import robot_block
+from pprs_dynamics.simulation.arm_engine import ArmEngine
+
+BODY = ('<inertial><origin xyz="0.2 0.02 0.1"/><mass value="{}"/><inertia ixx="0.03" iyy="0.04" '
+        'izz="0.02" ixy="0.001" ixz="0.002" iyz="-0.001"/></inertial>')
+ROTOR = ('<inertial><mass value="0"/><inertia ixx="0" iyy="2e-4" izz="0" ixy="0" ixz="0" iyz="0"/>'
+         '</inertial>')
+MJCF = '''<mujoco><option gravity="1 2 -9"/><worldbody><body name="plate" euler="40 20 0">
+  <body name="l1" pos="0.1 0 0.2"><joint name="j1" axis="0 1 0" pos="0.1 0.05 0" ref="0.4"/>
+  <joint name="j2" type="slide" axis="1 0 0"/><inertial pos="0.1 0 0.1" mass="2"
+  diaginertia="0.02 0.03 0.04"/><body name="l2" pos="0.3 0 0"><joint name="j3" axis="0 0 1"/>
+  <inertial pos="0.1 0.1 0" mass="1" diaginertia="0.02 0.03 0.04"/></body></body></body></worldbody>
+  <equality><joint joint1="j3" joint2="j1" polycoef="0.2 -2 0 0 0"/></equality></mujoco>'''
+
+
+def described(folder: Path) -> Path:
+    """Write an arm that hangs on a ceiling, with a gear's rotor, a gripper and a coupled joint."""
+    def joint(name: str, kind: str, parent: str, child: str, more: str = '') -> str:
+        return (f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child '
+                f'link="{child}"/><origin xyz="0.1 0 0.3" rpy="0.2 0.1 0"/><axis xyz="0 1 0"/>'
+                f'{more}</joint>')
+
+    limit = '<limit lower="{}" upper="{}" effort="1" velocity="1"/>'
+    (folder / 'robot.urdf').write_text(
+        '<robot name="r"><link name="world"/><joint name="mount" type="fixed"><parent '
+        'link="world"/><child link="plate"/><origin rpy="3 0.2 0"/></joint><link name="plate"/>'
+        + joint('j1', 'revolute', 'plate', 'l1', limit.format(-2, 2))
+        + f'<link name="l1">{BODY.format(2)}</link>'
+        + joint('motor', 'continuous', 'plate', 'rotor', '<mimic joint="j1" multiplier="50"/>')
+        + f'<link name="rotor">{ROTOR}</link>'
+        + joint('slide', 'prismatic', 'l1', 'l2', limit.format(0.5, 0.9))
+        + f'<link name="l2">{BODY.format(1)}</link>'
+        + joint('jaw', 'revolute', 'l2', 'l3', limit.format(-2, 2)
+                + '<mimic joint="slide" multiplier="-1" offset="1.5"/>')
+        + f'<link name="l3">{BODY.format(1.5)}</link></robot>')
+    path = folder / 'robot.yaml'
+    path.write_text('/**:\n  ros__parameters:\n    robot: {urdf: robot.urdf, base: plate, '
+                    'tool: l3, drives: [j1], locked: {slide: 0.5}}\n')
+    return path
+
+
+def test_plant_and_model_agree(tmp_path: Path) -> None:
+    ArmEngine(MechanismModel.load(described(tmp_path)))
+    for robot in (robots.hexapod, robots.delta, robots.five_bar):
+        ArmEngine(MechanismModel.load(robot().write(tmp_path)))
+    (tmp_path / 'robot.xml').write_text(MJCF)
+    path = tmp_path / 'mjcf.yaml'
+    path.write_text('/**:\n  ros__parameters:\n    robot: {mjcf: robot.xml, base: plate, tool: l2, '
+                    'drives: [j1, j2]}\n')
+    engine = ArmEngine(MechanismModel.load(path))
+    engine.add_payload(1.0, np.array([0.0, 0.1, 0.2]))
+    engine.add_to_link(0, 0.5)
+    engine._require_agreement(_loaded(path, engine))
+
+
+def _loaded(path: Path, engine: ArmEngine) -> MechanismModel:
+    return replace(MechanismModel.load(path), robot=engine.robot)
+
+
+def locked_at_zero(self: object, joint: object) -> float:
+    return 0.0
+
+
+@pytest.mark.parametrize('fault', ['massless_rotors_are_dropped', 'locked_joints_are_at_zero',
+                                   'a_follower_ignores_its_offset', 'gravity_is_in_the_base'])
+def test_faults_of_the_model_are_seen(tmp_path: Path, fault: str,
+                                      monkeypatch: pytest.MonkeyPatch) -> None:
+    if fault == 'massless_rotors_are_dropped':
+        own = structure.Structure.__dict__['inertial'].func
+
+        def with_mass(self: structure.Structure) -> np.ndarray:
+            inertial: np.ndarray = own(self)
+            return np.where(inertial[:, :1] > 0, inertial, 0.0)
+
+        monkeypatch.setattr(structure.Structure, 'inertial', property(with_mass))
+    elif fault == 'locked_joints_are_at_zero':
+        monkeypatch.setattr(structure._Builder, '_locked_position', locked_at_zero)
+    elif fault == 'a_follower_ignores_its_offset':
+        whole = structure._Builder._locked_position
+
+        def without_offset(self: structure._Builder, joint: structure.Joint) -> float:
+            return 0.0 if joint.mimic is not None else whole(self, joint)
+
+        monkeypatch.setattr(structure._Builder, '_locked_position', without_offset)
+    else:
+        def as_standard(of: structure.Structure) -> tuple[float, ...]:
+            return (0.0, 0.0, -9.81)
+
+        monkeypatch.setattr(robot_block, 'described_gravity', as_standard)
+        monkeypatch.setattr('pprs_dynamics.simulation.arm_engine.described_gravity', as_standard)
+    robot_block._structure.cache_clear()
+    with pytest.raises(ModelError, match='in MuJoCo'):
+        ArmEngine(MechanismModel.load(described(tmp_path)))
+    robot_block._structure.cache_clear()
