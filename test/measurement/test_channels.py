@@ -15,8 +15,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from pprs_dynamics.drives import RecordedDrives
 from pprs_dynamics.errors import MotionError, UnreadableFileError
-from pprs_dynamics.measurement.files.contents import Series
 from pprs_dynamics.inference.readings.columns import guess_columns
+from pprs_dynamics.measurement.files.contents import Series
 from pprs_dynamics.measurement.files.recording import (
     Recording,
     describe,

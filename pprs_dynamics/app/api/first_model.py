@@ -64,8 +64,7 @@ SCALE_KEYS = {POSITION: 'position_scale', VELOCITY: 'velocity_scale', EFFORT: 'e
 
 
 # Mistakes of which a model file may have the line without a question.
-SURE_KINDS = ('position_unit', 'effort_unit', 'effort_sign', 'effort_sign_bit', 'time_unit')
-MOST_CORRECTIONS = 3
+SURE_KINDS = {'position_unit', 'effort_unit', 'effort_sign', 'effort_sign_bit', 'time_unit'}
 
 
 class FirstModelError(PprsError, ValueError):
@@ -189,8 +188,9 @@ def first_model(
 
     has_efforts = bool({EFFORT, CURRENT} & {*found})
     text, model = written()
-    for _ in range(MOST_CORRECTIONS if has_efforts else 0):
-        scales, reasons, questions = _corrections(model, given[0])
+    corrected: set[str] = set()
+    while has_efforts:
+        scales, reasons, questions = _corrections(model, given[0], corrected)
         columns, guessed = _with_scales(columns, scales), [*guessed, *reasons]
         notes += [*reasons, *questions]
         text, model = written()
@@ -208,14 +208,19 @@ def first_model(
 # ---------------------------------------------------------------------------------- readings
 
 
-def _corrections(model: Model, path: Path) -> tuple[Scales, list[str], list[str]]:
-    """Return factors with which a recording is read surely, why, and what is not sure."""
+def _corrections(model: Model, path: Path, corrected: set[str],
+                 ) -> tuple[Scales, list[str], list[str]]:
+    """Return factors with which a recording is read surely, why, and what is not sure.
+
+    What is corrected already is a question when it comes again; `corrected` gets the new kinds.
+    """
     try:
         mistakes = find_mistakes(model, read_recording(path, model.recorded))
     except PprsError:
         return (), [], []
     readings = [each for each in mistakes if isinstance(each, OtherReading)]
-    sure = [each for each in readings if each.scales and each.kind in SURE_KINDS]
+    sure = [each for each in readings if each.scales and each.kind in SURE_KINDS - corrected]
+    corrected.update(each.kind for each in sure)
     unsure = [each for each in readings if each not in sure] if not sure else []
     questions = [f'{each.what}: if so, write {line}' for each in unsure
                  if (line := each.line or columns_line([each]))]

@@ -53,6 +53,7 @@ from pprs_dynamics.inference.readings.table import (
     QUARTERS,
     RATE_OFF,
     STROKE_SLACK,
+    SURE,
     TIMES,
     WEAK,
     Reading,
@@ -67,8 +68,9 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.model.force_model import ForceModel
 
-# Other units than prefixes are those of all drives: `find_scales`.
-SCALES = (1.0, -1.0, 1e3, 1e-3, -1e3, -1e-3)
+SCALES = (1.0, -1.0, *EFFORTS, *(-unit for unit in EFFORTS))
+# Of one drive among others; other units are those of all drives.
+OF_ONE = (1.0, -1.0, 1e3, 1e-3, -1e3, -1e-3)
 SHORTEST_STEP = 1e-5  # [s]; no robot is sampled at more than 100 kHz
 STRETCHES = 8  # of an excerpt, evenly over the recording
 
@@ -124,11 +126,17 @@ def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]
     best = search.best()
     contents = effort_contents(model, recording, excerpts.get(1.0))
     mistakes: list[Defect] = [] if best is None else list(_of_fit(model, best))
+    if best is not None and (rival := search.rival(best)) is not None:
+        lines = [columns_line([*_of_fit(model, fit)], model.recorded.columns is not None)
+                 for fit in (best, rival)]
+        mistakes = [OtherReading.of(
+            'ambiguous', model.drives, range(len(model.drives)), f'{best.reading.what}, or '
+            f'{rival.reading.what}', ' or '.join(lines))]
     kinds = {mistake.kind for mistake in mistakes}
     if not mistakes:
         mistakes += find_scales(model, contents)
     # What explains the efforts well is in the right unit, whatever limits say.
-    if not kinds & {'position_unit', 'drive_order'} and search.plain_left > GOOD_FIT:
+    if not kinds & {'position_unit', 'drive_order', 'ambiguous'} and search.plain_left > GOOD_FIT:
         mistakes += _of_strokes(model, recording)
     if not kinds & {'position_unit', 'position_sign', 'reversed_time'}:
         unit = 1.0 if best is None else best.time_unit
@@ -153,6 +161,7 @@ class Search:
     def __init__(self, model: ForceModel, excerpts: dict[float, Excerpt]) -> None:
         self.model, self.excerpts = model, excerpts
         self.plain_left = 1.0  # residual of the plain reading
+        self.fits: list[Fit] = []
         self._parts: dict[tuple[float, bytes, bytes, bool], Parts | None] = {}
 
     def best(self) -> Fit | None:
@@ -175,6 +184,7 @@ class Search:
             for unit in self.excerpts:
                 fit = None if reading is first and unit == 1 else self.fit(reading, unit)
                 if fit is not None:
+                    self.fits.append(fit)
                     best = self._better(best, fit)
         # Zeros that are quarter turns off, one drive after another.
         seeds = [start, *([best[0]] if best[0] else [])]
@@ -183,6 +193,13 @@ class Search:
         found = best[0]
         return None if found is None or found.left > GOOD_FIT or not self._is_certain(
             found) else found
+
+    def rival(self, best: Fit) -> Fit | None:
+        """Return another reading of positions that is nearly as likely as the best one."""
+        others = [fit for fit in self.fits if best.score - fit.score < SURE and not fit.is_plain
+                  and fit.reading.kind == best.reading.kind == 'position_unit'
+                  and not np.allclose(fit.reading.position, best.reading.position)]
+        return max(others, key=lambda fit: fit.score, default=None)
 
     def _turned(self, seed: Fit, best: tuple[Fit | None, float]) -> tuple[Fit | None, float]:
         if seed.left < CLOSE_FIT or seed.reading.kind not in ('', 'position_unit'):
@@ -236,7 +253,7 @@ class Search:
 
         alone = np.ones(effort.shape[1])
         for d in measured:
-            alone[d] = max(SCALES, key=lambda scale: found[d, scale].score
+            alone[d] = max(OF_ONE, key=lambda scale: found[d, scale].score
                            - _mistakes(scale) / weights[d])
         choices = [alone]
         for scale in SCALES:
@@ -323,7 +340,7 @@ def _time_units(recording: Recording) -> list[float]:
 # --------------------------------------------------------------------------------- sentences
 
 
-def _of_fit(model: ForceModel, fit: Fit) -> Iterator[Mistake]:
+def _of_fit(model: ForceModel, fit: Fit) -> Iterator[OtherReading]:
     """Yield the mistakes of times, of positions and order, and of efforts."""
     drives, units = model.drives, model.units
     if fit.time_unit != 1.0:
