@@ -55,7 +55,7 @@ setup(
         (f'share/{package_name}/launch', glob('launch/*.launch.py')),
     ],
     python_requires='>=3.11',
-    install_requires=['setuptools', 'numpy>=1.26', 'scipy>=1.11', 'PyYAML>=6'],
+    install_requires=['setuptools', 'numpy>=1.26', 'scipy>=1.11', 'pandas>=2.1', 'PyYAML>=6'],
     extras_require={
         # ROS 2 as wheels, for machines where no ROS 2 is installed and sourced.
         'ros': ['ros-rclpy[fastrtps]==9.1.2', 'ros-std-msgs==5.5.1',
@@ -66,18 +66,18 @@ setup(
         'sim': ['mujoco>=4.0'],
         'fast': ['numba>=0.60'],
         'bags': ['rosbags>=0.11'],
-        'fleet': ['distributed>=2025.1', 'pandas>=2', 'pyarrow>=17', 'ruptures>=1.1.9'],
+        'fleet': ['distributed>=2025.1', 'pyarrow>=17', 'ruptures>=1.1.9'],
         # Tables by columns of the model file: pyarrow reads Parquet.
         'tables': ['pyarrow>=17'],
         'workbench': ['starlette>=0.40', 'uvicorn>=0.30'],
-        # Results in a notebook: tables of pandas, pictures, and what the terminal shows.
-        'notebook': ['rich>=13', 'matplotlib>=3.8', 'pandas>=2'],
+        # Results in a notebook: pictures, and what the terminal shows.
+        'notebook': ['rich>=13', 'matplotlib>=3.8'],
         # The site of the documentation: Markdown and notebooks, in a theme that reads on a phone.
         'docs': ['sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1', 'matplotlib>=3.8'],
         # Peers of the naming benchmark: LASSO, group LASSO, sparse identification of dynamics.
         'naming': ['scikit-learn>=1.5', 'skglm>=0.4', 'pysindy>=2.0'],
         'test': ['pytest>=8', 'pytest-xdist>=3.5', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3',
-                 'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11', 'pandas>=2',
+                 'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11',
                  'axe-playwright-python>=0.1.4',  # accessibility of pages
                  'cosmic-ray>=8.3',  # make mutants
                  'jsonschema>=4',  # ~/status against its schema

@@ -31,7 +31,7 @@ from pprs_dynamics.measurement.files.recording import Recording, read_recording,
 from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.physics.model.model_file import build_model, load_model
-from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
+from pprs_dynamics.simulation.injected_effects import INJECTED_EFFECTS, draw_effect
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / 'docs'
@@ -159,7 +159,7 @@ def benchmark() -> Iterator[ModuleType]:
         yield recordings
 
 
-@pytest.mark.parametrize('name', HIDDEN_EFFECTS)
+@pytest.mark.parametrize('name', INJECTED_EFFECTS)
 def test_no_hidden_effect_is_called_a_mistake(benchmark: ModuleType, name: str) -> None:
     place = benchmark.scene(11, 0.0)
     read = place.plant.readings([draw_effect(name, np.random.default_rng(4), 4.0)])

@@ -77,7 +77,7 @@ def run_of(model: ForceModel, motion: Any, still: Any) -> Run:
                forces.total - rigid)
 
 
-def arm_run(folder: Path, **changes: Any) -> Run:
+def mechanism_run(folder: Path, **changes: Any) -> Run:
     model, moved = arm.real_arm(folder, **changes), arm.motion(DURATION, RATE)
     rest = np.zeros_like(moved.velocity)
     return run_of(model, moved, type(moved)(moved.position, rest, rest, moved.time))
@@ -104,7 +104,7 @@ def axis_run(gravity: float) -> Run:
     return run_of(model, JointMotion(*q, time), JointMotion(q[0], rest, rest, time))
 
 
-MACHINES = {'arm': arm_run, 'platform': lambda folder: platform_run(),
+MACHINES = {'arm': mechanism_run, 'platform': lambda folder: platform_run(),
             'axis': lambda folder: axis_run(0.0), 'upright axis': lambda folder: axis_run(-9.81)}
 
 
@@ -180,7 +180,7 @@ def test_a_motion_that_shows_nothing_tells_nothing(tmp_path: Path) -> None:
 
 
 def test_nothing_is_claimed_of_what_is_no_measurement(tmp_path: Path) -> None:
-    run = arm_run(tmp_path)
+    run = mechanism_run(tmp_path)
     found = diagnose(run.model, [run.of(run.total - run.gravity)])
     assert found.verdict == 'unknown'
     assert found.effects == found.suspects == found.depends_on == ()
@@ -188,7 +188,7 @@ def test_nothing_is_claimed_of_what_is_no_measurement(tmp_path: Path) -> None:
 
 
 def test_effort_kind_says_that_gravity_was_taken_out(tmp_path: Path) -> None:
-    run = arm_run(tmp_path)
+    run = mechanism_run(tmp_path)
     model = build_model({**run.model.values, 'effort_kind': 'without_gravity'}, run.model.source)
     recording = run.of(run.total - run.gravity)
     assert looks_like(model, [recording]) == {}
@@ -198,13 +198,13 @@ def test_effort_kind_says_that_gravity_was_taken_out(tmp_path: Path) -> None:
 
 
 def test_effort_kind_says_that_efforts_are_commands(tmp_path: Path) -> None:
-    run = arm_run(tmp_path)
+    run = mechanism_run(tmp_path)
     model = build_model({**run.model.values, 'effort_kind': 'commanded'}, run.model.source)
     assert kinds_of(looks_like(model, [run.of(run.total)])) == every(run, 'command')
 
 
 def test_effort_kind_says_that_efforts_are_currents(tmp_path: Path) -> None:
-    run = arm_run(tmp_path)
+    run = mechanism_run(tmp_path)
     values = {**run.model.values, 'robot.gain': (2.0, 3.0, 4.0), 'effort_kind': 'current'}
     model = build_model(values, run.model.source)
     write_recording(tmp_path / 'run.csv', run.of(run.total))
@@ -222,7 +222,7 @@ def test_another_kind_is_refused(tmp_path: Path) -> None:
 
 
 def test_commands_stop_or_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run = arm_run(tmp_path)
+    run = mechanism_run(tmp_path)
     write_recording(tmp_path / 'run.csv', run.of(run.total - run.gravity))
     given = [str(tmp_path / 'run.csv'), '--model', str(tmp_path / 'arm.yaml')]
     for command in ('info', 'compare'):

@@ -55,13 +55,7 @@ class Result(ABC):
 
     @abstractmethod
     def table(self) -> DataFrame:
-        """Return the numbers as a table of pandas.
-
-        Raises
-        ------
-        MissingLibraryError
-            Where pandas is not installed.
-        """
+        """Return the numbers as a table of pandas."""
 
     @abstractmethod
     def plot(self) -> Figure:
@@ -106,9 +100,7 @@ class Result(ABC):
 
 def data_frame(rows: Sequence[Mapping[str, Any]], index: Sequence[str] | None = None,
                name: str | None = None) -> DataFrame:
-    """Return rows as a table of pandas, or raise MissingLibraryError."""
-    try:
-        import pandas as pd
-    except ImportError:
-        raise MissingLibraryError('pandas', 'a table', 'notebook') from None
+    """Return rows as a table of pandas."""
+    import pandas as pd
+
     return pd.DataFrame(list(rows), index=None if index is None else pd.Index(index, name=name))

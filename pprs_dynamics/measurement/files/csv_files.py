@@ -3,15 +3,14 @@
 
 """CSV files of any program: with a header or without, packed or not.
 
-Our own have `time`, `<drive>/position`, and optionally `<drive>/velocity`, `<drive>/effort`.
-
-Read by numpy.loadtxt in blocks. 300 000 rows of 19 columns (108 MB) on one core, all exact to the
-last bit: pandas 1.0 s, pyarrow 3.1 s, this 5.7 s. A diagnosis of them takes longer, the first two
-are libraries of 60 and 170 MB, and neither says in which row and column a cell is no number.
+Files of this package have `time`, `<drive>/position`, and optionally `<drive>/velocity` and
+`<drive>/effort`. pandas reads the numbers, exact to the last bit. Only a block that pandas does not
+read is read again row by row, which names the row and the column that are wrong.
 """
 
 from __future__ import annotations
 
+import csv
 import gzip
 import os
 import re
@@ -21,7 +20,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import import_module
-from io import TextIOWrapper
+from io import StringIO, TextIOWrapper
 from itertools import islice
 from pathlib import Path
 from typing import IO, Any, TextIO, cast
@@ -32,13 +31,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
 from pprs_dynamics.measurement.files.samples import QUANTITIES, Progress, Samples
-from pprs_dynamics.system.csv_tables import (
-    LONGEST_LINE,
-    cells_of,
-    check_length,
-    read_lines,
-    write_table,
-)
+from pprs_dynamics.system.csv_tables import write_table
 from pprs_dynamics.system.numbers import parse_number
 from pprs_dynamics.system.plain_text import counted
 
@@ -47,6 +40,8 @@ BLANK = ' '  # where nothing else is between the cells
 REMARKS = ('#', '%', 'sep=')  # lines that may stand above a table
 ZSTANDARD = ('.zst', '.zstd')
 LARGEST_UNPACKED = 2_000_000_000  # bytes
+BLOCK = 4 << 20  # characters read at a time
+NO_NUMBERS = ['', 'nan', 'NaN', 'NAN']
 NO_TEXT = 'neither rosbag2 (MCAP, sqlite3) nor CSV text in UTF-8'
 
 
@@ -94,12 +89,10 @@ class CsvTable:
         """
         separators = tuple(each for each in SEPARATORS if each != decimal)
         with _text_of(path) as (file, _):
-            above, remark, first = 0, '', _line(path, file, 1)
-            while first.startswith(REMARKS) and (line := _line(path, file, above + 2)):
+            above, remark, first = 0, '', file.readline()
+            while first.startswith(REMARKS) and (line := file.readline()):
                 above, remark, first = above + 1, first.lstrip('#% '), line
-            second = _line(path, file, above + 2)
-            while second and not second.strip():
-                second = _line(path, file, above + 2)
+            second = next((line for line in file if line.strip()), '')
         if not first:
             raise UnreadableFileError(path, 'the file is empty')
         if '\x00' in first:
@@ -125,18 +118,24 @@ class CsvTable:
         Raises
         ------
         UnreadableFileError
-            Where a column is missing, a row is none of this table, or a cell is no number.
+            If a column is missing, a row has another count of cells, or a cell is no number.
         """
         used = [self._place(column) for column in wanted]
-        size, blocks = self.path.stat().st_size, []
+        dates = {k for k in used if k < len(self.sample) and self.sample[k].strip()
+                 and not _is_number(self.sample[k], self.decimal) and _is_date(self.sample[k])}
+        size, is_packed = self.path.stat().st_size, self.path.suffix in ('.gz', *ZSTANDARD)
+        blocks, unpacked, row = [], 0, self.above + 1
         with _text_of(self.path) as (file, raw):
             for _ in range(self.above):
                 file.readline()
-            for block in self._blocks(file, used):
-                blocks.append(block)
+            while lines := file.readlines(BLOCK):
+                unpacked += sum(map(len, lines))
+                _check_unpacked(self.path, unpacked if is_packed else 0)
+                blocks.append(self._numbers(lines, row, used, dates))
+                row += len(lines)
                 if progress is not None:
                     progress(min(raw.tell(), size), size)
-        if not blocks:
+        if not sum(map(len, blocks)):
             raise UnreadableFileError(self.path, 'no samples below the header')
         return list(np.concatenate(blocks).T)
 
@@ -173,43 +172,40 @@ class CsvTable:
         """Return what a column is called."""
         return self.names[place] if self.names else str(place + 1)
 
-    def _blocks(self, file: TextIO, used: Sequence[int]) -> Iterator[Array]:
-        """Yield the used columns of the rows, (n, columns used)."""
-        dates = {k for k in used if k < len(self.sample) and self.sample[k].strip()
-                 and not _is_number(self.sample[k], self.decimal) and _is_date(self.sample[k])}
-        is_packed, size = self.path.suffix in ('.gz', *ZSTANDARD), 0
-        for start, lines in read_lines(self.path, file, start=self.above + 1):
-            size += sum(map(len, lines)) + len(lines)
-            _check_unpacked(self.path, size if is_packed else 0)
-            numbered = [(number, line) for number, line in enumerate(lines, start) if line.strip()]
-            if self.separator == BLANK:
-                numbered = [(number, BLANK.join(line.split())) for number, line in numbered]
-            for number, line in numbered:
-                if line.count(self.separator) != self.count - 1:
-                    self._row(number, line)
-            if numbered:
-                yield self._numbers(numbered, used, dates)
-
-    def _numbers(self, numbered: list[tuple[int, str]], used: Sequence[int], dates: set[int],
+    def _numbers(self, lines: list[str], start: int, used: Sequence[int], dates: set[int],
                  ) -> Array:
-        text = _with_empty_cells_named(
-            '\n' + '\n'.join([line for _, line in numbered]), self.separator)
-        if self.decimal != '.':
-            text = text.replace(self.decimal, '.')
-        if not dates:
-            try:
-                rows = np.loadtxt(text[1:].split('\n'), delimiter=self.separator, usecols=used,
-                                  comments=None, ndmin=2, quotechar='"')
-                if len(rows) == len(numbered):
-                    return rows
-            except ValueError:
-                pass
-        # Slow, and seldom: for dates, to name the row or the cell, or to read cells of blanks.
+        """Return the used columns of lines, (n, columns used); blank lines are left out."""
+        import pandas as pd  # takes a third of a second
+
+        numbered = [(number, line) for number, line in enumerate(lines, start) if line.strip()]
+        # pandas fills short rows, and takes a quote without its pair for the beginning of a cell.
+        for number, line in numbered:
+            count = (len(line.split()) if self.separator == BLANK else
+                     line.count(self.separator) + 1)
+            if count != self.count or '"' in line:
+                self._row(number, line)
+        # From pandas 3.1 on, numbers are always exact and the argument is deprecated.
+        exact = ({'float_precision': 'round_trip'}
+                 if tuple(map(int, pd.__version__.split('.')[:2])) < (3, 1) else {})
+        try:
+            frame = pd.read_csv(
+                StringIO(''.join(lines)), header=None, names=range(self.count), usecols=used,
+                sep=r'\s+' if self.separator == BLANK else self.separator, decimal=self.decimal,
+                skipinitialspace=True, keep_default_na=False, na_values=NO_NUMBERS,
+                dtype={k: str if k in dates else float for k in used}, **exact)
+            if len(frame) == len(numbered):
+                for k in dates:
+                    frame[k] = [_seconds_of(date) for date in frame[k].fillna('')]
+                return np.asarray(frame[list(used)], dtype=float)
+        except ValueError:
+            pass
         return np.array([[self._number(number, cells, column, column in dates) for column in used]
-                         for number, line in numbered for cells in [self._row(number, line)]])
+                         for number, line in numbered for cells in [self._row(number, line)]]
+                        ).reshape(-1, len(used))
 
     def _row(self, number: int, line: str) -> list[str]:
-        cells = cells_of(self.path, number, line, self.separator)
+        """Return the cells of a row, or raise UnreadableFileError if it is none of this table."""
+        cells = _cells(self.path, number, line, self.separator)
         if len(cells) == self.count:
             return cells
         raise UnreadableFileError(
@@ -217,10 +213,10 @@ class CsvTable:
             f'{"header" if self.names else "first"} {self.count}: it is truncated or not a table')
 
     def _number(self, line: int, cells: Sequence[str], column: int, is_date: bool) -> float:
-        cell = cells[column].strip()
+        cell = cells[column]
         try:
             if is_date:
-                return _seconds_of(cell) if cell else float('nan')
+                return _seconds_of(cell)
             return parse_number(cell.replace(self.decimal, '.')) if cell else float('nan')
         except ValueError:
             comma = (' (a decimal comma: write columns: {decimal: ","} in the model file)'
@@ -230,17 +226,18 @@ class CsvTable:
                 f'holds {cell[:40]!r}{comma}') from None
 
 
-def _line(path: Path, file: TextIO, number: int) -> str:
-    line = file.readline(LONGEST_LINE + 1)
-    check_length(path, number, line)
-    return line
-
-
 def _cells(path: Path, number: int, line: str, separator: str) -> list[str]:
-    line = line.rstrip('\n')
-    if separator == BLANK:
-        line = BLANK.join(line.split())
-    return [cell.strip() for cell in cells_of(path, number, line, separator)]
+    """Return the cells of a row, which ends where its line does."""
+    line = BLANK.join(line.split()) if separator == BLANK else line.rstrip('\n')
+    try:
+        # The reader takes the second line into a cell if a quote is left open.
+        cells, *following = csv.reader([f'{line}\n', 'following'], delimiter=separator)
+    except csv.Error as error:
+        raise UnreadableFileError(path, f'row {number} is no row of a table: {error}') from None
+    if not following:
+        raise UnreadableFileError(
+            path, f'row {number} has a quote (") without its pair, so its end is unknown')
+    return [cell.strip() for cell in cells]
 
 
 def _is_number(cell: str, decimal: str) -> bool:
@@ -264,7 +261,9 @@ def _is_value(cell: str, decimal: str) -> bool:
 
 
 def _seconds_of(date: str) -> float:
-    """Return seconds since 1970 of an ISO 8601 date, UTC where it does not say otherwise."""
+    """Return seconds since 1970 of an ISO 8601 date, UTC if it has no zone; NaN if it is empty."""
+    if not date:
+        return float('nan')
     moment = datetime.fromisoformat(date.strip().replace(',', '.'))
     return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
@@ -330,17 +329,3 @@ def write_csv(path: Path, samples: Samples) -> None:
     quantities += samples.channels.items()
     header = ['time', *(f'{drive}/{name}' for name, _ in quantities for drive in samples.drives)]
     write_table(path, header, [samples.time, *(values for _, values in quantities)])
-
-
-def _with_empty_cells_named(text: str, separator: str) -> str:
-    """Return lines, after a first newline, with nan in cells of no character."""
-    # Plain searches: a regular expression for the same takes as long as reading the numbers.
-    if '\n' + separator in text:
-        text = text.replace('\n' + separator, '\nnan' + separator)
-    if separator + '\n' in text or text.endswith(separator):
-        text = (text + '\n').replace(separator + '\n', separator + 'nan\n')[:-1]
-    if separator * 2 in text:
-        # Twice: of three separators in a row the first replacement sees only one pair.
-        for _ in range(2):
-            text = text.replace(separator * 2, separator + 'nan' + separator)
-    return text

@@ -44,7 +44,7 @@ def read_poses(path: str | PathLike[str], rate: float | None = None) -> Platform
     MotionError
         Where the poses are no motion: non-finite, off unit length, times not increasing.
     """
-    rows = [(line, row) for line, row in read_rows(path) if any(cell.strip() for cell in row)]
+    rows = read_rows(path)
     header = [cell.strip() for cell in rows[0][1]] if rows else []
     columns = _columns(path, header)
     if len(rows) == 1:
