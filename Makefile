@@ -125,7 +125,7 @@ decisions: $(VENV)/.test
 	$(BIN)/python -m benchmarks.scores.decisions
 
 mutants: $(VENV)/.test
-	$(BIN)/python benchmarks/mutants.py --json output/mutants.json
+	$(BIN)/python -m benchmarks.mutants --json output/mutants.json
 
 workbench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.speed.workbench 30 docs/images/workbench.png

@@ -6,7 +6,7 @@
 Of every module a fixed sample of mutants is tried, each in a copy of the sources, against that
 module's focused tests alone. Compiled kernels are run uncompiled: each mutant would compile anew.
 
-    python benchmarks/mutants.py [MODULE ...] [--count 12] [--json output/mutants.json]
+    python -m benchmarks.mutants [MODULE ...] [--count 8] [--json output/mutants.json]
 """
 
 from __future__ import annotations
@@ -30,16 +30,19 @@ from cosmic_ray.testing import run_tests
 from cosmic_ray.work_db import WorkDB, use_db
 from cosmic_ray.work_item import MutationSpec, TestOutcome, WorkerOutcome
 
+from benchmarks.results import write_results
+
 ROOT = Path(__file__).parents[1]
 COPIED = ('pprs_dynamics', 'config', 'test', 'benchmarks', 'demo', 'docs')
 SEED = 25  # of the sample
-COUNT = 12  # mutants of a module
+COUNT = 8  # mutants of a module
 TIMEOUT = 240.0  # [s] for the tests of a mutant; one that hangs them is killed
 # Substitutes that no hand would write and any test would see: they would only flatter the share.
 CHEAP = ('LShift', 'RShift', 'BitAnd', 'BitOr', 'BitXor', '_Invert', 'USub_Not', 'RemoveDecorator')
 # No module of these is imported by pytest before a test asks for it.
 UNCOMPILED = "import sys\nsys.modules['numba'] = None\n"
 
+SEARCH = ('inference/test_invariants_of_diagnosis.py', 'inference/test_search.py')
 # Where a mistake would give wrong forces or verdicts, and the tests that are to see it.
 TESTS = {
     'physics/three_pprs/inverse_kinematics.py': ('physics/test_kinematics.py',),
@@ -50,12 +53,15 @@ TESTS = {
     'physics/model/limits.py': ('physics/test_limits.py',),
     'physics/model/ledger.py': ('physics/test_ledger.py',),
     'inference/residuals/noise.py': ('inference/test_noise.py',),
-    'inference/search/held_out.py': ('inference/test_gates.py',),
     'inference/regression/joint_fit.py': ('inference/test_joint_fit.py',
                                           'inference/test_noise.py'),
     'inference/regression/normal_equations.py': ('inference/test_joint_fit.py',),
+    'inference/search/search.py': SEARCH,
+    'inference/search/fitted_sets.py': SEARCH,
+    'inference/search/ranking.py': SEARCH,
+    'inference/search/cost_terms.py': (*SEARCH, 'inference/test_prior_costs.py'),
+    'inference/search/held_out.py': ('inference/test_gates.py', *SEARCH),
     'inference/search/model_discrepancy.py': ('inference/test_gates.py',),
-    'inference/search/search.py': ('inference/test_search.py',),
     'inference/adoption/objections.py': ('inference/test_gates.py',),
     'ros/force_command.py': ('ros/test_force_command.py',),
     'ros/messages/measured_states.py': ('ros/test_measured_states.py',),
@@ -67,6 +73,10 @@ TESTS = {
     'app/workbench/server/change_log.py': ('app/test_change_log.py',),
     'app/workbench/server/access.py': ('app/test_workbench_safety.py',),
 }
+# The search decides all verdicts: more of it than COUNT, 40 mutants together.
+MORE = {'inference/search/search.py': 10, 'inference/search/fitted_sets.py': 10,
+        'inference/search/ranking.py': 10, 'inference/search/cost_terms.py': 4,
+        'inference/search/held_out.py': 6}
 
 
 @dataclass(frozen=True)
@@ -94,7 +104,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Print a table of what was killed, and every mutant that survived."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('modules', nargs='*', metavar='MODULE', help='by default all')
-    parser.add_argument('--count', type=int, default=COUNT, help='mutants of a module')
+    parser.add_argument('--count', type=int,
+                        help=f'mutants of a module; by default {COUNT}, of the search more')
     parser.add_argument('--workers', type=int, default=1, help='modules at a time')
     parser.add_argument('--json', type=Path, help='file for every mutant')
     options = parser.parse_args(arguments)
@@ -102,17 +113,31 @@ def main(arguments: Sequence[str] | None = None) -> None:
                if not options.modules or any(part in name for part in options.modules)]
     found: list[Mutant] = []
     with ThreadPoolExecutor(options.workers) as pool:
-        for mutants in pool.map(lambda name: list(_tried(name, options.count)), modules):
+        for mutants in pool.map(lambda name: list(_tried(
+                name, options.count or MORE.get(name, COUNT))), modules):
             found += mutants
             print(_row(mutants), flush=True)
             if options.json:
                 options.json.parent.mkdir(parents=True, exist_ok=True)
                 options.json.write_text(json.dumps([asdict(one) for one in found], indent=1))
-    killed = sum(one.outcome != 'survived' for one in found)
-    print(f'{killed} of {len(found)} killed')
-    for one in found:
-        if one.outcome == 'survived':
-            print(f'\n{one.module}:{one.line} {one.function} ({one.operator})\n{one.change}')
+    page = report(found)
+    print(page)
+    if not options.modules:
+        write_results('mutants', 'Mutants', 'make mutants', page)
+
+
+def report(mutants: Sequence[Mutant]) -> str:
+    """Return a table of modules, and each mutant that no test saw."""
+    rows = ['| module | killed | of |', '|---|---|---|']
+    for module in dict.fromkeys(one.module for one in mutants):
+        outcomes = [one.outcome for one in mutants if one.module == module]
+        rows.append(f'| `{module}` | {len(outcomes) - outcomes.count("survived")} '
+                    f'| {len(outcomes)} |')
+    survived = [one for one in mutants if one.outcome == 'survived']
+    rows.append(f'| all | {len(mutants) - len(survived)} | {len(mutants)} |')
+    return '\n'.join(rows) + ''.join(
+        f'\n\n`{one.module}` line {one.line}, {one.function} ({one.operator}):\n\n'
+        f'```diff\n{one.change}\n```' for one in survived)
 
 
 def _row(mutants: Sequence[Mutant]) -> str:
@@ -134,7 +159,8 @@ def _tried(module: str, count: int) -> Iterator[Mutant]:
             '', 'test', 'test/support', 'demo', 'benchmarks'))
         # From the copy's folder: `python -m` finds modules there before all others.
         command = (f'env -C {copy} PYTHONPATH={sources} OPENBLAS_NUM_THREADS=1 {sys.executable} '
-                   f'-m pytest -x -q -p uncompiled -p no:cacheprovider --rootdir {copy} '
+                   '-m pytest -x -q -m "not slow" -p uncompiled -p no:cacheprovider '
+                   f'--rootdir {copy} '
                    f'{" ".join(tests)}')
         outcome, output = run_tests(command, TIMEOUT)
         if outcome is not TestOutcome.SURVIVED:

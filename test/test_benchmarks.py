@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import mutants
+
 PROJECT = Path(__file__).parents[1]
 MODULES = sorted('.'.join(file.relative_to(PROJECT).with_suffix('').parts)
                  for file in (PROJECT / 'benchmarks').rglob('*.py') if file.stem != '__init__')
@@ -27,6 +29,14 @@ def test_a_benchmark_imports_what_there_is(name: str) -> None:
 def test_what_make_runs_is_there() -> None:
     assert len(RUN_BY_MAKE) > 8
     assert set(RUN_BY_MAKE) <= set(MODULES)
+
+
+def test_mutants_are_of_modules_and_for_tests_that_there_are() -> None:
+    for module, tests in mutants.TESTS.items():
+        assert (PROJECT / 'pprs_dynamics' / module).is_file()
+        assert all((PROJECT / 'test' / name).is_file() for name in tests)
+    assert sum(mutants.MORE.values()) == 40
+    assert set(mutants.MORE) <= set(mutants.TESTS)
 
 
 def test_a_score_tells_its_options_and_where_its_outcomes_go() -> None:

@@ -80,29 +80,6 @@ def test_the_curves_leave_a_gap_where_the_second_approach_is_not_defined(reprodu
     np.testing.assert_allclose(rms, [3.43, 3.93, 3.93, 13.41, 13.41, 13.41], atol=0.005)
 
 
-MISTAKES = {
-    ('reproduce',): '--output',
-    ('compute',): 'compute',
-    ('reproduce', '--output', '/dev/null/below'): '/dev/null/below: cannot be a folder',
-    ('reproduce', '--output', '{tmp}', '--model', 'nowhere.yaml'): 'nowhere.yaml: no such file',
-    ('reproduce', '--output', '{tmp}', '--json', '{tmp}/no/x.json'): 'no/x.json: cannot be written',
-    # What would be taken and not minded.
-    ('workbench', '--json', '{tmp}/x.json'): '--json',
-    ('history', 'model.yaml', '--model', 'other.yaml'): '--model',
-    ('trend', 'store', '--model', 'other.yaml'): '--model',
-}
-
-
-@pytest.mark.parametrize('arguments', MISTAKES, ids=' '.join)
-def test_a_mistake_is_one_line_and_status_2(tmp_path: Path, arguments: tuple[str, ...]) -> None:
-    done = pprs(*(word.replace('{tmp}', str(tmp_path)) for word in arguments), cwd=tmp_path)
-    assert done.returncode == 2
-    assert MISTAKES[arguments] in done.stderr
-    assert 'Traceback' not in done.stderr
-    assert len(done.stderr.splitlines()) == 1
-    assert done.stderr.startswith('pprs')
-
-
 def test_a_file_that_cannot_be_written_leaves_the_old_one_whole(tmp_path: Path) -> None:
     old = tmp_path / 'result.json'
     write_text(old, 'old')

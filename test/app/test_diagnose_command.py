@@ -25,7 +25,7 @@ from pprs_dynamics import DriveModel, __version__
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.simulation.hidden_effects import draw_effect
+from pprs_dynamics.simulation.injected_effects import draw_effect
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 HIDDEN, RATE = 'coulomb_friction', 250.0
@@ -148,35 +148,6 @@ def test_the_effect_that_is_named_is_adopted(folder: Path) -> None:
                 'adopted.yaml', cwd=folder)
     assert done.returncode == 0, done.stderr
     assert len(done.stdout.strip().splitlines()) <= 25
-
-
-MISTAKES = {
-    ('run.csv', '--validate', 'run.csv'): 'what is held out must be another recording',
-    ('run.csv', '--adopt-all'): '--adopt-all: no --output FILE is given',
-    ('run.csv', '--output', 'x.yaml'): '--output: it is given without --adopt-all',
-    ('run.csv', '--adopt-all', '--output', 'x.yaml', '--refit', '--reference'):
-        '--refit: it is given with --reference',
-    ('nowhere.csv',): 'nowhere.csv: No such file',
-    ('run.csv', '--model', 'nowhere.yaml'): 'nowhere.yaml: no such file',
-    ('empty.csv',): 'empty.csv: ',
-}
-
-
-@pytest.mark.parametrize('arguments', MISTAKES, ids=' '.join)
-def test_a_mistake_is_one_line_and_status_2(folder: Path, arguments: tuple[str, ...]) -> None:
-    (folder / 'empty.csv').write_text('')
-    done = pprs('diagnose', *arguments, cwd=folder)
-    assert done.returncode == 2
-    assert done.stderr.startswith('pprs diagnose: ')
-    assert MISTAKES[arguments] in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
-    assert not (folder / 'x.yaml').exists()
-
-
-def test_no_recording_is_a_mistake_too() -> None:
-    done = pprs('diagnose')
-    assert done.returncode == 2
-    assert 'RECORDING' in done.stderr
 
 
 @needs_browser

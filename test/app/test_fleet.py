@@ -11,7 +11,6 @@ import re
 import signal
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas
@@ -187,21 +186,6 @@ def test_auto_diagnoses_and_an_effect_that_is_not_found_is_0(
     value, = rows[rows.effect == 'coulomb_friction'].value
     assert sorted(trend.value) == [0.0, value]
     assert abs(value - 6.0) < 0.5
-
-
-@pytest.mark.parametrize('options', [
-    [], ['x.csv', '--manifest', 'y.csv'], ['--manifest', 'missing.csv'],
-    ['x.csv', '--effects', 'no_such_effect'], ['x.csv', '--workers', '0'],
-    ['test/conftest.py', '--scheduler', 'nowhere', '--effects', EFFECTS]])
-def test_impossible_requests_are_one_line_and_status_2(
-        tmp_path: Path, options: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    try:
-        status: Any = main(['survey', *options, '--model', MODEL,
-                            '--output', str(tmp_path / 's')])
-    except SystemExit as end:
-        status = end.code
-    assert status == 2
-    assert len(capsys.readouterr().err.strip().splitlines()) == 1
 
 
 def test_other_parquet_files_are_no_store(tmp_path: Path) -> None:

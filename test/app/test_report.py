@@ -9,13 +9,12 @@ import io
 import json
 import re
 from pathlib import Path
-from typing import Any
 
 import matplotlib.image
 import numpy as np
 import pytest
 from browser import Seen, chromium, needs_browser
-from pprs_command import pprs
+from pprs_command import pprs, simulate_into
 from rich.console import Console
 from rich.progress import Progress
 
@@ -34,10 +33,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('compare')
     # A name that would be a script where it is not escaped.
     run = folder / '<script>alert(1)</script>.mcap'.replace('/', '')
-    done = pprs('simulate', '--output', run, '--effect', 'coulomb_friction', '--seed', '11',
-                '--duration', '15', '--json', folder / 'truth.json', '--report',
-                folder / 'robot.html')
-    assert done.returncode == 0, done.stderr
+    simulate_into(folder, '--output', run.name, '--effect', 'coulomb_friction', '--seed', '11',
+                  '--duration', '15', '--json', 'truth.json')
     done = pprs('compare', run, '--json', folder / 'mcap.json', '--report', folder / 'page.html')
     assert done.returncode == 0, done.stderr
     (folder / 'stdout.txt').write_text(done.stdout)
@@ -92,17 +89,6 @@ def test_info_says_what_is_in_a_file_and_what_is_wrong_with_it(folder: Path) -> 
     assert '1 gap' in done.stdout
 
 
-@pytest.mark.parametrize('content', [b'', b'time,a\n1,2\n', bytes(range(256)) * 20])
-def test_a_foreign_file_is_one_line_and_status_2(tmp_path: Path, content: bytes) -> None:
-    file = tmp_path / 'x.csv'
-    file.write_bytes(content)
-    for command in ('compare', 'info'):
-        done = pprs(command, file)
-        assert done.returncode == 2
-        assert done.stderr.startswith(f'pprs {command}: {file}: ')
-        assert len(done.stderr.strip().splitlines()) == 1
-
-
 def test_the_page_needs_no_network_and_escapes_names(folder: Path) -> None:
     text = (folder / 'page.html').read_text()
     assert not re.search(r'<(script|link|img)[^>]+(src|href)=', text)
@@ -111,12 +97,9 @@ def test_the_page_needs_no_network_and_escapes_names(folder: Path) -> None:
 
 
 @needs_browser
-@pytest.mark.parametrize('name', ['page.html', 'robot.html'])
-def test_a_browser_draws_the_page_without_complaints(
-    folder: Path, tmp_path: Path, name: str,
-) -> None:
+def test_a_browser_draws_the_page_without_complaints(folder: Path, tmp_path: Path) -> None:
     with chromium() as browser:
-        seen = Seen(browser, folder / name, viewport={'width': 1280, 'height': 1600})
+        seen = Seen(browser, folder / 'page.html', viewport={'width': 1280, 'height': 1600})
         assert seen.unfold() >= 1
         assert seen.complaints == []
         seen.tab.evaluate('scrollTo(0, 0)')
@@ -130,16 +113,13 @@ def test_a_browser_draws_the_page_without_complaints(
 
 
 def test_a_progress_bar_never_goes_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    shown: list[tuple[Any, float]] = []
-    monkeypatch.setattr(Progress, 'update', lambda self, task, completed: shown.append(
-        (task, completed)))
+    shown: list[float] = []
+    monkeypatch.setattr(Progress, 'update', lambda self, task, completed: shown.append(completed))
     with staged_bar(Console(file=io.StringIO())) as advance:
         for stage, share in (('diagnosing', 0.1), ('diagnosing', 0.6), ('diagnosing', 0.4),
                              ('adopting', 0.2), ('adopting', 0.1)):
             advance(stage, share)
-    first, second = shown[0][0], shown[-1][0]
-    assert shown == [(first, 0.1), (first, 0.6), (first, 0.6), (second, 0.2), (second, 0.2)]
-    assert first != second
+    assert shown == [0.1, 0.6, 0.6, 0.2, 0.2]
 
 
 def test_curves_of_a_figure_share_their_samples_and_keep_every_peak() -> None:

@@ -211,61 +211,6 @@ def test_a_model_file_of_an_undecodable_name(folder: Path) -> None:
     assert done.stderr.startswith(b'pprs info: none\\xfe.yaml: no such file')
 
 
-def test_an_unknown_effect_is_one_line(folder: Path) -> None:
-    for name in ('nonsense', 'viscous_frictoin', '[/]'):
-        done = process(folder, 'adopt', name, 'run.csv', '--output', 'x.yaml')
-        assert done.returncode == 2
-        assert done.stderr.count(b'\n') == 1
-        assert b'unknown effect' in done.stderr
-
-
-OUTPUTS = {
-    ('simulate', '--output', 'x.txt'): '.csv, .mcap, .db3',
-    ('simulate', '--output', 'x.CSV'): '.csv, .mcap, .db3',
-    ('adopt', 'viscous_friction', 'run.csv', '--output', 'x.csv'): '.yaml or .yml',
-    ('diagnose', 'run.csv', '--adopt-all', '--output', 'x'): '.yaml or .yml',
-    ('history', 'model.yaml', '--undo', '--output', 'x.json'): '.yaml or .yml',
-    ('history', 'model.yaml', '--report', 'x.svg'): '.html',
-    ('next-experiment', 'run.csv', '--output', 'x.yaml'): '.csv',
-    ('compare', 'run.csv', '--report', 'x.txt'): '.html',
-    ('info', 'run.csv', '--json', 'x.txt'): '.json'}
-
-
-@pytest.mark.parametrize('arguments', OUTPUTS, ids=' '.join)
-def test_unknown_endings_of_outputs_are_refused_with_those_that_are_known(
-    folder: Path, arguments: tuple[str, ...],
-) -> None:
-    before = set(folder.iterdir())
-    done = process(folder, *arguments)
-    assert done.returncode == 2
-    last = done.stderr.decode().splitlines()[-1]
-    assert f'must end in {OUTPUTS[arguments]}' in last
-    assert set(folder.iterdir()) == before
-
-
-NUMBERS = {
-    'simulate': {'--seed': ('-1', '9' * 5000, '1.5', '²'), '--path-seed': ('-1', '9' * 40),
-                 '--duration': ('0', '1e9', 'inf', 'x'), '--noise': ('-1', '1e9')},
-    'next-experiment': {'--seed': ('-1', '9' * 40)}}
-
-
-@pytest.mark.parametrize('command', NUMBERS)
-def test_every_number_has_bounds_and_a_sentence(
-    command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path,
-) -> None:
-    from pprs_dynamics.app.commands.pprs import main
-
-    for option, values in NUMBERS[command].items():
-        for value in values:
-            with pytest.raises(SystemExit) as ended:
-                main([command, '--output', str(tmp_path / 'x.csv'), option, value])
-            assert ended.value.code == 2
-            last = capsys.readouterr().err.splitlines()[-1]
-            assert f'argument {option}: ' in last
-            assert ' must ' in last
-            assert len(last) < 200
-
-
 @pytest.mark.parametrize('place', [('info', '{}.csv'), ('info', 'a.csv', '--model', '{}.yaml'),
                                    ('simulate', '--output', '{}.csv'), ('info', '--topic={}')])
 def test_a_name_that_would_fill_the_screen_is_shortened(

@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pprs_command import pprs
 from workbench_bench import write_hidden
 from workbench_server import workbench
 
@@ -112,20 +111,6 @@ def test_ctrl_c_during_a_diagnosis_ends_it_in_a_line(folder: Path) -> None:
         os.killpg(bench.process.pid, signal.SIGINT)
         assert bench.process.wait(60) == 128 + signal.SIGINT
     assert (folder / 'workbench.log').read_text() == 'pprs workbench: interrupted\n'
-
-
-def test_mistakes_of_usage_are_one_line_before_anything_is_served(tmp_path: Path) -> None:
-    bad = tmp_path / 'bad.csv'
-    bad.write_text('time,\n1,2\n')
-    for arguments, told in ((('--port', '99999'), '--port'), (('nothing.csv',), 'nothing.csv'),
-                            (('--model', 'no.yaml'), 'no.yaml'), ((str(bad),), 'bad.csv'),
-                            ((str(bad), str(bad)), 'twice'),
-                            (('--host', '0.0.0.0'), 'one address')):
-        done = pprs('workbench', '--no-browser', *arguments)
-        assert done.returncode == 2, arguments
-        assert done.stdout == ''
-        assert done.stderr.count('\n') == 1
-        assert told in done.stderr
 
 
 def test_a_single_axis_has_the_same_session(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ import pytest
 from node_bench import bench
 from pprs_command import pprs
 from ros_processes import environment, executable, node_process
-from short_recordings import short_recordings
+from short_recordings import hidden_friction, short_recordings
 
 from benchmarks.scores import adoption
 from pprs_dynamics import DriveModel, PlatformMotion
@@ -68,10 +68,10 @@ def score() -> Iterator[ModuleType]:
 
 
 @pytest.fixture(scope='module')
-def files(score: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Files:
+def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
     folder = tmp_path_factory.mktemp('adopt')
-    robot = score.Robot(score.Case('effects', (HIDDEN,), 7, 3.0, width=1.0))
-    recordings = robot.recordings()
+    robot = hidden_friction()
+    recordings = robot.recordings
     for recording in recordings:
         write_recording(folder / f'{recording.name}.csv', recording)
     model, new = folder / 'model.yaml', folder / 'new.yaml'
@@ -80,9 +80,8 @@ def files(score: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Files:
                 '--model', model, '--output', new, '--json', folder / 'answer.json',
                 '--report', folder / 'page.html')
     assert done.returncode == 0, done.stdout + done.stderr
-    robot.effects = []
-    return Files(folder, model, folder / 'first.csv', folder / 'second.csv',
-                 robot.recordings()[1], new, json.loads((folder / 'answer.json').read_text()),
+    return Files(folder, model, folder / 'first.csv', folder / 'second.csv', robot.healthy[1],
+                 new, json.loads((folder / 'answer.json').read_text()),
                  done.stdout, recordings, diagnose(robot.model, recordings[:1]))
 
 
@@ -231,30 +230,6 @@ def test_where_nothing_is_missing_nothing_is_added() -> None:
     answer = adopt(model, EffectRequest.of('platform_inertia'), [recording])
     assert not answer.adopted
     assert 'do not call for platform_inertia' in answer.reason
-
-
-MISTAKES = {
-    ('coulomb_frictoin', '{first}', '--output', '{tmp}/x.yaml'): 'did you mean coulomb_friction',
-    ('coulomb_friction:lift_7', '{first}', '--output', '{tmp}/x.yaml'): "unknown drive 'lift_7'",
-    ('payload_mass:lift_1', '{first}', '--output', '{tmp}/x.yaml'): 'must stand alone',
-    ('payload_mass', '{first}', '--output', '{model}'): '--output and the model at once',
-    ('payload_mass', '{first}', '--output', '{tmp}/none/x.yaml'): 'its folder does not exist',
-    ('payload_mass', '{first}', '--validate', '{first}', '--output', '{tmp}/x.yaml'):
-        'what is held out must be another recording',
-    ('payload_mass', '{tmp}/none.csv', '--output', '{tmp}/x.yaml'): 'No such file',
-}
-
-
-@pytest.mark.parametrize('arguments', MISTAKES, ids=' '.join)
-def test_a_mistake_is_one_line_and_status_2(
-    files: Files, tmp_path: Path, arguments: tuple[str, ...],
-) -> None:
-    done = pprs('adopt', '--model', files.model, *(
-        word.format(first=files.first, model=files.model, tmp=tmp_path) for word in arguments))
-    assert done.returncode == 2
-    assert MISTAKES[arguments] in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize('damage', ['cut', 'binary', 'value', 'ledger'])

@@ -427,19 +427,3 @@ def test_commission_writes_poses_json_and_page(tmp_path: Path) -> None:
     page = (tmp_path / 'first.html').read_text()
     assert 'The next experiment' in page
     assert 'http' not in page.split('plotly')[0]
-
-
-@pytest.mark.parametrize(('arguments', 'sentence'), [
-    (('--output', 'a.csv'), 'no recording is given'),
-    (('--purpose', 'commission', '--output', 'a.csv', '--duration', '1'),
-     "argument --duration: '1' must lie between 5 and 120 s"),
-    (('--purpose', 'commission', '--output', 'a.csv', '--margin', '0.95'), 'margin'),
-    (('--purpose', 'commission', '--output', 'no/folder.csv', '--duration', '5'), 'no/folder.csv'),
-])
-def test_mistakes_are_told_in_one_line(
-    tmp_path: Path, arguments: tuple[str, ...], sentence: str,
-) -> None:
-    done = pprs('next-experiment', *arguments, cwd=tmp_path)
-    assert done.returncode == 2
-    assert sentence in done.stderr
-    assert len(done.stderr.splitlines()) == 1

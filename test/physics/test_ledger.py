@@ -154,29 +154,6 @@ def test_the_command_shows_draws_and_takes_back(
     assert old.read_bytes() == content
 
 
-MISTAKES = {
-    ('--undo',): 'be given with --undo, and only then',
-    ('--output', 'x.yaml'): 'be given with --undo, and only then',
-    ('--undo', '--output', '{file}'): '--output and the model at once, must be another file',
-    ('--undo', '--output', '{folder}/none/x.yaml'): 'its folder does not exist',
-    ('--undo', '--output', '{folder}'): 'it is a folder',
-    ('--report', 'x.pdf'): 'end in .html',
-}
-
-
-@pytest.mark.parametrize('options', MISTAKES, ids=' '.join)
-def test_a_mistake_is_one_line_and_status_2(
-    stages: list[dict[str, Any]], tmp_path: Path, options: tuple[str, ...],
-) -> None:
-    file = tmp_path / 'model.yaml'
-    write_model(file, stages[1])
-    done = pprs('history', str(file), *(
-        word.format(file=file, folder=tmp_path) for word in options))
-    assert done.returncode == 2
-    assert MISTAKES[options] in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
-
-
 OLD = Path(__file__).parents[2] / 'config/paper.yaml'
 
 

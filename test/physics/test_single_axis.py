@@ -269,17 +269,6 @@ def test_nothing_is_missing_where_nothing_is(folder: Path) -> None:
     assert (found['verdict'], found['effects']) == ('adequate', [])
 
 
-@pytest.mark.parametrize('arguments', [
-    ('adopt', 'payload_mass', 'run.csv', '--output', 'x.yaml'),
-    ('adopt', 'homing_error', 'run.csv', '--output', 'x.yaml'),
-    ('simulate', '--output', 'x.csv'), ('reproduce', '--output', 'x')])
-def test_what_an_axis_cannot_do_is_one_line(folder: Path, arguments: tuple[str, ...]) -> None:
-    done = pprs(*arguments, '--model', 'axis.yaml', cwd=folder)
-    assert done.returncode == 2
-    assert len(done.stderr.strip().splitlines()) == 1
-    assert 'single axis' in done.stderr
-
-
 @pytest.mark.parametrize('node', ['feedforward', 'monitor', 'simulated_robot'])
 def test_a_node_refuses_an_axis_in_one_sentence(node: str, ros_domain: int) -> None:
     done = subprocess.run(

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -23,10 +22,9 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
-from short_recordings import short_recordings
+from short_recordings import hidden_friction
 from std_msgs.msg import Float64MultiArray
 
-from benchmarks.scores import adoption
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.request import EffectRequest
@@ -52,9 +50,9 @@ PATIENCE = 90.0  # [s], on a busy machine, where a node's first answer may take 
 class Robot:
     """What was recorded, the model before and after, and the noise."""
 
-    def __init__(self, score: ModuleType, folder: Path) -> None:
-        robot = score.Robot(score.Case('effects', (HIDDEN,), 7, 3.0, width=1.0))
-        first, self.replayed = robot.recordings()
+    def __init__(self, folder: Path) -> None:
+        robot = hidden_friction()
+        first, self.replayed = robot.recordings
         answer = adopt(robot.model, EffectRequest.of(HIDDEN), [first])
         assert answer.adopted, answer.reason
         self.noise = robot.noise
@@ -64,9 +62,8 @@ class Robot:
 
 
 @pytest.fixture(scope='module')
-def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
-    with short_recordings(15.0):
-        yield Robot(adoption, tmp_path_factory.mktemp('live'))
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    return Robot(tmp_path_factory.mktemp('live'))
 
 
 class Live:

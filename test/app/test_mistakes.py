@@ -1,0 +1,108 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""A mistake of usage is one line that names it and status 2, for every command, and no file."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from made_up_recordings import judged, measured
+from pprs_command import pprs
+
+from pprs_dynamics.app.commands.pprs import COMMANDS
+from pprs_dynamics.measurement.files.recording import write_recording
+
+CONFIG = Path(__file__).parents[2] / 'config'
+TWICE = 'what is held out must be another recording'
+ENDS = 'must end in '
+# Words of the command line, and a part of the line that names what is wrong.
+MISTAKES = {
+    'adopt coulomb_frictoin run.csv --output x.yaml': 'did you mean coulomb_friction',
+    'adopt coulomb_friction:lift_7 run.csv --output x.yaml': "unknown drive 'lift_7'",
+    'adopt payload_mass:lift_1 run.csv --output x.yaml': 'must stand alone',
+    'adopt payload_mass run.csv --model model.yaml --output model.yaml':
+        '--output and the model at once',
+    'adopt payload_mass run.csv --output none/x.yaml': 'its folder does not exist',
+    'adopt payload_mass run.csv --validate run.csv --output x.yaml': TWICE,
+    'adopt payload_mass none.csv --output x.yaml': 'No such file',
+    'adopt viscous_friction run.csv --output x.csv': ENDS + '.yaml or .yml',
+    'adopt payload_mass run.csv --model axis.yaml --output x.yaml': 'single axis',
+    'compare empty.csv': 'empty.csv: ',
+    'compare short.csv': 'short.csv: ',
+    'compare binary.csv': 'binary.csv: ',
+    'compare run.csv --report x.txt': ENDS + '.html',
+    'diagnose': 'RECORDING',
+    'diagnose run.csv --validate run.csv': TWICE,
+    'diagnose run.csv --adopt-all': '--adopt-all: no --output FILE is given',
+    'diagnose run.csv --output x.yaml': '--output: it is given without --adopt-all',
+    'diagnose run.csv --adopt-all --output x.yaml --refit --reference':
+        '--refit: it is given with --reference',
+    'diagnose run.csv --adopt-all --output x': ENDS + '.yaml or .yml',
+    'diagnose nowhere.csv': 'nowhere.csv: No such file',
+    'diagnose run.csv --model nowhere.yaml': 'nowhere.yaml: no such file',
+    'export --output x.txt --model model.yaml': ENDS,
+    'fit nowhere.csv --output x.yaml': 'nowhere.csv: No such file',
+    'history model.yaml --undo': 'be given with --undo, and only then',
+    'history model.yaml --output x.yaml': 'be given with --undo, and only then',
+    'history model.yaml --undo --output model.yaml': 'must be another file',
+    'history model.yaml --undo --output none/x.yaml': 'its folder does not exist',
+    'history model.yaml --undo --output .': 'it is a folder',
+    'history model.yaml --report x.pdf': ENDS + '.html',
+    'history model.yaml --model other.yaml': '--model',
+    'info run.csv --json x.txt': ENDS + '.json',
+    'info binary.csv': 'binary.csv: ',
+    'init nowhere.urdf run.csv --output x.yaml': 'nowhere.urdf',
+    'next-experiment --output x.csv': 'no recording is given',
+    'next-experiment --purpose commission --output none/x.csv': 'none/x.csv',
+    'next-experiment run.csv --output x.yaml': ENDS + '.csv',
+    'reproduce': '--output',
+    'reproduce --output /dev/null/below': '/dev/null/below: cannot be a folder',
+    'reproduce --output x --model axis.yaml': 'single axis',
+    'simulate --output x.txt': ENDS + '.csv, .mcap, .db3',
+    'simulate --output x.csv --noise -1': 'argument --noise: ',
+    'simulate --output x.csv --path-seed -1': 'argument --path-seed: ',
+    'simulate --output x.csv --seed 1.5': "'1.5' must be a whole number",
+    'simulate --output x.csv --duration inf': "'inf' must lie between",
+    'simulate --output x.csv --model axis.yaml': 'single axis',
+    'survey run.csv --output x --effects no_such_effect': 'no_such_effect',
+    'survey run.csv --output x --manifest y.csv': '--manifest',
+    'survey run.csv --output x --workers 0': '--workers',
+    'trend nowhere': 'nowhere',
+    'trend store --model other.yaml': '--model',
+    'workbench --no-browser --host 0.0.0.0': 'one address',
+    'workbench --no-browser --json x.json': '--json',
+    'workbench --no-browser --model no.yaml': 'no.yaml',
+    'workbench --no-browser --port 99999': '--port',
+    'workbench --no-browser short.csv': 'short.csv',
+    'workbench --no-browser run.csv run.csv': 'twice',
+}
+
+
+@pytest.fixture(scope='module')
+def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp('mistakes')
+    write_recording(folder / 'run.csv', judged(measured(200)))
+    (folder / 'empty.csv').write_text('')
+    (folder / 'short.csv').write_text('time,a\n1,2\n')
+    (folder / 'binary.csv').write_bytes(bytes(range(256)) * 20)
+    shutil.copy(CONFIG / 'paper.yaml', folder / 'model.yaml')
+    shutil.copy(CONFIG / 'single_axis.yaml', folder / 'axis.yaml')
+    return folder
+
+
+def test_every_command_is_tried() -> None:
+    assert {words.split()[0] for words in MISTAKES} == set(COMMANDS)
+
+
+@pytest.mark.parametrize('words', MISTAKES)
+def test_a_mistake_is_one_line_and_status_2(given: Path, words: str) -> None:
+    before = {path: path.read_bytes() for path in given.iterdir()}
+    done = pprs(*words.split(), cwd=given)
+    assert done.returncode == 2, done.stdout
+    assert MISTAKES[words] in done.stderr
+    assert done.stderr.startswith('pprs')
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert {path: path.read_bytes() for path in given.iterdir()} == before
