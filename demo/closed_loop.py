@@ -31,7 +31,7 @@ from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
-from pprs_dynamics.simulation.hidden_effects import draw_effects
+from pprs_dynamics.simulation.injected_effects import draw_effects
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
 LEAD_IN = 2.0  # [s] from the home pose to the path's start, not counted

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError, SingularityError
 from pprs_dynamics.simulation.closed_chains import DOFS, DRIVE_DOFS, ClosedChains
-from pprs_dynamics.simulation.hidden_effect import PlatformMoment
+from pprs_dynamics.simulation.injected_effect import PlatformMoment
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.simulation.hidden_effect import DriveForce, DriveMoment
-from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
-from pprs_dynamics.simulation.hidden_forces import effort_offset, gear_efficiency
+from pprs_dynamics.simulation.injected_effect import DriveForce, DriveMoment
+from pprs_dynamics.simulation.injected_effects import IN_CATALOGUE
+from pprs_dynamics.simulation.injected_forces import effort_offset, gear_efficiency
 
 OFF = (0.05, 0.15)  # s
 WAVELENGTHS = (0.05, 0.3)  # [m]

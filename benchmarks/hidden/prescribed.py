@@ -33,14 +33,14 @@ from pprs_dynamics.simulation.closed_chains import (
     PASSIVE_DOFS,
     ClosedChains,
 )
-from pprs_dynamics.simulation.hidden_effect import (
+from pprs_dynamics.simulation.injected_effect import (
     BodyChange,
     DriveForce,
     DriveMoment,
-    HiddenEffect,
+    InjectedEffect,
     StructureForce,
 )
-from pprs_dynamics.simulation.hidden_forces import FrictionTemperature
+from pprs_dynamics.simulation.injected_forces import FrictionTemperature
 from pprs_dynamics.simulation.plant import LOAD_ROUNDS, LOAD_TOLERANCE, PlantSettings
 from pprs_dynamics.simulation.resistance import JOINT_OF_RATE, Resistance
 from pprs_dynamics.simulation.sensors import ButterworthFilter, SensorFaults
@@ -123,13 +123,13 @@ class PrescribedPlant:
         self._chains = ClosedChains(values)
         self._bodies: BodyForces | None = None
 
-    def efforts(self, effects: Sequence[HiddenEffect] = (),
+    def efforts(self, effects: Sequence[InjectedEffect] = (),
                 delay: Array | None = None) -> Efforts:
         """Return the efforts of the drives.
 
         Parameters
         ----------
-        effects : sequence of HiddenEffect
+        effects : sequence of InjectedEffect
             Their memory starts afresh. Those of sensors are left to others.
         delay : (6,) array, optional
             Return efforts of times that lie so much earlier [s]; before the first sample, those
@@ -158,7 +158,7 @@ class PrescribedPlant:
             total += _hidden_force(effect, moment)
         return Efforts(total, loads)
 
-    def readings(self, effects: Sequence[HiddenEffect] = ()) -> Readings:
+    def readings(self, effects: Sequence[InjectedEffect] = ()) -> Readings:
         """Return the readings, without noise and quantisation."""
         motion, faults = self.motion, SensorFaults.of(effects)
         smooth = ButterworthFilter(faults.time_constant, float(np.median(np.diff(motion.time))))

@@ -34,9 +34,9 @@ from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.simulation.hidden_effect import DriveForce, HiddenEffect
-from pprs_dynamics.simulation.hidden_effects import draw_effect
-from pprs_dynamics.simulation.hidden_forces import vibration
+from pprs_dynamics.simulation.injected_effect import DriveForce, InjectedEffect
+from pprs_dynamics.simulation.injected_effects import draw_effect
+from pprs_dynamics.simulation.injected_forces import vibration
 from pprs_dynamics.simulation.plant import PlantSettings
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
@@ -146,7 +146,7 @@ class Scene:
                                         Whitening(noise_settings(noise, NOISE), self.block))
         return self._refits[noise]
 
-    def contribution(self, effect: HiddenEffect) -> np.ndarray:
+    def contribution(self, effect: InjectedEffect) -> np.ndarray:
         """Return what an effect adds to the treated residual of the model, (M, 6) [N]."""
         read, plain = self.plant.readings([effect]), self.plain
         added = read.effort - plain.effort
@@ -263,7 +263,7 @@ def load_case(path: Path | str) -> tuple[DriveModel, Recording, dict[str, Any]]:
 
 @dataclass(frozen=True)
 class _Drawn:
-    effect: HiddenEffect
+    effect: InjectedEffect
     scale: float
     snr: float  # at a noise of NOISE
     by_drive: np.ndarray  # the same, (6,)
@@ -280,7 +280,7 @@ def _draw(case: Case, place: Scene, name: str) -> _Drawn:
     return drawn
 
 
-def _effect(case: Case, name: str, what: str, scale: float) -> HiddenEffect:
+def _effect(case: Case, name: str, what: str, scale: float) -> InjectedEffect:
     """Return the effect that a case draws; in the row `vibration` at any frequency."""
     effect = draw_effect(name, case.rng(what), scale)
     if case.row == 'forms':

@@ -38,11 +38,11 @@ from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import format_model
-from pprs_dynamics.simulation.arm_run import simulate_arm
 from pprs_dynamics.simulation.export.exported_robot import export_robot
 from pprs_dynamics.simulation.export.expressed import express
 from pprs_dynamics.simulation.export.writers import written
-from pprs_dynamics.simulation.hidden_effects import NOT_IN_CATALOGUE
+from pprs_dynamics.simulation.injected_effects import NOT_IN_CATALOGUE
+from pprs_dynamics.simulation.mechanism_run import simulate_mechanism
 from pprs_dynamics.simulation.sensors import EffortNoise
 
 DURATION = 40.0  # [s]
@@ -186,9 +186,8 @@ def _of_arm(draw: Draw) -> tuple[ForceModel, Recording, Truth]:
     model = load_model(model_of(draw.robot))
     assert isinstance(model, MechanismModel)
     motion_seed = draw.seed % 1_000_000
-    plain = simulate_arm(model, (), draw.seed, noise=0.0, duration=DURATION, path_seed=motion_seed)
-    run = simulate_arm(model, draw.names, draw.seed, noise=0.0, duration=DURATION,
-                       path_seed=motion_seed)
+    plain, run = (simulate_mechanism(model, names, draw.seed, noise=0.0, duration=DURATION,
+                                     path_seed=motion_seed) for names in ((), draw.names))
     assert run.motion.time is not None
     time, effort, effects = run.motion.time, run.effort, list(run.effects)
     largest = np.maximum(np.abs(plain.effort).max(axis=0), 1e-9)

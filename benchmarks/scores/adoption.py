@@ -39,8 +39,8 @@ from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.model.model_writer import write_model
-from pprs_dynamics.simulation.hidden_effect import HiddenEffect
-from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
+from pprs_dynamics.simulation.injected_effect import InjectedEffect
+from pprs_dynamics.simulation.injected_effects import IN_CATALOGUE
 from pprs_dynamics.simulation.sensors import EffortNoise
 
 OTHER_MOTION = 1000  # between the seeds of the two motions
@@ -61,7 +61,7 @@ class Robot:
         self.case = case
         self.place = hidden_recordings.scene(case.seed, case.width)
         drawn = [hidden_recordings._draw(case, self.place, name) for name in case.effects]
-        self.effects: list[HiddenEffect] = [one.effect for one in drawn]
+        self.effects: list[InjectedEffect] = [one.effect for one in drawn]
         self.noise = min([one.noise for one in drawn], default=hidden_recordings.NOISE)
         self.other = _on_motion(self.place, case.seed + OTHER_MOTION)
 

@@ -43,8 +43,8 @@ from pprs_dynamics.inference.experiments.question import Question, question_of
 from pprs_dynamics.inference.experiments.trajectory_search import TrajectorySearch
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
-from pprs_dynamics.simulation.hidden_effect import HiddenEffect
-from pprs_dynamics.simulation.hidden_effects import draw_effect
+from pprs_dynamics.simulation.injected_effect import InjectedEffect
+from pprs_dynamics.simulation.injected_effects import draw_effect
 from pprs_dynamics.simulation.plant import PlantSettings
 from pprs_dynamics.simulation.sensors import EffortNoise
 from pprs_dynamics.simulation.virtual_robot import DriveReference, simulate
@@ -77,7 +77,7 @@ class HiddenRobot:
             values = changed_values(values, key, index, 1 + TOLERANCE * rng.uniform(-1, 1))
         self.values, self.name, self.seed, self.scale = values, name, seed, scale
 
-    def effect(self) -> HiddenEffect:
+    def effect(self) -> InjectedEffect:
         """Return the effect, afresh."""
         return draw_effect(self.name, np.random.default_rng((self.seed, 3)), self.scale)
 

@@ -48,8 +48,8 @@ from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.held_out import predictive_gain
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE
-from pprs_dynamics.simulation.hidden_forces import FrictionTemperature
+from pprs_dynamics.simulation.injected_effects import IN_CATALOGUE
+from pprs_dynamics.simulation.injected_forces import FrictionTemperature
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 STEPS = ('plain', 'change', 'hidden', 'hidden', 'plain', 'plain')

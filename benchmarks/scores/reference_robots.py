@@ -7,7 +7,7 @@
     python -m benchmarks.scores.reference_robots --model ur_base.yaml --changes --power
 
 In every drive there are hysteresis, ripple and Stribeck friction of forms that the catalogue has
-not (`pprs_dynamics.simulation.arm_forms`), and in every passive joint of a robot with loops dry
+not (`pprs_dynamics.simulation.joint_forms`), and in every passive joint of a robot with loops dry
 friction that turns over otherwise. They are the same on all days. A run on path 0 is the
 reference. Others, on `--path`, have noise of their own, and a change: of `--effects` in the place
 of the catalogue's that are drawn in turn, of `--changes` those of a table, and of `--power` the
@@ -42,14 +42,19 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel, inertial_values
 from pprs_dynamics.physics.model.model_file import build_model, load_model
-from pprs_dynamics.simulation.arm_engine import ArmEngine
-from pprs_dynamics.simulation.arm_forms import FORMS, STEEPNESS, JointForm, JointMoment
-from pprs_dynamics.simulation.arm_run import ArmRun, draw_motion, noise_like, simulate_arm
+from pprs_dynamics.simulation.joint_forms import FORMS, STEEPNESS, JointForm, JointMoment
+from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
+from pprs_dynamics.simulation.mechanism_run import (
+    MechanismRun,
+    draw_motion,
+    noise_like,
+    simulate_mechanism,
+)
 
 DURATION, REFERENCE_SEED = 20.0, 1000
 HEALTHY, SHARE = ('hysteresis', 'force_ripple', 'stribeck_friction'), 0.4  # of a form's size
 PASSIVE = 0.02  # of a drive's largest effort, from each passive joint
-# Hidden in turn: what changes on a machine, on which arm_forms and the healthy forms agree.
+# Hidden in turn: what changes on a machine, on which joint_forms and the healthy forms agree.
 EFFECTS = ('coulomb_friction', 'viscous_friction', 'payload_mass', 'link_mass', 'drive_spring',
            'effort_offset', 'homing_error', 'drive_inertia', 'load_friction', 'joint_friction')
 # Of an arm: number of the model file, drive from the base, and by which share it grows.
@@ -97,9 +102,9 @@ class Robot:
 
     def __init__(self, model: MechanismModel, duration: float) -> None:
         self.model, self.duration = model, duration
-        self.engine = ArmEngine(model)
+        self.engine = MechanismEngine(model)
         motion = draw_motion(model, duration, 0)
-        self.plain = simulate_arm(model, (), REFERENCE_SEED, noise=0.0, duration=duration)
+        self.plain = simulate_mechanism(model, (), REFERENCE_SEED, noise=0.0, duration=duration)
         self.largest = np.abs(self.plain.effort).max(axis=0)
         random = np.random.default_rng(REFERENCE_SEED)
         self.forms: list[tuple[JointForm, int, dict[str, float]]] = []
@@ -109,11 +114,11 @@ class Robot:
                 drawn[next(iter(drawn))] *= SHARE
                 self.forms.append((FORMS[name], j, drawn))
 
-    def _moment(self, motion: JointMotion, run: ArmRun, joint: int) -> JointMoment:
+    def _moment(self, motion: JointMotion, run: MechanismRun, joint: int) -> JointMoment:
         return JointMoment.along(motion, joint, run.effort[:, joint], self.largest[joint],
                                  self.model.gear_ratios[joint], np.zeros_like(motion.position))
 
-    def healthy(self, run: ArmRun) -> Array:
+    def healthy(self, run: MechanismRun) -> Array:
         """Return what no effect explains and was always there, (N, D) [N, N m]."""
         force = self._passive(run.motion)
         for form, j, drawn in self.forms:
@@ -157,7 +162,7 @@ class Robot:
         motion, d = self.plain.motion, change.drive
         if change.effect == 'payload_mass':
             pull = self._changed(replace(change, value=1.0, over_noise=np.nan))
-            clean = simulate_arm(pull, (), 0, noise=0.0, duration=self.duration)
+            clean = simulate_mechanism(pull, (), 0, noise=0.0, duration=self.duration)
             unit = float((root_mean_square(clean.effort - self.plain.effort)
                           / self.noise()).max())
             return change.over_noise / unit
@@ -190,12 +195,12 @@ class Robot:
         drawn = np.isnan(change.value) and np.isnan(change.over_noise) and change.effect
         truth: list[dict[str, Any]] = []
         if drawn:
-            run = simulate_arm(self.model, (change.effect,), seed, noise=0.0,
+            run = simulate_mechanism(self.model, (change.effect,), seed, noise=0.0,
                                duration=self.duration, path_seed=path)
             truth = [dict(one) for one in run.effects]
         else:
             change = replace(change, value=self.sized(change))
-            run = simulate_arm(self._changed(change), (), seed, noise=0.0,
+            run = simulate_mechanism(self._changed(change), (), seed, noise=0.0,
                                duration=self.duration, path_seed=path)
             if change.effect:
                 truth = [{'name': change.effect, 'parameters': {change.key: change.value},

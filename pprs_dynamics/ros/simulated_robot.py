@@ -40,8 +40,8 @@ from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
-from pprs_dynamics.simulation.hidden_effect import HiddenEffect
-from pprs_dynamics.simulation.hidden_effects import draw_effects
+from pprs_dynamics.simulation.injected_effect import InjectedEffect
+from pprs_dynamics.simulation.injected_effects import draw_effects
 from pprs_dynamics.simulation.mechanism_plant import MechanismPlant
 from pprs_dynamics.simulation.sensors import SensorSettings
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
@@ -216,7 +216,7 @@ def _loop_in_words(node_values: dict[str, Any]) -> str:
     return f'PD gains {node_values["stiffness"]:g} N/m and {node_values["damping"]:g} N s/m'
 
 
-def _platform(model: ForceModel, node_values: dict[str, Any], effects: Sequence[HiddenEffect],
+def _platform(model: ForceModel, node_values: dict[str, Any], effects: Sequence[InjectedEffect],
               ) -> SimulatedRobot:
     rate = node_values['rate']
     if 2000 % rate:
@@ -254,7 +254,7 @@ class Hidden:
 
     words: tuple[str, ...]
     drawn_with: tuple[float, int]
-    effects: tuple[HiddenEffect, ...]
+    effects: tuple[InjectedEffect, ...]
 
     @classmethod
     def of(cls, values: Mapping[str, Any], running: Hidden | None = None) -> Hidden:
@@ -262,7 +262,7 @@ class Hidden:
 
         Raises
         ------
-        HiddenEffectError
+        InjectedEffectError
             For words that name no effect.
         """
         words = tuple(values['hidden_effects'])

@@ -26,11 +26,11 @@ from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.simulation.arm_engine import SLOWEST, ArmEngine
-from pprs_dynamics.simulation.arm_forms import FORMS, JointMoment, draw_form, truth
-from pprs_dynamics.simulation.arm_run import draw_motion, one_able_joint
 from pprs_dynamics.simulation.drive_control import ControlSettings
-from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
+from pprs_dynamics.simulation.injected_effect import InjectedEffectError
+from pprs_dynamics.simulation.joint_forms import FORMS, JointMoment, draw_form, truth
+from pprs_dynamics.simulation.mechanism_engine import SLOWEST, MechanismEngine
+from pprs_dynamics.simulation.mechanism_run import draw_motion, one_able_joint
 from pprs_dynamics.simulation.plant import UnsolvedError
 from pprs_dynamics.simulation.temperatures import Climate
 
@@ -82,14 +82,14 @@ class MechanismPlant:
     ------
     MissingLibraryError
         Where mujoco is not installed.
-    HiddenEffectError
+    InjectedEffectError
         For a name of none.
     """
 
     def __init__(self, model: MechanismModel, names: Sequence[str] = (), seed: int = 0,
                  scale: float = 1.0, rate: float = 500.0) -> None:
         self.time_step = 1 / (rate * math.ceil(1 / (rate * LONGEST_STEP)))
-        self.model, self.engine = model, ArmEngine(model)
+        self.model, self.engine = model, MechanismEngine(model)
         self.structure = s = model.robot.structure
         random = np.random.default_rng(seed)
         motion = draw_motion(model, NOMINAL, seed)
@@ -129,7 +129,7 @@ class MechanismPlant:
         if name == 'link_mass':
             links = [j for j in range(len(model.robot.bodies)) if j != model.robot.carrier]
             if not links:
-                raise HiddenEffectError('link_mass needs a link beside that of the tool')
+                raise InjectedEffectError('link_mass needs a link beside that of the tool')
             return self.engine.hide_link_mass(random, scale, links)
         if name == 'base_tilt':
             return self.engine.hide_tilt(random, scale)
@@ -299,10 +299,10 @@ class MechanismPlant:
 
 
 def _drawn(names: Sequence[str], random: np.random.Generator) -> list[str]:
-    """Return names of hidden effects, or raise HiddenEffectError."""
+    """Return names of hidden effects, or raise InjectedEffectError."""
     drawn = [str(random.choice(sorted(HIDDEN))) if name == 'random' else name for name in names]
     for name in drawn:
         if name not in HIDDEN:
-            raise HiddenEffectError(f'{name} cannot be hidden in such a robot while it moves, must '
-                                    f'be one of {", ".join(HIDDEN)}')
+            raise InjectedEffectError(f'{name} cannot be hidden in such a robot while it moves, '
+                                      f'must be one of {", ".join(HIDDEN)}')
     return drawn

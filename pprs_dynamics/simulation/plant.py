@@ -44,10 +44,10 @@ from pprs_dynamics.simulation.closed_chains import (
     ClosedChains,
     Equations,
 )
-from pprs_dynamics.simulation.hidden_effect import (
+from pprs_dynamics.simulation.injected_effect import (
     BodyChange,
     DriveMoment,
-    HiddenEffect,
+    InjectedEffect,
     PlatformMoment,
     StructureForce,
 )
@@ -136,12 +136,12 @@ class Plant:
     ----------
     values : mapping
         Flat keys and values of a model file.
-    effects : sequence of HiddenEffect
+    effects : sequence of InjectedEffect
     settings : PlantSettings, optional
 
     Attributes
     ----------
-    effects : tuple of HiddenEffect
+    effects : tuple of InjectedEffect
         Those that are hidden in it now.
 
     Raises
@@ -150,7 +150,7 @@ class Plant:
         Where mujoco is not installed.
     """
 
-    def __init__(self, values: Mapping[str, Any], effects: Sequence[HiddenEffect] = (),
+    def __init__(self, values: Mapping[str, Any], effects: Sequence[InjectedEffect] = (),
                  settings: PlantSettings | None = None) -> None:
         self.settings, self._values = settings or PlantSettings(), values
         self.time_step = self.settings.step
@@ -158,7 +158,7 @@ class Plant:
         self.lower, self.upper = self.limits.strokes
         self.resistance = Resistance(values, self.settings.drive_width,
                                      self.settings.passive_width, self.settings.friction)
-        self.effects: tuple[HiddenEffect, ...] = ()
+        self.effects: tuple[InjectedEffect, ...] = ()
         self.chains = self._with(effects)
         # A copy without hidden effects, of which the drives' control knows the weight.
         self._known = ClosedChains(values)
@@ -173,7 +173,7 @@ class Plant:
         self._widest = 3 * float(strokes.max())  # a whole stroke beyond the end
         self.place(self.position)
 
-    def _with(self, effects: Sequence[HiddenEffect]) -> ClosedChains:
+    def _with(self, effects: Sequence[InjectedEffect]) -> ClosedChains:
         """Take effects, and return the bodies with them."""
         chains = ClosedChains(self._values)
         self.resistance.use_effects(effects)
@@ -189,7 +189,7 @@ class Plant:
         """Largest efforts of its motion: not known, sensors go by their own."""
         return None
 
-    def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
+    def use_effects(self, effects: Sequence[InjectedEffect]) -> None:
         """Have other hidden effects from now on; the motion goes on, and what stays remembers."""
         before = self.chains.qpos.copy()
         self.chains = self._with(effects)

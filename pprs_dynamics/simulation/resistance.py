@@ -20,11 +20,11 @@ from scipy.linalg.lapack import dposv
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.simulation.closed_chains import Equations
-from pprs_dynamics.simulation.hidden_effect import (
+from pprs_dynamics.simulation.injected_effect import (
     DriveForce,
     DriveMoment,
-    HiddenEffect,
-    HiddenJointFriction,
+    InjectedEffect,
+    InjectedJointFriction,
 )
 
 FORCE_TOLERANCE = 1e-8  # [N]
@@ -75,16 +75,16 @@ class Resistance:
         self._smallest_squares = (SMALLEST_SPEED * self.width) ** 2
         self._resolved = RESOLVED_SHARE * float(self.width[:6].min())
         self.drive_forces: list[DriveForce] = []
-        self._passive_friction: list[HiddenJointFriction] = []
+        self._passive_friction: list[InjectedJointFriction] = []
 
-    def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
+    def use_effects(self, effects: Sequence[InjectedEffect]) -> None:
         """Have these hidden effects from now on; those of other kinds are left to others.
 
         Those that act already keep their memory.
         """
         running = self.drive_forces
         self.drive_forces = [e for e in effects if isinstance(e, DriveForce)]
-        self._passive_friction = [e for e in effects if isinstance(e, HiddenJointFriction)]
+        self._passive_friction = [e for e in effects if isinstance(e, InjectedJointFriction)]
         for force in self.drive_forces:
             if force not in running:
                 force.prepare(self.dry[:6], self.width[:6])

@@ -18,7 +18,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT
-from pprs_dynamics.simulation.hidden_effect import HiddenEffect, Range, SensorEffect
+from pprs_dynamics.simulation.injected_effect import InjectedEffect, Range, SensorEffect
 
 # A play is crossed whenever a drive turns, however slowly: within that time [s] of it; what is
 # slower than the second stands [m/s].
@@ -97,7 +97,7 @@ class SensorFaults:
     play: Array
 
     @classmethod
-    def of(cls, effects: Sequence[HiddenEffect], drives: int = COUNT) -> SensorFaults:
+    def of(cls, effects: Sequence[InjectedEffect], drives: int = COUNT) -> SensorFaults:
         """Return the faults among effects."""
         faults = [effect for effect in effects if isinstance(effect, SensorEffect)]
         zero, gain, delay, time_constant, play = (
@@ -226,7 +226,7 @@ class Sensors:
     step : float
         Time between readings of the encoders [s].
     rng : numpy.random.Generator
-    effects : sequence of HiddenEffect
+    effects : sequence of InjectedEffect
         Of which the faults of sensors act here.
     scale : (D,) array, optional
         Units in which the settings give the noise of the efforts.
@@ -238,7 +238,7 @@ class Sensors:
     """
 
     def __init__(self, settings: SensorSettings, step: float, rng: np.random.Generator,
-                 effects: Sequence[HiddenEffect] = (), scale: Array | None = None) -> None:
+                 effects: Sequence[InjectedEffect] = (), scale: Array | None = None) -> None:
         self.settings, self._step = settings, step
         self._scale = np.ones(COUNT) if scale is None else scale
         self._noise = EffortNoise(settings, rng, len(self._scale))
@@ -250,7 +250,7 @@ class Sensors:
         self.smoothing = 1.0 if settings.true_velocity else 1 - float(
             np.exp(-2 * np.pi * settings.velocity_bandwidth * step))
 
-    def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
+    def use_effects(self, effects: Sequence[InjectedEffect]) -> None:
         """Have the faults of other effects from now on; a moved zero is no velocity."""
         self._faults = SensorFaults.of(effects, len(self._scale))
         self._filter = ButterworthFilter(self._faults.time_constant, self._step)

@@ -16,8 +16,8 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MotionError, WorkspaceError
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.simulation.drive_control import ControlSettings, DriveControl, Note, Setpoint
-from pprs_dynamics.simulation.hidden_effect import HiddenEffect
-from pprs_dynamics.simulation.hidden_forces import FrictionTemperature
+from pprs_dynamics.simulation.injected_effect import InjectedEffect
+from pprs_dynamics.simulation.injected_forces import FrictionTemperature
 from pprs_dynamics.simulation.mechanism_plant import MechanismPlant
 from pprs_dynamics.simulation.plant import Plant, PlantSettings, Truth, UnsolvedError
 from pprs_dynamics.simulation.sensors import Measurement, Sensors, SensorSettings
@@ -36,7 +36,7 @@ class SimulatedRobot:
     values : mapping or MechanismPlant
         Flat keys and values of a 3-PPRS's model file, e.g. `DriveModel.values`; or an arm, or a
         robot with loops, and what is hidden in it.
-    effects : sequence of HiddenEffect
+    effects : sequence of InjectedEffect
         Of the 3-PPRS, that the model knows nothing of. They carry memory: every robot needs its
         own.
     seed : int
@@ -57,7 +57,7 @@ class SimulatedRobot:
     """
 
     def __init__(
-        self, values: Mapping[str, Any] | MechanismPlant, effects: Sequence[HiddenEffect] = (), *,
+        self, values: Mapping[str, Any] | MechanismPlant, effects: Sequence[InjectedEffect] = (), *,
         seed: int = 0, rate: float = 500.0, plant: PlantSettings | None = None,
         control: ControlSettings | None = None, sensors: SensorSettings | None = None,
     ) -> None:
@@ -107,7 +107,7 @@ class SimulatedRobot:
         self._effort: Array | None = None
         self._stopped = False
 
-    def use_effects(self, effects: Sequence[HiddenEffect]) -> None:
+    def use_effects(self, effects: Sequence[InjectedEffect]) -> None:
         """Have other hidden effects from now on; the motion goes on, and what stays remembers."""
         self.plant.use_effects(effects)
         self.sensors.use_effects(effects)
@@ -243,7 +243,7 @@ class SimulatedRun:
 
 
 def simulate(
-    values: Mapping[str, Any], reference: DriveReference, effects: Sequence[HiddenEffect] = (), *,
+    values: Mapping[str, Any], reference: DriveReference, effects: Sequence[InjectedEffect] = (), *,
     seed: int = 0, duration: float | None = None, rate: float = 500.0, truth: bool = True,
     plant: PlantSettings | None = None, control: ControlSettings | None = None,
     sensors: SensorSettings | None = None, progress: Callable[[float], None] | None = None,
@@ -258,7 +258,7 @@ def simulate(
         Flat keys and values of a 3-PPRS's model file, e.g. `DriveModel.values`.
     reference : DriveReference
         One sample per tick.
-    effects : sequence of HiddenEffect
+    effects : sequence of InjectedEffect
     seed : int
         Of the noise.
     duration : float, optional

@@ -25,7 +25,7 @@ from pprs_dynamics import DriveModel, __version__
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.simulation.hidden_effects import draw_effect
+from pprs_dynamics.simulation.injected_effects import draw_effect
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 HIDDEN, RATE = 'coulomb_friction', 250.0

@@ -22,7 +22,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.keys import NAMES
 from pprs_dynamics.physics.model.parameter_values import is_known
 from pprs_dynamics.ros.messages.status_codes import CODES, LEVELS
-from pprs_dynamics.simulation.hidden_effects import IN_CATALOGUE, NOT_IN_CATALOGUE
+from pprs_dynamics.simulation.injected_effects import IN_CATALOGUE, NOT_IN_CATALOGUE
 
 # Options of other programs that pages show.
 FOREIGN = {'--ros-args', '--params-file', '--packages-select', '--symlink-install', '--upgrade',

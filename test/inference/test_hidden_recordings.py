@@ -20,8 +20,8 @@ from benchmarks.scores.cases import here, read_outcomes
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.simulation.hidden_effect import DriveMoment
-from pprs_dynamics.simulation.hidden_effects import draw_effect
+from pprs_dynamics.simulation.injected_effect import DriveMoment
+from pprs_dynamics.simulation.injected_effects import draw_effect
 from pprs_dynamics.simulation.sensors import EffortNoise
 
 pytestmark = pytest.mark.slow

@@ -24,7 +24,8 @@ from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.residuals.measured_effort import (
+from pprs_dynamics.inference.readings.measured_effort import (
+    effort_contents,
     find_no_measurements,
     kinds_of,
     looks_like,
@@ -76,7 +77,7 @@ def run_of(model: ForceModel, motion: Any, still: Any) -> Run:
                forces.total - rigid)
 
 
-def arm_run(folder: Path, **changes: Any) -> Run:
+def mechanism_run(folder: Path, **changes: Any) -> Run:
     model, moved = arm.real_arm(folder, **changes), arm.motion(DURATION, RATE)
     rest = np.zeros_like(moved.velocity)
     return run_of(model, moved, type(moved)(moved.position, rest, rest, moved.time))
@@ -103,7 +104,7 @@ def axis_run(gravity: float) -> Run:
     return run_of(model, JointMotion(*q, time), JointMotion(q[0], rest, rest, time))
 
 
-MACHINES = {'arm': arm_run, 'platform': lambda folder: platform_run(),
+MACHINES = {'arm': mechanism_run, 'platform': lambda folder: platform_run(),
             'axis': lambda folder: axis_run(0.0), 'upright axis': lambda folder: axis_run(-9.81)}
 
 
@@ -175,11 +176,11 @@ def test_a_motion_that_shows_nothing_tells_nothing(tmp_path: Path) -> None:
     recording = Recording.from_arrays(
         'slow', slow.time, slow.position, slow.velocity,
         forces + np.random.default_rng(0).normal(0, 0.5, forces.shape), model.drives)
-    assert find_no_measurements(model, recording) == ()
+    assert find_no_measurements(model, effort_contents(model, recording)) == ()
 
 
 def test_nothing_is_claimed_of_what_is_no_measurement(tmp_path: Path) -> None:
-    run = arm_run(tmp_path)
+    run = mechanism_run(tmp_path)
     found = diagnose(run.model, [run.of(run.total - run.gravity)])
     assert found.verdict == 'unknown'
     assert found.effects == found.suspects == found.depends_on == ()
@@ -187,7 +188,7 @@ def test_nothing_is_claimed_of_what_is_no_measurement(tmp_path: Path) -> None:
 
 
 def test_effort_kind_says_that_gravity_was_taken_out(tmp_path: Path) -> None:
-    run = arm_run(tmp_path)
+    run = mechanism_run(tmp_path)
     model = build_model({**run.model.values, 'effort_kind': 'without_gravity'}, run.model.source)
     recording = run.of(run.total - run.gravity)
     assert looks_like(model, [recording]) == {}
@@ -197,13 +198,13 @@ def test_effort_kind_says_that_gravity_was_taken_out(tmp_path: Path) -> None:
 
 
 def test_effort_kind_says_that_efforts_are_commands(tmp_path: Path) -> None:
-    run = arm_run(tmp_path)
+    run = mechanism_run(tmp_path)
     model = build_model({**run.model.values, 'effort_kind': 'commanded'}, run.model.source)
     assert kinds_of(looks_like(model, [run.of(run.total)])) == every(run, 'command')
 
 
 def test_effort_kind_says_that_efforts_are_currents(tmp_path: Path) -> None:
-    run = arm_run(tmp_path)
+    run = mechanism_run(tmp_path)
     values = {**run.model.values, 'robot.gain': (2.0, 3.0, 4.0), 'effort_kind': 'current'}
     model = build_model(values, run.model.source)
     write_recording(tmp_path / 'run.csv', run.of(run.total))
@@ -221,7 +222,7 @@ def test_another_kind_is_refused(tmp_path: Path) -> None:
 
 
 def test_commands_stop_or_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run = arm_run(tmp_path)
+    run = mechanism_run(tmp_path)
     write_recording(tmp_path / 'run.csv', run.of(run.total - run.gravity))
     given = [str(tmp_path / 'run.csv'), '--model', str(tmp_path / 'arm.yaml')]
     for command in ('info', 'compare'):
@@ -252,5 +253,6 @@ CASES_OF = {
 @pytest.mark.parametrize('case', CASES_OF)
 def test_other_peoples_recordings(case: str) -> None:
     for recording, model, kinds in CASES_OF[case]:
-        found = find_no_measurements(*shared_case(case, model, recording))
+        read = shared_case(case, model, recording)
+        found = find_no_measurements(read[0], effort_contents(*read))
         assert {one.kind for one in found} == kinds, recording

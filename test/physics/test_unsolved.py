@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import DriveModel, PprsError, simulate
-from pprs_dynamics.simulation.hidden_effects import draw_effects
+from pprs_dynamics.simulation.injected_effects import draw_effects
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
 

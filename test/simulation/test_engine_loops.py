@@ -13,8 +13,8 @@ import robots_with_loops as robots
 
 from pprs_dynamics import JointMotion, MechanismModel, WorkspaceError
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
-from pprs_dynamics.simulation.arm_engine import ArmEngine
-from pprs_dynamics.simulation.arm_run import draw_motion
+from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
+from pprs_dynamics.simulation.mechanism_run import draw_motion
 
 ROBOTS = {'hexapod': robots.hexapod, 'delta': robots.delta, 'five_bar': robots.five_bar,
           'three_rrr': robots.three_rrr}
@@ -31,7 +31,7 @@ def rubbing(name: str, folder: Path) -> MechanismModel:
 def test_motion_reactions_and_friction_are_those_of_the_model(tmp_path: Path, name: str) -> None:
     model = rubbing(name, tmp_path)
     motion = draw_motion(model, 3.0, 2)
-    forces, engine = model.drive_forces(motion), ArmEngine(model)
+    forces, engine = model.drive_forces(motion), MechanismEngine(model)
     bodies = engine.torques(motion)
     largest = np.abs(forces.total).max()
     assert np.abs(bodies - forces.parts['rigid_body']
@@ -49,7 +49,7 @@ def test_loops_are_closed_without_the_model(tmp_path: Path, name: str,
     model = rubbing(name, tmp_path)
     motion = draw_motion(model, 1.0, 3)
     expected = model.mechanism(motion).links.motion
-    engine = ArmEngine(model)
+    engine = MechanismEngine(model)
     engine.home()
     for one in ('forward_kinematics', 'forces', 'inverse_dynamics', 'friction',
                 'link_jacobians'):
@@ -69,7 +69,7 @@ def test_loops_are_closed_without_the_model(tmp_path: Path, name: str,
 
 def test_beyond_reach_is_told(tmp_path: Path) -> None:
     model = rubbing('five_bar', tmp_path)
-    engine = ArmEngine(model)
+    engine = MechanismEngine(model)
     apart = np.array([[np.pi, 0.0]])
     with pytest.raises(WorkspaceError, match='loops do not close'):
         engine.closed(JointMotion(apart, 0 * apart, 0 * apart))

@@ -16,11 +16,11 @@ import robots_with_loops as robots
 
 from pprs_dynamics import JointMotion, MechanismModel
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
-from pprs_dynamics.simulation.arm_forms import tilted
-from pprs_dynamics.simulation.arm_run import draw_motion
 from pprs_dynamics.simulation.drive_control import Setpoint
-from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
+from pprs_dynamics.simulation.injected_effect import InjectedEffectError
+from pprs_dynamics.simulation.joint_forms import tilted
 from pprs_dynamics.simulation.mechanism_plant import MechanismPlant
+from pprs_dynamics.simulation.mechanism_run import draw_motion
 from pprs_dynamics.simulation.sensors import SensorSettings
 from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
 
@@ -118,7 +118,7 @@ def test_a_hidden_payload_is_moved_by_the_drive_that_carries_it(tmp_path: Path) 
 
 def test_what_cannot_be_hidden_is_told(tmp_path: Path) -> None:
     model = MechanismModel.load(robots.five_bar().write(tmp_path))
-    with pytest.raises(HiddenEffectError, match='rod_mass cannot be hidden'):
+    with pytest.raises(InjectedEffectError, match='rod_mass cannot be hidden'):
         MechanismPlant(model, ['rod_mass'])
 
 

@@ -16,10 +16,10 @@ from pprs_dynamics.errors import MotionError, SingularityError
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.simulation.drive_control import ControlSettings
-from pprs_dynamics.simulation.hidden_bodies import PayloadPickUp
-from pprs_dynamics.simulation.hidden_effect import HiddenEffect
-from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, draw_effect
-from pprs_dynamics.simulation.hidden_forces import Hysteresis, coulomb_friction, effort_offset
+from pprs_dynamics.simulation.injected_bodies import PayloadPickUp
+from pprs_dynamics.simulation.injected_effect import InjectedEffect
+from pprs_dynamics.simulation.injected_effects import INJECTED_EFFECTS, draw_effect
+from pprs_dynamics.simulation.injected_forces import Hysteresis, coulomb_friction, effort_offset
 from pprs_dynamics.simulation.plant import PlantSettings
 from pprs_dynamics.simulation.sensors import (
     EffortGain,
@@ -92,7 +92,7 @@ def test_friction_of_an_effect_loads_the_joints_as_in_the_engine() -> None:
     np.testing.assert_allclose(same, forces, rtol=0, atol=1e-9)
 
 
-def run_plant(effects: list[HiddenEffect], actual_loads: bool = False) -> SimulatedRun:
+def run_plant(effects: list[InjectedEffect], actual_loads: bool = False) -> SimulatedRun:
     """Return a run of the plant in which every drive reverses."""
     time = np.arange(150)[:, None] / RATE
     rates = 2 * np.pi * np.array([1.9, 2.3, 2.1, 1.7, 2.0, 1.8])
@@ -121,7 +121,7 @@ def along(run: SimulatedRun, actual_loads: bool = False) -> PrescribedPlant:
 def test_along_the_plants_own_motion_it_needs_the_plants_efforts(
     group: str, actual_loads: bool,
 ) -> None:
-    def effects() -> list[HiddenEffect]:
+    def effects() -> list[InjectedEffect]:
         rng = np.random.default_rng(11)
         return [draw_effect(name, rng) for name in GROUPS[group]]
 
@@ -136,13 +136,13 @@ def test_along_the_plants_own_motion_it_needs_the_plants_efforts(
 
 def test_every_hidden_effect_is_compared_with_the_plant() -> None:
     compared = {name for group in GROUPS.values() for name in group}
-    assert compared | {*MEMORY, *SENSORS, 'payload_pick_up'} == set(HIDDEN_EFFECTS)
+    assert compared | {*MEMORY, *SENSORS, 'payload_pick_up'} == set(INJECTED_EFFECTS)
 
 
 @pytest.mark.parametrize('name', MEMORY)
 def test_memory_advances_as_in_the_plant(name: str) -> None:
     # The plant advances it by time steps, here it goes from sample to sample.
-    def effect() -> HiddenEffect:
+    def effect() -> InjectedEffect:
         return draw_effect(name, np.random.default_rng(5))
 
     run = run_plant([effect()])
@@ -165,7 +165,7 @@ def test_a_payload_is_picked_up_as_in_the_plant() -> None:
     assert np.abs(found - run.truth.effort).max() < 0.4 * 15 * 0.00025 / 0.2
 
 
-@pytest.mark.parametrize('name', sorted(HIDDEN_EFFECTS))
+@pytest.mark.parametrize('name', sorted(INJECTED_EFFECTS))
 def test_every_hidden_effect_changes_what_is_measured_and_starts_afresh(
     name: str, motion: DrivenMotion,
 ) -> None:

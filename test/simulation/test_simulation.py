@@ -27,10 +27,10 @@ from pprs_dynamics.simulation.drive_control import (
     DriveControl,
     Setpoint,
 )
-from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
-from pprs_dynamics.simulation.hidden_effects import (
-    HIDDEN_EFFECTS,
+from pprs_dynamics.simulation.injected_effect import InjectedEffectError
+from pprs_dynamics.simulation.injected_effects import (
     IN_CATALOGUE,
+    INJECTED_EFFECTS,
     NOT_IN_CATALOGUE,
     draw_effect,
 )
@@ -299,7 +299,7 @@ def test_every_effect_of_the_interface_is_there() -> None:
     assert not set(IN_CATALOGUE) & set(NOT_IN_CATALOGUE)
 
 
-@pytest.mark.parametrize('name', [name for name in HIDDEN_EFFECTS if name not in (
+@pytest.mark.parametrize('name', [name for name in INJECTED_EFFECTS if name not in (
     'effort_filter', 'effort_gain', 'homing_error', 'lost_motion', 'time_delay')])
 def test_a_hidden_effect_changes_the_efforts_of_its_drives_alone(name: str) -> None:
     effect = drawn(name)
@@ -365,7 +365,7 @@ CLOSED_FORMS = {
 @pytest.mark.parametrize('name', CLOSED_FORMS)
 def test_a_hidden_force_has_the_form_that_it_states(name: str) -> None:
     parameters, form = CLOSED_FORMS[name]
-    effect = HIDDEN_EFFECTS[name]({'slide_1': parameters, 'lift_3': parameters})
+    effect = INJECTED_EFFECTS[name]({'slide_1': parameters, 'lift_3': parameters})
     run = simulate(MODEL.values, wave(0.3), [effect], control=WEIGHT_HELD, sensors=QUIET)
     expected = form(run.truth)
     expected[:, 1:5] = 0.0
@@ -388,15 +388,15 @@ BODIES = {
 @pytest.mark.parametrize('name', BODIES)
 def test_a_hidden_body_is_a_robot_with_other_numbers(name: str) -> None:
     parameters, numbers = BODIES[name]
-    effect = HIDDEN_EFFECTS[name](**parameters)
+    effect = INJECTED_EFFECTS[name](**parameters)
     run = simulate(MODEL.values, wave(0.2), [effect], control=WEIGHT_HELD, sensors=QUIET)
     assert rms(unexplained(run, changed(**numbers))).max() < AGREEMENT
     assert rms(unexplained(run)).max() > 0.02
 
 
 def test_hidden_bodies_add_up_in_any_order() -> None:
-    mass = HIDDEN_EFFECTS['payload_mass'](mass=0.3)
-    offset = HIDDEN_EFFECTS['payload_offset'](x=0.01, y=0.0, z=0.02)
+    mass = INJECTED_EFFECTS['payload_mass'](mass=0.3)
+    offset = INJECTED_EFFECTS['payload_offset'](x=0.01, y=0.0, z=0.02)
     tensors = []
     for effects in ((mass, offset), (offset, mass)):
         chains = Plant(MODEL.values, effects).chains
@@ -470,7 +470,7 @@ def test_forces_on_the_platform_raise_the_friction_of_the_guides() -> None:
 
 
 def test_a_hidden_offset_shifts_the_held_effort_by_its_force() -> None:
-    offset = HIDDEN_EFFECTS['effort_offset']({'lift_2': {'force': 0.8}})
+    offset = INJECTED_EFFECTS['effort_offset']({'lift_2': {'force': 0.8}})
     stiff = ControlSettings(stiffness=40000.0, damping=150.0, gravity_compensation=True)
     held = [simulate(MODEL.values, still(1.0), effects, control=stiff, sensors=QUIET).effort[-1]
             for effects in ([], [offset])]
@@ -479,7 +479,7 @@ def test_a_hidden_offset_shifts_the_held_effort_by_its_force() -> None:
 
 
 def test_presliding_follows_displacement_and_saturates() -> None:
-    effect = HIDDEN_EFFECTS['hysteresis']({'slide_1': {'share': 1.0, 'distance': 0.001,
+    effect = INJECTED_EFFECTS['hysteresis']({'slide_1': {'share': 1.0, 'distance': 0.001,
                                                        'power': 2.0}})
     run = simulate(MODEL.values, wave(1.2), [effect], control=WEIGHT_HELD, sensors=QUIET)
     extra, velocity = unexplained(run)[:, 0], run.truth.velocity[:, 0]
@@ -495,7 +495,7 @@ def test_presliding_follows_displacement_and_saturates() -> None:
 
 
 def test_cold_friction_fades_with_the_work_done() -> None:
-    effect = HIDDEN_EFFECTS['friction_drift']({'slide_1': {
+    effect = INJECTED_EFFECTS['friction_drift']({'slide_1': {
         'force': 1.0, 'path': 0.1, 'cooling_time': 100.0, 'width': 0.001}})
     run = simulate(MODEL.values, wave(0.9), [effect], control=WEIGHT_HELD, sensors=QUIET)
     moving = np.abs(run.truth.velocity[:, 0]) > 0.03
@@ -505,7 +505,7 @@ def test_cold_friction_fades_with_the_work_done() -> None:
 
 
 def test_a_payload_picked_up_weighs_from_then_on() -> None:
-    effect = HIDDEN_EFFECTS['payload_pick_up'](mass=0.3, time=0.5, x=0.0, y=0.0, z=0.03)
+    effect = INJECTED_EFFECTS['payload_pick_up'](mass=0.3, time=0.5, x=0.0, y=0.0, z=0.03)
     run = simulate(MODEL.values, still(1.2), [effect], control=WEIGHT_HELD, sensors=QUIET)
     lifts = unexplained(run)[:, 3:].sum(axis=1)
     assert np.abs(lifts[run.time < 0.5]).max() < AGREEMENT
@@ -525,7 +525,7 @@ def moved(robot: SimulatedRobot, first: int, last: int) -> np.ndarray:
 def test_effects_that_come_and_go_at_once_leave_the_motion() -> None:
     plain, other = (SimulatedRobot(MODEL.values, seed=1, control=WEIGHT_HELD) for _ in range(2))
     assert np.array_equal(moved(plain, 0, 60), moved(other, 0, 60))
-    other.use_effects([drawn(name) for name in HIDDEN_EFFECTS])
+    other.use_effects([drawn(name) for name in INJECTED_EFFECTS])
     other.use_effects([])
     np.testing.assert_allclose(moved(other, 60, 120), moved(plain, 60, 120), rtol=0, atol=1e-9)
 
@@ -541,7 +541,7 @@ def test_effects_switched_on_in_a_running_robot_are_those_it_could_have_started_
 
 def test_what_stays_on_keeps_its_memory() -> None:
     """Cold friction that has faded is not cold again because a payload came."""
-    effect = HIDDEN_EFFECTS['friction_drift']({'slide_1': {
+    effect = INJECTED_EFFECTS['friction_drift']({'slide_1': {
         'force': 1.0, 'path': 0.02, 'cooling_time': 100.0, 'width': 0.001}})
     robot = SimulatedRobot(MODEL.values, [effect], control=WEIGHT_HELD, sensors=QUIET)
     moved(robot, 0, 100)
@@ -551,7 +551,7 @@ def test_what_stays_on_keeps_its_memory() -> None:
     assert np.array_equal(effect._heat, warm)
 
 
-@pytest.mark.parametrize('name', HIDDEN_EFFECTS)
+@pytest.mark.parametrize('name', INJECTED_EFFECTS)
 def test_draws_repeat_by_seed_and_can_be_told(name: str) -> None:
     one, same, other = (drawn(name, seed) for seed in (1, 1, 2))
     assert one.truth() == same.truth() != other.truth()
@@ -575,11 +575,11 @@ def test_scale_multiplies_the_strength() -> None:
     (lambda: draw_effect('viscous', np.random.default_rng(0)), 'did you mean'),
     (lambda: draw_effect('base_tilt:lift_1', np.random.default_rng(0)), 'acts in no drive'),
     (lambda: draw_effect('drive_coupling:x', np.random.default_rng(0)), 'acts in a drive'),
-    (lambda: HIDDEN_EFFECTS['payload_mass'](weight=1.0), 'has the parameters mass'),
-    (lambda: HIDDEN_EFFECTS['payload_mass'](mass=np.nan), 'finite'),
-    (lambda: HIDDEN_EFFECTS['effort_offset']({'lift_9': {'force': 1.0}}), 'lift_9')])
+    (lambda: INJECTED_EFFECTS['payload_mass'](weight=1.0), 'has the parameters mass'),
+    (lambda: INJECTED_EFFECTS['payload_mass'](mass=np.nan), 'finite'),
+    (lambda: INJECTED_EFFECTS['effort_offset']({'lift_9': {'force': 1.0}}), 'lift_9')])
 def test_impossible_effects_are_refused_in_a_sentence(make: object, text: str) -> None:
-    with pytest.raises(HiddenEffectError, match=text):
+    with pytest.raises(InjectedEffectError, match=text):
         make()
 
 
@@ -648,7 +648,7 @@ def test_pink_noise_falls_with_its_exponent(exponent: float) -> None:
 
 
 def test_a_gain_scales_the_measured_effort_only() -> None:
-    effect = HIDDEN_EFFECTS['effort_gain']({'slide_2': {'gain': 0.1}})
+    effect = INJECTED_EFFECTS['effort_gain']({'slide_2': {'gain': 0.1}})
     run, plain = (simulate(MODEL.values, wave(0.2), effects, control=WEIGHT_HELD, sensors=QUIET)
                   for effects in ([effect], []))
     assert np.array_equal(run.truth.effort, plain.truth.effort)
@@ -656,7 +656,7 @@ def test_a_gain_scales_the_measured_effort_only() -> None:
 
 
 def test_a_late_effort_is_that_of_a_moment_before() -> None:
-    effect = HIDDEN_EFFECTS['time_delay']({'slide_1': {'delay': 0.006}})
+    effect = INJECTED_EFFECTS['time_delay']({'slide_1': {'delay': 0.006}})
     run, plain = (simulate(MODEL.values, wave(0.4), effects, control=WEIGHT_HELD, sensors=QUIET)
                   for effects in ([effect], []))
     assert np.array_equal(run.position, plain.position)
@@ -665,7 +665,7 @@ def test_a_late_effort_is_that_of_a_moment_before() -> None:
 
 
 def test_a_filtered_effort_is_rounded_as_butterworths_filter_rounds_it() -> None:
-    effect = HIDDEN_EFFECTS['effort_filter']({'slide_1': {'time_constant': 0.01}})
+    effect = INJECTED_EFFECTS['effort_filter']({'slide_1': {'time_constant': 0.01}})
     run, plain = (simulate(MODEL.values, wave(0.4), effects, control=WEIGHT_HELD, sensors=QUIET)
                   for effects in ([effect], []))
     assert np.array_equal(run.position, plain.position)
@@ -679,7 +679,7 @@ def test_a_filtered_effort_is_rounded_as_butterworths_filter_rounds_it() -> None
 
 
 def test_an_early_effort_is_prompt_among_encoders_that_are_late() -> None:
-    effect = HIDDEN_EFFECTS['time_delay']({'slide_1': {'delay': -0.006}})
+    effect = INJECTED_EFFECTS['time_delay']({'slide_1': {'delay': -0.006}})
     run, plain = (simulate(MODEL.values, wave(0.4), effects, control=WEIGHT_HELD, sensors=QUIET)
                   for effects in ([effect], []))
     np.testing.assert_allclose(run.effort[:, 0], plain.effort[:, 0], atol=1e-12)
@@ -688,7 +688,7 @@ def test_an_early_effort_is_prompt_among_encoders_that_are_late() -> None:
 
 
 def test_a_wrong_zero_shifts_the_robot_under_its_encoders() -> None:
-    effect = HIDDEN_EFFECTS['homing_error']({'lift_1': {'zero': 0.002}})
+    effect = INJECTED_EFFECTS['homing_error']({'lift_1': {'zero': 0.002}})
     run = simulate(MODEL.values, wave(0.2), [effect], control=WEIGHT_HELD, sensors=QUIET)
     np.testing.assert_allclose(run.position - run.truth.position,
                                np.tile([0, 0, 0, 0.002, 0, 0], (100, 1)), atol=1e-12)
@@ -807,8 +807,8 @@ CONTAINERS = (
 DESCRIPTION = tuple(f'pprs_dynamics.physics.mechanism.{name}' for name in (
     'description', 'urdf', 'mjcf', 'structure', 'mechanism', 'tree_equations', 'passive_joints'))
 OF_ARMS = {**dict.fromkeys(('engine_state.py', 'engine_loops.py'), DESCRIPTION),
-           'arm_engine.py': (*DESCRIPTION, 'pprs_dynamics.physics.model.robot_block'),
-           **dict.fromkeys(('arm_run.py', 'mechanism_plant.py'), (
+           'mechanism_engine.py': (*DESCRIPTION, 'pprs_dynamics.physics.model.robot_block'),
+           **dict.fromkeys(('mechanism_run.py', 'mechanism_plant.py'), (
                *DESCRIPTION, 'pprs_dynamics.physics.effects.laws.joint_friction'))}
 # Of the equations, which are compiled functions over tables, names and kinds of rows alone.
 NAMES_OF_TABLES = {'AXES', 'KIND', 'LOOP', 'TRANSLATION', 'JointFriction'}

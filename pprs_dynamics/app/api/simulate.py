@@ -157,10 +157,10 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     names = [effects] if isinstance(effects, str) else list(effects)
     share_done = stage(progress, 'simulating')
     if isinstance(found, MechanismModel) and found.is_described:
-        from pprs_dynamics.simulation.arm_run import RATE as ARM_RATE
-        from pprs_dynamics.simulation.arm_run import simulate_arm
+        from pprs_dynamics.simulation.mechanism_run import RATE as ARM_RATE
+        from pprs_dynamics.simulation.mechanism_run import simulate_mechanism
 
-        arm = simulate_arm(found, names, seed, scale, noise, duration, path_seed, share_done,
+        arm = simulate_mechanism(found, names, seed, scale, noise, duration, path_seed, share_done,
                            thermometers, link_encoders)
         assert arm.motion.time is not None
         recording = Recording.from_arrays('simulated', arm.motion.time, arm.position, None,
@@ -171,7 +171,7 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     if feedforward not in FEEDFORWARDS:
         raise MotionError('feedforward', repr(feedforward),
                           f'be one of {", ".join(FEEDFORWARDS)}', 'shape')
-    from pprs_dynamics.simulation.hidden_effects import draw_effects
+    from pprs_dynamics.simulation.injected_effects import draw_effects
     from pprs_dynamics.simulation.sensors import SensorSettings
     from pprs_dynamics.simulation.virtual_robot import DriveReference
     from pprs_dynamics.simulation.virtual_robot import simulate as simulate_robot

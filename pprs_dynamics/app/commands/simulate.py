@@ -21,8 +21,8 @@ from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.parameter_file import find_file
-from pprs_dynamics.simulation.arm_forms import NAMES as ARM_EFFECTS
-from pprs_dynamics.simulation.hidden_effects import HIDDEN_EFFECTS, RANDOM
+from pprs_dynamics.simulation.injected_effects import INJECTED_EFFECTS, RANDOM
+from pprs_dynamics.simulation.joint_forms import NAMES as ARM_EFFECTS
 
 LONGEST = 3600.0  # [s], of an excitation: minutes of simulation, and hundreds of megabytes
 
@@ -35,9 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         required=True,
                         help='.mcap, .csv, or the name of a rosbag2 folder to make')
     parser.add_argument('--effect', metavar='NAME', action='append', default=[],
-                        choices=(*dict.fromkeys((*HIDDEN_EFFECTS, *ARM_EFFECTS)), RANDOM),
+                        choices=(*dict.fromkeys((*INJECTED_EFFECTS, *ARM_EFFECTS)), RANDOM),
                         help='physics that the model does not know of, drawn from the seed; may '
-                        f'be repeated: random, {", ".join(HIDDEN_EFFECTS)}; of an arm or a '
+                        f'be repeated: random, {", ".join(INJECTED_EFFECTS)}; of an arm or a '
                         f'robot with loops {", ".join(ARM_EFFECTS)}')
     parser.add_argument('--seed', type=seed, default=0, help='of noise and effects (default 0)')
     parser.add_argument('--path', default='excitation',

@@ -26,7 +26,7 @@ from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.residuals.conventions import find_mistakes
+from pprs_dynamics.inference.readings.check import find_mistakes
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import estimate_present
 from pprs_dynamics.measurement.files.fingerprint import fingerprint

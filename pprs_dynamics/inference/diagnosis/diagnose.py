@@ -15,7 +15,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.diagnosis.statements import word_stick_slip
 from pprs_dynamics.inference.fit.reference import Reference
-from pprs_dynamics.inference.residuals.measured_effort import looks_like
+from pprs_dynamics.inference.readings.measured_effort import looks_like
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.ranking import select, without_search
 from pprs_dynamics.measurement.files.recording import Recording

@@ -41,8 +41,9 @@ Integers = np.typing.NDArray[np.int_]
 # Prior precision of a coefficient that is known: far above any information on it, 1e6 or so.
 CERTAIN = 1e14
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
-# The fit has converged when a round changes the deviance by less; rounds are bounded.
-CONVERGED, MOST_ROUNDS = 0.01, 40
+# The fit has converged when the next round would change the deviance by less than the first, the
+# last one having changed it by less than the second; rounds are bounded.
+CONVERGED, NEARLY, MOST_ROUNDS = 0.01, 0.1, 40
 NOISE_STEPS = 3  # of the noise in a round: fitted to its end, rounds take a quarter longer
 MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
 MOST_PRODUCTS = 4000  # products of blocks on a drive that are kept: some 10 kB each
@@ -247,14 +248,19 @@ class Regression:
             start = shapes.start(np.stack([drive.squares for drive in system.drives]), self.counts)
         amplitudes, spectra = start, shapes.spectra(start)
         solution = system.solve(spectra, self.counts)
+        last = np.inf
         for _ in range(MOST_ROUNDS - 1):
             before = solution.deviance
             amplitudes = shapes.fitted(amplitudes, solution.squares, self.counts,
                                        solution.leverage, NOISE_STEPS)
             spectra = shapes.spectra(amplitudes)
             solution = system.solve(spectra, self.counts)
-            if abs(before - solution.deviance) < CONVERGED:
+            change = abs(before - solution.deviance)
+            # Changes fall as a geometric series: the next one is change^2 / last.
+            if change < CONVERGED or (change < last and change ** 2 < CONVERGED * last / 2
+                                      and change < NEARLY):
                 break
+            last = change
         return JointFit(tuple(blocks), solution.coefficients, solution.covariance, amplitudes,
                         spectra, solution.deviance, solution.squares, system.places)
 

@@ -1,7 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Normal equations of a joint fit, from sums of products over bands of frequency."""
+"""Normal equations of a joint fit, from sums of products over bands of frequency.
+
+References
+----------
+K. G. Murty, Note on a Bard-type scheme for solving the complementarity problem, Opsearch 11 (1974).
+"""
 
 from __future__ import annotations
 
@@ -19,7 +24,8 @@ from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
 
 # A tolerance is a limit: beyond it a number's prior is this many times as steep.
 BEYOND_TOLERANCE = 25.0
-MOST_LIMITED = 12  # rounds until the numbers at their limits are known
+# Rounds until the numbers at their limits are known, and those in which all change at once.
+MOST_LIMITED, ALL_AT_ONCE = 200, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +136,7 @@ class Prior:
         b = side - gram @ self.mean
         beyond = np.zeros(len(b))
         open_prior = gram + self.precision
-        for _ in range(MOST_LIMITED):
+        for number in range(MOST_LIMITED):
             H = open_prior + np.diag(BEYOND_TOLERANCE * np.abs(beyond)) if beyond.any() else (
                 open_prior)
             scale = 1 / np.sqrt(np.einsum('ii->i', H))
@@ -143,9 +149,14 @@ class Prior:
             away = scale * dpotrs(factor, scale * (
                 b + BEYOND_TOLERANCE * DEVIATIONS * beyond))[0]
             now = np.sign(away) * (self.limited & (np.abs(away) > DEVIATIONS))
-            if np.array_equal(now, beyond):
+            changed = np.flatnonzero(now != beyond)
+            if not len(changed):
                 break
-            beyond = now
+            # All at once may come back to where they were; one at a time ends (Murty).
+            changed = changed if number < ALL_AT_ONCE else changed[:1]
+            beyond[changed] = now[changed]
+        else:
+            raise np.linalg.LinAlgError('numbers with a tolerance did not settle')
         upper = dpotri(factor)[0]  # 0 below the diagonal, as the factor is
         covariance = upper + upper.T
         np.einsum('ii->i', covariance)[:] = np.einsum('ii->i', upper)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 PASSIVE_JOINTS = ('revolute', 'spherical')  # of a 3-PPRS: C_i and A_i
 
 
-class HiddenEffectError(PprsError, ValueError):
+class InjectedEffectError(PprsError, ValueError):
     """A hidden effect that does not exist, or parameters that it has not got."""
 
 
@@ -118,7 +118,7 @@ class PlatformMoment:
     rod_angle: Array
 
 
-class HiddenEffect(ABC):
+class InjectedEffect(ABC):
     """Physics that is in the robot and not in its model.
 
     Class attributes
@@ -180,7 +180,7 @@ class HiddenEffect(ABC):
                 'parameters': self.parameters, 'form': self.form}
 
 
-class DriveBound(HiddenEffect):
+class DriveBound(InjectedEffect):
     """An effect that acts in one drive, some or all.
 
     Parameters
@@ -192,7 +192,7 @@ class DriveBound(HiddenEffect):
     def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
         for drive, parameters in drives.items():
             if drive not in DRIVES:
-                raise HiddenEffectError(f'{self.name} acts in a drive, not in {drive!r}')
+                raise InjectedEffectError(f'{self.name} acts in a drive, not in {drive!r}')
             require_parameters(type(self), parameters)
         self.parameters = {drive: dict(parameters) for drive, parameters in drives.items()}
         # One array per parameter, neutral where a drive has not got the effect.
@@ -265,7 +265,7 @@ class SteepDriveForce(DriveForce):
     steep: ClassVar[bool] = True
 
 
-class HiddenJointFriction(HiddenEffect):
+class InjectedJointFriction(InjectedEffect):
     """Friction in the passive joints.
 
     Parameters
@@ -277,8 +277,8 @@ class HiddenJointFriction(HiddenEffect):
 
     def __init__(self, joint: str, **parameters: float) -> None:
         if joint not in PASSIVE_JOINTS:
-            raise HiddenEffectError(f'{self.name} acts in one of {", ".join(PASSIVE_JOINTS)}, not '
-                                    f'in {joint!r}')
+            raise InjectedEffectError(f'{self.name} acts in one of {", ".join(PASSIVE_JOINTS)}, '
+                                      f'not in {joint!r}')
         super().__init__(**parameters)
         self.joint = joint
 
@@ -303,7 +303,7 @@ class HiddenJointFriction(HiddenEffect):
         """Return moment per speed [N m s/rad], (3,), at speeds and loads (3,)."""
 
 
-class StructureForce(HiddenEffect):
+class StructureForce(InjectedEffect):
     """Forces on rods and platform."""
 
     method: ClassVar[str] = 'apply'
@@ -316,7 +316,7 @@ class StructureForce(HiddenEffect):
         """
 
 
-class BodyChange(HiddenEffect):
+class BodyChange(InjectedEffect):
     """A difference of bodies or gravity from the model."""
 
     method: ClassVar[str] = 'apply'
@@ -334,11 +334,11 @@ class SensorEffect(DriveBound):
     """A systematic error of a sensor; see `sensors.Sensors`."""
 
 
-def require_parameters(effect: type[HiddenEffect], given: Mapping[str, float]) -> None:
-    """Raise HiddenEffectError unless the effect's parameters are given, all finite."""
+def require_parameters(effect: type[InjectedEffect], given: Mapping[str, float]) -> None:
+    """Raise InjectedEffectError unless the effect's parameters are given, all finite."""
     if set(given) != set(effect.ranges):
-        raise HiddenEffectError(f'{effect.name} has the parameters {", ".join(effect.ranges)}, '
+        raise InjectedEffectError(f'{effect.name} has the parameters {", ".join(effect.ranges)}, '
                                 f'not {", ".join(given) or "none"}')
     for name, value in given.items():
         if not np.isfinite(value):
-            raise HiddenEffectError(f'{effect.name}: {name} is {value}, must be finite')
+            raise InjectedEffectError(f'{effect.name}: {name} is {value}, must be finite')

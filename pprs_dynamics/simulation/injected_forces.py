@@ -12,10 +12,10 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.simulation.hidden_effect import (
+from pprs_dynamics.simulation.injected_effect import (
     DriveForce,
     DriveMoment,
-    HiddenJointFriction,
+    InjectedJointFriction,
     PlatformMoment,
     Range,
     SteepDriveForce,
@@ -295,7 +295,7 @@ class DriveCoupling(DriveForce):
         return self.values['coefficient'] * moment.velocity[..., sources]
 
 
-class JointFriction(HiddenJointFriction):
+class JointFriction(InjectedJointFriction):
     """Dirt or preload in the revolute joints C_i, or in the spherical joints A_i."""
 
     name: ClassVar[str] = 'joint_friction'

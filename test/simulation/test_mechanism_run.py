@@ -19,10 +19,10 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.simulation.arm_engine import ArmEngine
-from pprs_dynamics.simulation.arm_forms import FORMS, NAMES
-from pprs_dynamics.simulation.arm_run import draw_motion, simulate_arm
-from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
+from pprs_dynamics.simulation.injected_effect import InjectedEffectError
+from pprs_dynamics.simulation.joint_forms import FORMS, NAMES
+from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
+from pprs_dynamics.simulation.mechanism_run import draw_motion, simulate_mechanism
 
 
 @pytest.fixture(scope='module')
@@ -41,7 +41,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> MechanismModel:
 
 def test_the_engine_moves_the_bodies_of_the_model(model: MechanismModel) -> None:
     motion = draw_motion(model, 10.0, 0)
-    engine = ArmEngine(model)
+    engine = MechanismEngine(model)
     assert engine.torques(motion) == pytest.approx(
         model.drive_forces(motion).parts['rigid_body']
         - np.array(model.values['robot.armature']) * motion.acceleration, abs=1e-8)
@@ -51,13 +51,13 @@ def test_the_engine_moves_an_arm_whose_last_joint_stands(tmp_path: Path) -> None
     arm.write_arm(tmp_path, joints=arm.JOINTS[:2])
     standing = MechanismModel.load(tmp_path / 'arm.yaml')
     motion = draw_motion(standing, 10.0, 0)
-    assert ArmEngine(standing).torques(motion) == pytest.approx(
+    assert MechanismEngine(standing).torques(motion) == pytest.approx(
         standing.drive_forces(motion).parts['rigid_body'], abs=1e-8)
 
 
 def test_a_hidden_payload_is_a_point_at_the_tool(model: MechanismModel) -> None:
     motion = draw_motion(model, 10.0, 1)
-    engine = ArmEngine(model)
+    engine = MechanismEngine(model)
     before = engine.torques(motion)
     engine.add_payload(1.5, np.zeros(3))
     loaded = build_model({**model.values, 'effects.active': ['payload_mass'],
@@ -70,7 +70,7 @@ def test_a_hidden_payload_is_a_point_at_the_tool(model: MechanismModel) -> None:
 def test_a_wrench_at_the_tool_is_that_of_the_engine(model: MechanismModel, of: str) -> None:
     robot = model if of == 'arm' else MechanismModel.load('config/hexapod.yaml')
     motion = draw_motion(robot, 2.0, 1)
-    engine = ArmEngine(robot)
+    engine = MechanismEngine(robot)
     before = engine.torques(motion)
     engine.wrench = np.array([30.0, -20.0, 500.0, 1.0, 2.0, -3.0])
     state = robot.mechanism(motion)
@@ -81,7 +81,7 @@ def test_a_wrench_at_the_tool_is_that_of_the_engine(model: MechanismModel, of: s
 
 def test_a_hidden_link_mass_is_that_of_the_model(model: MechanismModel) -> None:
     motion = draw_motion(model, 10.0, 1)
-    engine = ArmEngine(model)
+    engine = MechanismEngine(model)
     before = engine.torques(motion)
     engine.add_to_link(1, 0.7)
     loaded = build_model({**model.values, 'effects.active': ['link_mass'],
@@ -100,14 +100,14 @@ def test_a_link_that_is_the_payloads_or_not_there_is_refused(
 
 
 def test_without_effects_the_model_leaves_noise(model: MechanismModel) -> None:
-    run = simulate_arm(model, (), 0, noise=0.3)
+    run = simulate_mechanism(model, (), 0, noise=0.3)
     error = run.effort - model.drive_forces(run.motion).total
     assert np.std(error, axis=0) == pytest.approx(np.full(3, 0.3), rel=0.1)
 
 
 def test_an_arm_has_no_passive_joint_that_could_rub(model: MechanismModel) -> None:
-    with pytest.raises(HiddenEffectError, match='needs a passive joint'):
-        simulate_arm(model, ('joint_friction',), 4, duration=10.0)
+    with pytest.raises(InjectedEffectError, match='needs a passive joint'):
+        simulate_mechanism(model, ('joint_friction',), 4, duration=10.0)
 
 
 @pytest.mark.parametrize('name', [name for name in NAMES if name != 'joint_friction'])
@@ -115,7 +115,7 @@ def test_every_hidden_effect_shows(wrist: MechanismModel, name: str) -> None:
     model = wrist
     # A slow motion turns the joints farther, as a cylinder needs.
     duration = 30.0 if name == 'counterbalance' else 10.0
-    plain, hidden = (simulate_arm(model, names, 4, noise=0.0, duration=duration)
+    plain, hidden = (simulate_mechanism(model, names, 4, noise=0.0, duration=duration)
                      for names in ((), (name,)))
     moved, pushed = (np.abs(getattr(hidden, one) - getattr(plain, one)).max()
                      for one in ('position', 'effort'))
@@ -132,8 +132,8 @@ def test_every_hidden_effect_shows(wrist: MechanismModel, name: str) -> None:
 
 
 def test_motors_without_a_map_rub_nowhere(model: MechanismModel) -> None:
-    with pytest.raises(HiddenEffectError, match=r'friction: \{motors:'):
-        simulate_arm(model, ('coupled_drives',), 4, duration=10.0)
+    with pytest.raises(InjectedEffectError, match=r'friction: \{motors:'):
+        simulate_mechanism(model, ('coupled_drives',), 4, duration=10.0)
 
 
 @pytest.fixture(scope='module')
@@ -151,7 +151,7 @@ def wrist(model: MechanismModel) -> MechanismModel:
     ('counterbalance', 1), ('coupled_drives', 1), ('current_gain', 1), ('effort_gain', 1)])
 def test_what_is_hidden_is_named(wrist: MechanismModel, name: str, seed: int) -> None:
     model = wrist
-    run = simulate_arm(model, (name,), seed, thermometers=True)
+    run = simulate_mechanism(model, (name,), seed, thermometers=True)
     assert run.motion.time is not None
     found = diagnose(model, [Recording.from_arrays(
         'run', run.motion.time, run.position, None, run.effort, model.drives, run.channels)])
@@ -180,7 +180,7 @@ def test_statements_have_the_units_of_joints(model: MechanismModel, tmp_path: Pa
     without = build_model({**model.values, 'friction.coulomb': (0.0, 4.0, 0.0)}, model.source)
     from pprs_dynamics.inference.diagnosis.localisation import localise
     from pprs_dynamics.inference.residuals.measuring import measure_residuals
-    run = simulate_arm(model, (), 0)
+    run = simulate_mechanism(model, (), 0)
     assert run.motion.time is not None
     recording = Recording.from_arrays('run', run.motion.time, run.position, None, run.effort,
                                       model.drives)

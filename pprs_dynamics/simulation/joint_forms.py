@@ -16,7 +16,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
+from pprs_dynamics.simulation.injected_effect import InjectedEffectError
 from pprs_dynamics.simulation.temperatures import REFERENCE, thinner
 
 CROSSED = 0.02  # of a joint's top speed or load, within which a clearance is crossed
@@ -215,10 +215,10 @@ NAMES = (*FORMS, *OF_ARM)
 
 
 def require_known(names: tuple[str, ...]) -> None:
-    """Raise HiddenEffectError for a name that no hidden effect of an arm has."""
+    """Raise InjectedEffectError for a name that no hidden effect of an arm has."""
     for name in names:
         if name not in NAMES:
-            raise HiddenEffectError(f'{name} is no hidden effect of such a robot, must be one of '
+            raise InjectedEffectError(f'{name} is no hidden effect of such a robot, must be one of '
                                     f'{", ".join(NAMES)}')
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.simulation.closed_chains import DRIVE_DOFS, ClosedChains
-from pprs_dynamics.simulation.hidden_effect import BodyChange, DriveBound, Range
+from pprs_dynamics.simulation.injected_effect import BodyChange, DriveBound, Range
 
 PICK_UP_TIME = 0.2  # [s], in which the weight of a payload goes over to the platform
 

@@ -4,7 +4,7 @@
 """MuJoCo's model of a mechanism: its kinematics, inertia, gravity and reactions.
 
 MuJoCo reads the description itself. Its masses, inertias, gravity and couplings are retained:
-`ArmEngine` raises where the model reads the description otherwise.
+`MechanismEngine` raises where the model reads the description otherwise.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.model.robot_block import described_gravity
-from pprs_dynamics.simulation.arm_forms import tilted, truth
 from pprs_dynamics.simulation.engine_loops import ClosedMotion, EngineLoops, cross
 from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState
+from pprs_dynamics.simulation.joint_forms import tilted, truth
 
 CARRIER = '_added_to_'  # body of what is added to a joint
 LEAST = 1e-12  # [kg, kg m^2], of bodies that another's inertia contains
@@ -45,7 +45,7 @@ AGREEMENT = 1e-6  # of the largest effort
 WIDEST, SPAN = 1.0, 0.3  # [rad, m] of a drive, and the share of it in which both are compared
 
 
-class ArmEngine:
+class MechanismEngine:
     """MuJoCo's model of a mechanism.
 
     Numbers that the model file states in place of the description's replace MuJoCo's.

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a recording of a simulated arm holds: MuJoCo's inverse dynamics along a motion.
+"""Recordings of a simulated mechanism: MuJoCo's inverse dynamics along a motion.
 
-Friction of the arm is that of the model file, hidden effects have forms of their own (`arm_forms`).
+Friction is that of the model file. Injected effects have equations of their own (`joint_forms`).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.simulation.arm_engine import ArmEngine
-from pprs_dynamics.simulation.arm_forms import (
+from pprs_dynamics.simulation.injected_effect import InjectedEffectError
+from pprs_dynamics.simulation.joint_forms import (
     CROSSED,
     FORMS,
     SIZE,
@@ -33,7 +33,7 @@ from pprs_dynamics.simulation.arm_forms import (
     require_known,
     truth,
 )
-from pprs_dynamics.simulation.hidden_effect import HiddenEffectError
+from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
 from pprs_dynamics.simulation.sensors import ButterworthFilter, EffortFilter
 from pprs_dynamics.simulation.temperatures import REFERENCE, Climate, read_thermometers
 
@@ -53,7 +53,7 @@ COLOURED, CORRELATION = 0.36, 0.95  # share of the noise's variance, and from sa
 
 
 @dataclass(frozen=True)
-class ArmRun:
+class MechanismRun:
     """A simulated recording.
 
     Parameters
@@ -99,13 +99,13 @@ def draw_motion(model: MechanismModel, duration: float, seed: int, rate: float =
             uses = uses / SHRINK
         else:
             return motion
-    raise HiddenEffectError('no motion about home stays within the workspace')
+    raise InjectedEffectError('no motion about home stays within the workspace')
 
 
-def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: float = 1.0,
+def simulate_mechanism(model: MechanismModel, names: Sequence[str], seed: int, scale: float = 1.0,
                  noise: float | None = None, duration: float = 40.0, path_seed: int = 0,
                  progress: Callable[[float], None] | None = None, thermometers: bool = False,
-                 link_encoders: bool = False) -> ArmRun:
+                 link_encoders: bool = False) -> MechanismRun:
     """Return a recording of an arm with hidden effects.
 
     Parameters
@@ -113,7 +113,7 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
     model : MechanismModel
         Its added effects are part of the model, not of the arm.
     names : sequence of str
-        Of `arm_forms.NAMES`, or 'random'.
+        Of `joint_forms.NAMES`, or 'random'.
     seed : int
         Of effects and noise.
     scale : float
@@ -130,7 +130,7 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
 
     Raises
     ------
-    HiddenEffectError
+    InjectedEffectError
         For another name.
     """
     random = np.random.default_rng(seed)
@@ -139,7 +139,7 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
                       'payload_mass'))
     chosen = tuple(str(random.choice(choices)) if name == 'random' else name for name in names)
     require_known(chosen)
-    engine = ArmEngine(model)
+    engine = MechanismEngine(model)
     if progress is not None:
         progress(0.1)
     hidden: list[dict[str, Any]] = []
@@ -152,7 +152,7 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
     if 'link_mass' in chosen:
         links = links_that_weigh(model)
         if not links:
-            raise HiddenEffectError('link_mass needs a link between the first and that of the tool')
+            raise InjectedEffectError('link_mass needs a link between the first and the tool')
         hidden.append(engine.hide_link_mass(random, scale, links))
     passive = {}
     if 'joint_friction' in chosen:
@@ -238,7 +238,7 @@ def simulate_arm(model: MechanismModel, names: Sequence[str], seed: int, scale: 
             + ENCODER * second.uniform(-0.5, 0.5, beside.shape))
     position = read.position + beside + windup + ENCODER * random.uniform(
         -0.5, 0.5, beside.shape)
-    return ArmRun(motion, position, measured, tuple(hidden), channels)
+    return MechanismRun(motion, position, measured, tuple(hidden), channels)
 
 
 def _wind_up(model: MechanismModel, motion: JointMotion, loads: Array, random: np.random.Generator,
@@ -280,8 +280,8 @@ def _behind_encoder(model: MechanismModel, read: JointMotion, random: np.random.
     """
     able = [j for j, unit in enumerate(model.units) if unit.turns or model.gear_ratios[j] > 1]
     if not able:
-        raise HiddenEffectError('eccentric_encoder needs a joint that turns, or the gear_ratio of '
-                                'one that slides')
+        raise InjectedEffectError('eccentric_encoder needs a joint that turns, or the gear_ratio '
+                                  'of one that slides')
     j = able[int(random.integers(len(able)))]
     ratio = model.gear_ratios[j]
     # On the motor, or on the joint behind its gear.
@@ -330,7 +330,7 @@ def _lost_motion(model: MechanismModel, motion: JointMotion, loads: Array,
         'b / 2 x / sqrt(x^2 + (0.02 x_max)^2), x the load or the speed')
 
 
-def _hidden_joint(model: MechanismModel, engine: ArmEngine, motion: JointMotion, plain: Array,
+def _hidden_joint(model: MechanismModel, engine: MechanismEngine, motion: JointMotion, plain: Array,
                   random: np.random.Generator, scale: float,
                   ) -> tuple[str, Array, dict[str, float]]:
     """Return dry friction of a passive joint: its name, efforts against it (N,), and size."""
@@ -338,7 +338,7 @@ def _hidden_joint(model: MechanismModel, engine: ArmEngine, motion: JointMotion,
     joints = [name for name, (row, _) in friction_rows(structure).items()
               if row >= 0 and name not in structure.drives]
     if not joints:
-        raise HiddenEffectError('joint_friction needs a passive joint')
+        raise InjectedEffectError('joint_friction needs a passive joint')
     name = str(random.choice(joints))
     closed, dof = engine.closed(motion), engine.state.dof(name)
     rate, felt = closed.velocity[:, dof], np.abs(closed.rates[:, dof]).max(axis=0)
@@ -354,7 +354,7 @@ def _hide_motor_friction(model: MechanismModel, motion: JointMotion, largest: Ar
     """Let a motor rub that moves several joints, and return how."""
     motors = model.robot.motors
     if not motors:
-        raise HiddenEffectError('coupled_drives needs a motor that moves several joints: write '
+        raise InjectedEffectError('coupled_drives needs a motor that moves several joints: write '
                                 'friction: {motors: {MOTOR: {JOINT: 1.0, OTHER: 1.0}}}')
     name = str(random.choice(sorted(motors)))
     row = np.array(motors[name])
@@ -394,7 +394,7 @@ def _hide_current_gain(model: MechanismModel, motion: JointMotion, temperature: 
     return truth('current_gain', [model.drives[j]], {model.drives[j]: parameters}, form)
 
 
-def _own_friction(model: MechanismModel, engine: ArmEngine, motion: JointMotion) -> Array:
+def _own_friction(model: MechanismModel, engine: MechanismEngine, motion: JointMotion) -> Array:
     """Return friction, offset and armature as the model file has them, under the true loads."""
     v = motion.velocity
     friction: Array = (
@@ -429,7 +429,7 @@ def one_able_joint(name: str, model: MechanismModel, motion: JointMotion,
     """Return one of the joints that a hidden force can act in along a motion."""
     able = able_joints(name, model, motion)
     if not able:
-        raise HiddenEffectError(f'{name} needs a joint that turns by '
+        raise InjectedEffectError(f'{name} needs a joint that turns by '
                                 f'{FORMS[name].needs_turn:g} rad')
     return able[int(random.integers(len(able)))]
 
