@@ -256,7 +256,8 @@ class Search:
             alone[d] = max(OF_ONE, key=lambda scale: found[d, scale].score
                            - _mistakes(scale) / weights[d])
         choices = [alone]
-        for scale in SCALES:
+        # Inertia alone may be invented: units that are no prefixes need a weight.
+        for scale in SCALES if np.nanmax(np.abs(parts.gravity)) > 0 else OF_ONE:
             common = np.ones(effort.shape[1])
             common[np.isfinite(effort).any(axis=0)] = scale
             choices.append(common)
