@@ -10,7 +10,7 @@
 
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
-from launch_ros.actions import Node
+from launch_ros.actions import LifecycleNode, Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
@@ -43,9 +43,9 @@ def generate_launch_description() -> LaunchDescription:
             Node(executable='simulated_robot', parameters=[*parameters, {
                 'hidden_effects': ParameterValue(given['hidden_effects'], value_type=list[str])}],
                  **common),
-            Node(executable='feedforward', parameters=parameters,
+            LifecycleNode(executable='feedforward', name='feedforward', parameters=parameters,
                  remappings=[('~/joint_command', 'simulated_robot/joint_command')], **common),
-            Node(executable='monitor', parameters=[*parameters, {
+            LifecycleNode(executable='monitor', name='monitor', parameters=[*parameters, {
                 'diagnose_every': ParameterValue(given['diagnose_every'], value_type=float)}],
                  **common),
             Node(executable='play_trajectory', parameters=[*parameters, {

@@ -10,7 +10,7 @@
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 from launch.actions import DeclareLaunchArgument, LogInfo, OpaqueFunction
 from launch.substitutions import Command, LaunchConfiguration
-from launch_ros.actions import Node
+from launch_ros.actions import LifecycleNode, Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchContext, LaunchDescription
@@ -25,19 +25,22 @@ def generate_launch_description() -> LaunchDescription:
         'namespace': ('', 'of the nodes'),
         'prefix': ('', 'of the joints: joint_states says PREFIXslide_1; empty: joint_prefix of '
                    'the model file'),
+        'tf_prefix': ('', 'of all frames: two robots on one /tf need one each'),
         'use_sim_time': ('false', 'the clock is that of /clock'),
         'parameters': ('', 'further file of parameters, e.g. QoS overrides, with a path; empty: '
                        'none'),
     }
     given = {name: LaunchConfiguration(name) for name in ('urdf', *arguments)}
 
-    def monitor(context: LaunchContext) -> list[Node]:
+    def monitor(context: LaunchContext) -> list[LifecycleNode]:
         # Launch would leave a missing file out, and say so in a line among many.
         files = require_files(*(given[name].perform(context) for name in ('model', 'parameters')))
-        own = {'use_sim_time': given['use_sim_time']}
+        own = {'use_sim_time': given['use_sim_time'],
+               'tf_prefix': ParameterValue(given['tf_prefix'], value_type=str)}
         if given['prefix'].perform(context):
             own['joint_prefix'] = ParameterValue(given['prefix'], value_type=str)
-        return [Node(package='pprs_dynamics', executable='monitor', output='screen',
+        return [LifecycleNode(executable='monitor', name='monitor', package='pprs_dynamics',
+                              output='screen',
                      namespace=given['namespace'], parameters=[*files, own],
                      remappings=[('joint_states', given['joint_states'])])]
 
@@ -56,6 +59,7 @@ def generate_launch_description() -> LaunchDescription:
         actions.append(Node(
             package='robot_state_publisher', executable='robot_state_publisher', output='screen',
             namespace=given['namespace'], parameters=[{
-                'robot_description': description, 'use_sim_time': given['use_sim_time']}],
+                'robot_description': description, 'use_sim_time': given['use_sim_time'],
+                'frame_prefix': ParameterValue(given['tf_prefix'], value_type=str)}],
             remappings=[('joint_states', 'monitor/joint_states_full')]))
     return LaunchDescription(actions)

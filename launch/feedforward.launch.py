@@ -10,7 +10,7 @@
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.conditions import IfCondition
 from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node
+from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchContext, LaunchDescription
@@ -35,7 +35,7 @@ def generate_launch_description() -> LaunchDescription:
     }
     given = {name: LaunchConfiguration(name) for name in arguments}
 
-    def nodes(context: LaunchContext) -> list[Node]:
+    def nodes(context: LaunchContext) -> list[LifecycleNode]:
         # Launch would leave a missing file out, and say so in a line among many.
         files = require_files(*(given[name].perform(context) for name in ('model', 'parameters')))
         own = {'use_sim_time': given['use_sim_time']}
@@ -43,13 +43,15 @@ def generate_launch_description() -> LaunchDescription:
             own['joint_prefix'] = ParameterValue(given['prefix'], value_type=str)
         parameters = [*files, own]
         return [
-            Node(package='pprs_dynamics', executable='feedforward', namespace=given['namespace'],
+            LifecycleNode(executable='feedforward', name='feedforward', package='pprs_dynamics',
+                          namespace=given['namespace'],
                  parameters=[*parameters, {
                      'stop_time': ParameterValue(given['stop_time'], value_type=float)}],
                  output='screen', remappings=[
                      ('~/commands', [given['controller'], '/commands']),
                      ('~/joint_trajectory', [given['controller'], '/joint_trajectory'])]),
-            Node(package='pprs_dynamics', executable='monitor', namespace=given['namespace'],
+            LifecycleNode(executable='monitor', name='monitor', package='pprs_dynamics',
+                          namespace=given['namespace'],
                  parameters=parameters, output='screen', condition=IfCondition(given['monitor']),
                  remappings=[('joint_states', given['joint_states'])])]
 

@@ -8,7 +8,7 @@
 
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node
+from launch_ros.actions import LifecycleNode
 from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchContext, LaunchDescription
@@ -31,7 +31,7 @@ def generate_launch_description() -> LaunchDescription:
     }
     given = {name: LaunchConfiguration(name) for name in arguments}
 
-    def nodes(context: LaunchContext) -> list[Node]:
+    def nodes(context: LaunchContext) -> list[LifecycleNode]:
         # Launch would leave a missing file out, and say so in a line among many.
         files = require_files(*(given[name].perform(context) for name in ('model', 'parameters')))
         own = {'use_sim_time': given['use_sim_time']}
@@ -39,7 +39,8 @@ def generate_launch_description() -> LaunchDescription:
             own['joint_prefix'] = ParameterValue(given['prefix'], value_type=str)
         if given['diagnose_every'].perform(context):
             own['diagnose_every'] = ParameterValue(given['diagnose_every'], value_type=float)
-        return [Node(package='pprs_dynamics', executable='monitor', namespace=given['namespace'],
+        return [LifecycleNode(executable='monitor', name='monitor', package='pprs_dynamics',
+                              namespace=given['namespace'],
                      parameters=[*files, own], output='screen',
                      remappings=[('joint_states', given['joint_states'])])]
 

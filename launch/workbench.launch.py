@@ -6,27 +6,39 @@
     ros2 launch pprs_dynamics workbench.launch.py model:=/path/robot.yaml
 """
 
-from launch.actions import DeclareLaunchArgument, ExecuteProcess
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.substitutions import FindPackagePrefix
 
-from launch import LaunchDescription
+from launch import LaunchContext, LaunchDescription
+from pprs_dynamics.system.input_files import require_files
 
 
 def generate_launch_description() -> LaunchDescription:
     """Return the process and its arguments."""
-    pprs = PathJoinSubstitution([FindPackagePrefix('pprs_dynamics'), 'lib/pprs_dynamics/pprs'])
+    arguments = {
+        'model': (None, 'model file of the robot that is connected, with a path'),
+        'namespace': ('/', 'of the topic, monitor and feedforward'),
+        'joint_states': ('joint_states', 'topic of the measurements'),
+        'port': ('8080', 'of the workbench'),
+        'use_sim_time': ('false', 'the clock is that of /clock'),
+        'parameters': ('', 'further file of parameters, e.g. QoS overrides, with a path; empty: '
+                       'none'),
+    }
+    given = {name: LaunchConfiguration(name) for name in arguments}
+
+    def process(context: LaunchContext) -> list[ExecuteProcess]:
+        # Launch would leave a missing file out, and say so in a line among many.
+        model, *files = require_files(
+            *(given[name].perform(context) for name in ('model', 'parameters')))
+        pprs = PathJoinSubstitution([FindPackagePrefix('pprs_dynamics'), 'lib/pprs_dynamics/pprs'])
+        return [ExecuteProcess(cmd=[
+            pprs, 'workbench', '--live', '--no-browser', '--model', model,
+            '--live-topic', given['joint_states'], '--namespace', given['namespace'],
+            '--port', given['port'], '--ros-args',
+            '-p', ['use_sim_time:=', given['use_sim_time']],
+            *(word for file in files for word in ('--params-file', file))], output='screen')]
+
     return LaunchDescription([
-        DeclareLaunchArgument(
-            'model', description='model file of the robot that is connected, with a path'),
-        DeclareLaunchArgument('topic', default_value='joint_states',
-                              description='of the measurements'),
-        DeclareLaunchArgument('namespace', default_value='/',
-                              description='of topic, monitor and feedforward'),
-        DeclareLaunchArgument('port', default_value='8080', description='of the workbench'),
-        ExecuteProcess(cmd=[pprs, 'workbench', '--live', '--no-browser', '--model',
-                            LaunchConfiguration('model'), '--live-topic',
-                            LaunchConfiguration('topic'), '--namespace',
-                            LaunchConfiguration('namespace'), '--port',
-                            LaunchConfiguration('port')], output='screen'),
-    ])
+        *(DeclareLaunchArgument(name, default_value=value, description=text)
+          for name, (value, text) in arguments.items()), OpaqueFunction(function=process)])

@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 from benchmarks.naming import columns, fetch, real, run
-from benchmarks.naming.entrants import CONTROL, ENTRANTS, PEERS, Entrant, ablations
-from benchmarks.naming.entrants.controls import perfect, random, silent
+from benchmarks.naming.entrants import ENTRANTS, PEERS, Entrant, ablations
+from benchmarks.naming.entrants.controls import perfect
 from benchmarks.naming.entrants.cross_validation import block_cross_validation
 from benchmarks.naming.entrants.equations import Equations
 from benchmarks.naming.entrants.pprs import answer_of
@@ -28,8 +28,6 @@ from benchmarks.naming.entrants.spike_and_slab import spike_and_slab
 from benchmarks.naming.entrants.stepwise import stepwise
 from benchmarks.naming.generate import draws, make, write_problem
 from benchmarks.naming.page import (
-    best_of_settings,
-    better_than_ours,
     fails_table,
     is_right,
     write_page,
@@ -46,9 +44,6 @@ from benchmarks.naming.problems import (
 from benchmarks.naming.robots import OFFERED, ROBOTS, hidden_names
 from benchmarks.naming.run import enter_all, make_all, score_all
 from benchmarks.naming.scoring import FIGURES, Rate, Scored, figures, judge
-from pprs_dynamics.inference.residuals.noise import NoiseShapes
-from pprs_dynamics.inference.search import fitted_sets, ranking, relinearisation, search
-from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.simulation.injected_effects import IN_CATALOGUE
 from pprs_dynamics.simulation.mechanism_run import NAMES
@@ -106,24 +101,6 @@ def test_the_perfect_entrant_gets_everything() -> None:
         assert rate.count == 0 or rate.share == (1.0 if better else 0.0), name
 
 
-def test_the_silent_entrant_names_nothing_and_claims_nothing() -> None:
-    found = figures(scored(silent(problem(0, {}))))
-    assert {name: found[name].hits for name in ('first', 'named', 'exact, one', 'unknown',
-                                                'wrong alone', 'false alarms')} == dict.fromkeys(
-        ('first', 'named', 'exact, one', 'unknown', 'wrong alone', 'false alarms'), 0)
-    assert found['false alarms'].count == 1
-
-
-def test_chance_names_one_of_as_many_as_there_are() -> None:
-    hits = 0
-    for seed in range(400):
-        asked = problem(0, {})
-        asked = Problem(asked.drives, asked.time, asked.error, asked.base, asked.columns,
-                        asked.rows, Path(str(seed)))
-        hits += bool(judge(DRIFT, random(asked)).first)
-    assert 0.25 - 0.07 < hits / 400 < 0.25 + 0.07  # one of four, three deviations
-
-
 @pytest.mark.parametrize(('truth', 'answer', 'what', 'right'), [
     (DRIFT, Answer.of([Named('spring', ('b',))]), 'exact', True),
     (DRIFT, Answer.of([Named('spring', ('a',))]), 'drives', False),
@@ -168,19 +145,6 @@ def test_wilson() -> None:
 def test_answers_of_another_form_are_refused(text: dict[str, object]) -> None:
     with pytest.raises(AnswerError):
         Answer.from_dict(text)
-
-
-def test_files_of_an_entrant_of_ones_own_are_scored(tmp_path: Path) -> None:
-    (tmp_path / 'truth').mkdir()
-    (tmp_path / 'answers' / 'mine').mkdir(parents=True)
-    for name, truth in (('one', DRIFT), ('two', DRIFT)):
-        text = {**truth.to_dict(), 'problem': name}
-        (tmp_path / 'truth' / f'{name}.json').write_text(json.dumps(text))
-    answer = Answer.of([Named('spring', ('b',), {'b.stiffness': (3.1, 0.1)})])
-    (tmp_path / 'answers' / 'mine' / 'one.json').write_text(json.dumps(answer.to_dict()))
-    found = figures(score_all(tmp_path)['mine'])
-    assert (found['first'].hits, found['first'].count) == (1, 2)  # what is not answered is silence
-    assert found['intervals hold'] == Rate(1, 1)
 
 
 def test_the_entrant_of_the_protocols_page_runs_and_is_scored(
@@ -274,41 +238,12 @@ def test_every_entrant_has_a_key_of_its_own() -> None:
 
 
 @pytest.mark.parametrize('without', ABLATIONS)
-def test_a_part_that_is_left_out_is_there_and_comes_back(
-    without: Callable[[Problem], Answer], monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    owners = NoiseShapes, Search, fitted_sets, ranking, relinearisation, search
-    before = [dict(vars(owner)) for owner in owners]
-    within: list[bool] = []
-
-    def diagnosed(asked: Problem) -> Answer:
-        within.append([dict(vars(owner)) for owner in owners] != before)
-        return Answer('none')
-    monkeypatch.setattr(ablations, 'pprs', diagnosed)
-    without(problem(0, {}))
-    assert within == [True]
-    assert [dict(vars(owner)) for owner in owners] == before
-
-
-@pytest.mark.parametrize('without', ABLATIONS)
 def test_this_package_answers_without_a_part_of_it(
     without: Callable[[Problem], Answer], tmp_path: Path,
 ) -> None:
     draw = next(one for one in draws(1, 24) if one.robot == 'axis')
     write_problem(draw, tmp_path / draw.name, seconds=8.0)
     assert without(replace(problem(0, {}), folder=tmp_path / draw.name)).verdict in VERDICTS
-
-
-def test_of_two_settings_the_better_one_is_ranked_and_peers_ahead_are_told() -> None:
-    right, wrong = (scored(perfect), scored(Answer.of([Named('offset', ('a',))])))
-    tuned = next(name for name in ENTRANTS if name.startswith('stepwise BIC, white, '))
-    every = {'pprs diagnose': wrong, 'stepwise BIC, white': wrong, tuned: right, 'LASSO': wrong}
-    assert best_of_settings(every)[0] == tuned
-    assert 'stepwise BIC, white' not in best_of_settings(every)
-    said = better_than_ours({name: every[name] for name in best_of_settings(every)})
-    assert f'*exact* (0 (0-56) here): {tuned} (100 (44-100))' in said
-    assert 'LASSO' not in said
-    assert all(ENTRANTS[name].sort == CONTROL for name in ('silent', 'random'))
 
 
 def test_what_is_fetched_becomes_a_recording() -> None:

@@ -28,8 +28,8 @@ from pprs_dynamics.ros.force_command import (
     ForceCommand,
     parameters_for,
 )
+from pprs_dynamics.ros.messages.command_writer import CommandWriter
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS, RobotNames
-from pprs_dynamics.ros.messages.serialisation import command_writer
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
 from pprs_dynamics.ros.messages.trajectory_request import (
     TRAJECTORY,
@@ -86,7 +86,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         # Which drives there are, and by which message they are asked for, stays.
         names = RobotNames.of(self._settings.model, node_values['frame_id'])
         self._readers = readers_for(self._settings.model, names)
-        self._written = command_writer(names)
+        self._written = CommandWriter(names)
         self._controller = ControllerWatch(names.joints)
         self._feedforward = Feedforward(self._settings.model, node_values)
         self._timing = Timing.of(node_values)

@@ -29,6 +29,7 @@ from pprs_dynamics.ros.node.parameters import NodeParameter, node_parameter
 REVERSAL_VELOCITY = 'friction.reversal_velocity'
 CLAMP = 'clamp'
 HOLD_GRAVITY, ZERO, SILENT = 'hold_gravity', 'zero', 'silent'
+RAMP_TIME = 2.0  # [s]; a person sees the efforts change and can stop it
 STILL = 1.1920929e-07  # [m/s, rad/s] joint_trajectory_controller's own bound for standing
 SAME_EFFORT = 1e-9  # [N, N m]
 
@@ -49,7 +50,7 @@ _PARAMETERS = (
                    choices=(REJECT, SPLINE)),
     node_parameter('feedforward_scale', 1.0, 'multiplies every effort that goes out [1]: less '
                    'than 1 while a robot is commissioned', lower=0, upper=1),
-    node_parameter('ramp_time', 0.0, 'in which efforts go over to those of a changed model or '
+    node_parameter('ramp_time', RAMP_TIME, 'in which efforts change to those of a changed model or '
                    'feedforward_scale while commands flow [s]; 0: at once', lower=0, upper=60),
     node_parameter('stop_time', 0.0, 'in which a last point of ~/joint_trajectory that moves is '
                    'followed by one at rest [s]; 0: none is', lower=0, upper=10),

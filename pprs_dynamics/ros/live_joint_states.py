@@ -224,7 +224,7 @@ class LiveNodes:
                    signal_handler_options=SignalHandlerOptions.NO)
         self._node = LiveJointStates(model, topic, monitor, feedforward, namespace=namespace,
                                      context=self._context)
-        self._steps = ModelSteps(self._node.clients_of, model.values)
+        self._steps = ModelSteps(self._node.clients_of)
         self._models: list[ForceModel] = []  # before each step
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
@@ -274,7 +274,8 @@ class LiveNodes:
         dict
             `is_set`, and `nodes`: what each said; '' where it took everything.
         """
-        answer = self._steps.set_model(model.values, self._confirmed(confirmed))
+        answer = self._steps.set_model(
+            model.values, self._node.model.values, self._confirmed(confirmed))
         if answer.is_done:
             self._models.append(self._node.model)
             self._node.stream.use_model(model)

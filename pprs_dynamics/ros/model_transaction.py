@@ -21,6 +21,7 @@ RAMP_TIME = 'ramp_time'
 # [s] in which efforts of the drives go over to those of another model; a person sees it begin and
 # can stop it.
 RAMP = 2.0
+OTHERS = 'has another model in force, changed by another program since: {}'
 ABSENT, SILENT = 'does not run', f'has not answered within {PATIENCE:g} s'
 
 Values = Mapping[str, Any]
@@ -58,7 +59,7 @@ def running(clients: Mapping[str, AsyncParameterClient]) -> list[str]:
 
 def set_on_all(
     clients: Mapping[str, AsyncParameterClient], names: Sequence[str],
-    changes: Mapping[str, Values],
+    changes: Mapping[str, Values], expected: Values,
 ) -> NodeAnswer:
     """Set parameters on nodes, one after the other; what was set is set back where one refuses.
 
@@ -71,6 +72,9 @@ def set_on_all(
         they are not touched where another one refuses.
     changes : mapping
         By node, of parameters to values.
+    expected : mapping
+        What the nodes have in force. One that has other values was changed by another program,
+        whose step must not be undone unseen.
     """
     said = dict.fromkeys(names, '')
     before: dict[str, dict[str, Any]] = {}
@@ -78,6 +82,9 @@ def set_on_all(
         had = _values(clients[name], list(changes[name]))
         if had is None:
             said[name] = ABSENT if not clients[name].services_are_ready() else SILENT
+        elif different := [key for key in changes[name] if key != RAMP_TIME and key in expected
+                           and not _same(had[key], expected[key])]:
+            said[name] = OTHERS.format(', '.join(different))
         else:
             before[name] = had
             given = dict(changes[name])
@@ -107,27 +114,23 @@ class ModelSteps:
     ----------
     clients : mapping
         By node; those that drive a machine last, see `set_on_all`.
-    given : mapping
-        Values of the model with which the nodes began.
     """
 
-    def __init__(self, clients: Mapping[str, AsyncParameterClient], given: Values) -> None:
+    def __init__(self, clients: Mapping[str, AsyncParameterClient]) -> None:
         self.clients = clients
-        self._given, self._set_before = given, set[str]()
-        self._steps: list[Mapping[str, Values]] = []
+        # What nodes had before each step, and what was set.
+        self._steps: list[tuple[Mapping[str, Values], Values]] = []
 
-    def set_model(self, values: Values, names: Sequence[str]) -> NodeAnswer:
-        """Set a model's values on nodes, all or none."""
-        # What was set once is set again: a number that is as it was given is so on the nodes, too.
-        keys = self._set_before | {
-            key for key, value in values.items()
-            if key != ACTIVE and not key.startswith('history.') and self._given.get(key) != value}
-        changes = {key: value for key, value in values.items() if key in keys}
+    def set_model(self, values: Values, in_force: Values, names: Sequence[str]) -> NodeAnswer:
+        """Set a model's values on nodes that have another one in force, all or none."""
+        changes = {key: value for key, value in values.items()
+                   if key != ACTIVE and not key.startswith('history.')
+                   and in_force.get(key) != value}
         changes |= {ACTIVE: list(values.get(ACTIVE, ())), RAMP_TIME: RAMP}
-        answer = set_on_all(self.clients, names, dict.fromkeys(names, changes))
+        answer = set_on_all(self.clients, names, dict.fromkeys(names, changes),
+                            {ACTIVE: (), **in_force})
         if answer.is_done:
-            self._set_before = keys
-            self._steps.append(answer.before)
+            self._steps.append((answer.before, changes))
         return answer
 
     def restore(self, names: Sequence[str]) -> NodeAnswer:
@@ -139,9 +142,11 @@ class ModelSteps:
         """
         if not self._steps:
             raise NothingToRestoreError
-        before = {name: values for name, values in self._steps[-1].items() if name in names}
+        had, was_set = self._steps[-1]
+        before = {name: values for name, values in had.items() if name in names}
         answer = set_on_all(self.clients, list(before), {
-            name: {**_restored(values), RAMP_TIME: RAMP} for name, values in before.items()})
+            name: {**_restored(values), RAMP_TIME: RAMP} for name, values in before.items()},
+            was_set)
         if answer.is_done:
             self._steps.pop()
         return answer
@@ -156,6 +161,13 @@ def _restored(values: Values) -> dict[str, Any]:
     # What was not there stays, without effect: the list of effects in force is set back.
     return {name: value for name, value in values.items()
             if value is not None and name != RAMP_TIME}
+
+
+def _same(value: Any, expected: Any) -> bool:
+    """Return whether a parameter has a value, an empty list being none."""
+    if isinstance(expected, (list, tuple)) or value is None:
+        return list(value or ()) == list(expected or ())
+    return bool(value == expected)
 
 
 def _values(client: AsyncParameterClient, names: list[str]) -> dict[str, Any] | None:

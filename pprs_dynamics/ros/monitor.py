@@ -49,6 +49,7 @@ except ImportError:  # it comes with a ROS 2 installation only
 PARAMETERS = (
     AUTOSTART,
     FRAME,
+    node_parameter('tf_prefix', '', 'of all frames on /tf: two robots need one each', stays=True),
     node_parameter('window', WINDOW, 'of the smoothing that gives velocity and acceleration; '
                    'answers lag by half of it [s]', lower=0.01, upper=2.0, stays=True),
     node_parameter('error_span', ERROR_SPAN, 'over which ~/error is taken [s]', lower=0.05,
@@ -181,7 +182,9 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._all_joints.publish(conversions.joint_positions(stamp, tree.names, pose.joints))
         if tree.bodies and self._tf is not None:
             self._tf.publish(TFMessage(
-                transforms=conversions.transforms(stamp, tree.base, tree.bodies, pose.bodies)))
+                transforms=conversions.transforms(
+                stamp, tree.base, tree.bodies, pose.bodies,
+                self._settings.node_values['tf_prefix'])))
 
     def _compare(self) -> None:
         if self.state != 'active':

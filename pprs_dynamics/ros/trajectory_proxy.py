@@ -31,8 +31,8 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.preparation import prepare
 from pprs_dynamics.ros.force_command import STILL, Feedforward, parameters_for
 from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.messages.command_writer import CommandWriter
 from pprs_dynamics.ros.messages.conversions import RobotNames
-from pprs_dynamics.ros.messages.serialisation import CommandObjects
 from pprs_dynamics.ros.messages.status_codes import Code, Rejection
 from pprs_dynamics.ros.messages.trajectory_request import (
     SPLINE,
@@ -157,7 +157,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
         except PprsError as error:
             self.get_logger().warning(f'the controller holds without gravity: {error}')
             return
-        self._hold.publish(CommandObjects(RobotNames.of(model)).joint_trajectory(
+        self._hold.publish(CommandWriter(RobotNames.of(model)).joint_trajectory(
             0, np.zeros(1, dtype=np.int64), held.forces, held.effort))
         self.get_logger().info('the controller holds with gravity')
 
@@ -200,7 +200,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
         velocity = answer.forces.drive_motion[1]
         is_still = np.abs(velocity[-1]).max() <= STILL  # else it is refused
         drives = feedforward.ending_at_rest(answer, SETTLING if is_still else 0.0)
-        trajectory = CommandObjects(RobotNames.of(model)).joint_trajectory(
+        trajectory = CommandWriter(RobotNames.of(model)).joint_trajectory(
             0, drives.offsets, drives, drives.effort)
         given = goal.trajectory if goal.trajectory.points else goal.multi_dof_trajectory
         trajectory.header = given.header  # a stamp of 0 means: at once, when it arrives

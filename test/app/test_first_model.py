@@ -23,7 +23,7 @@ from scipy.io import savemat
 from pprs_dynamics import ModelError, PprsError, UnreadableFileError
 from pprs_dynamics.app.api.first_model import FirstModelError, first_model
 from pprs_dynamics.app.commands.pprs import main
-from pprs_dynamics.measurement.files.guessed_columns import GuessError
+from pprs_dynamics.inference.readings.columns import GuessError
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.physics.model.model_file import load_model
 

@@ -273,8 +273,7 @@ def test_all_is_done_by_keyboard(page: Page) -> None:
         assert page.tab.locator(f'#view-{name}').is_visible()
 
 
-@pytest.mark.parametrize('scheme', ['light', 'dark'])
-@pytest.mark.parametrize('width', [1500, 390])
+@pytest.mark.parametrize(('scheme', 'width'), [('light', 1500), ('dark', 390)])
 def test_all_text_can_be_read(browser: Any, bench: Workbench, scheme: str, width: int) -> None:
     bench.settled()
     page = Page(browser, bench, color_scheme=scheme, viewport={'width': width, 'height': 900})

@@ -25,7 +25,6 @@ from pprs_dynamics import MechanismModel, read_recording
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench import Session
-from pprs_dynamics.app.workbench import session as session_module
 from pprs_dynamics.app.workbench.background import Cancelled, EndedError, Job, run_in_process
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.long_work import DesignedMotion
@@ -33,14 +32,13 @@ from pprs_dynamics.app.workbench.masks import MOST_POINTS, drawn_samples
 from pprs_dynamics.app.workbench.server.hub import Hub
 from pprs_dynamics.app.workbench.server.offered import Offered
 from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
-from pprs_dynamics.app.workbench.tick_fits import TickFits
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.ledger import read_steps
-from pprs_dynamics.physics.model.model_file import build_model, load_model
+from pprs_dynamics.physics.model.model_file import load_model
 
 FORCE = HIDDEN['effects.coulomb_friction.lift_2.force']
 MASS = HIDDEN['effects.payload_mass.mass']
@@ -258,47 +256,6 @@ def short_session(folder: Path) -> tuple[Session, Path]:
 
 def names_of(session: Session) -> list[str]:
     return [one['name'] for one in session.to_dict()['recordings']]
-
-
-def test_a_model_that_changes_while_a_recording_is_added_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    session, other = short_session(tmp_path)
-    changed = build_model({**session.model.values, 'masses.payload': 0.1})
-    began: list[None] = []
-
-    def overtaken(model: Any, recordings: Any, *given: Any) -> TickFits:
-        if not began:
-            began.append(None)
-            session._use(TickFits(changed, session.fits.recordings))  # as an adoption ends
-        return TickFits(model, recordings, *given)
-
-    monkeypatch.setattr(session_module, 'TickFits', overtaken)
-    session.add(other)
-    assert session.model is changed
-    assert names_of(session) == ['one.csv', 'two.csv']
-
-
-def test_a_recording_that_is_added_while_others_are_looked_at_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    session, other = short_session(tmp_path)
-    more, looks, added = session.inputs.with_more(other), threading.Event(), threading.Event()
-
-    def slow(inputs: Inputs) -> Inputs:
-        looks.set()
-        added.wait(4.0)
-        return inputs
-
-    monkeypatch.setattr(Inputs, 'checked', slow)
-    monkeypatch.setattr(Inputs, 'with_more', lambda *given: more)
-    looking = threading.Thread(target=session.find_mistakes)
-    looking.start()
-    assert looks.wait(60)
-    session.add(other)
-    added.set()
-    looking.join()
-    assert names_of(session) == ['one.csv', 'two.csv']
 
 
 def test_a_recording_that_is_opened_while_the_first_are_read_comes_on_top(

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from pprs_dynamics import DriveModel, Recording
-from pprs_dynamics.inference.residuals.conventions import find_mistakes
+from pprs_dynamics.inference.readings.check import find_mistakes
+from pprs_dynamics.inference.readings.findings import OtherReading
 from pprs_dynamics.inference.residuals.excerpt import excerpt_of, forces_on
-from pprs_dynamics.inference.residuals.mistakes import OtherReading
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_file import build_model
 

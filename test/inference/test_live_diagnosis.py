@@ -6,11 +6,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from pprs_dynamics import DriveModel
+from pprs_dynamics import JointMotion, MechanismModel
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.live_diagnosis import (
@@ -19,87 +20,89 @@ from pprs_dynamics.inference.diagnosis.live_diagnosis import (
 )
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
-from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.model.model_file import build_model, load_model
+from pprs_dynamics.physics.model.robot_block import AXIS
 
 RATE, LENGTH = 100.0, 20.0  # [Hz, s]
-ADDED = 0.3  # [kg] more payload than the model says
-NOISE = 0.05  # [N]
+SPRING = 300.0  # [N/m] that the model lacks
+NOISE = 1.0  # [N]
 SOONER = 8.0  # [s] within the second window
 
 
-def window(model: DriveModel, heavier: DriveModel, number: int, begins: float = 0.0) -> Recording:
-    """Return efforts of one robot before a moment [s] and of a heavier one after it."""
-    motion = Excitation(LENGTH, seed=number).motion(np.arange(0, LENGTH, 1 / RATE))
-    time = np.arange(len(motion)) / RATE
-    forces = model.drive_forces(motion)
-    effort = np.where((time < begins)[:, None], forces.total, heavier.drive_forces(motion).total)
+def window(model: MechanismModel, worn: MechanismModel, number: int, begins: float = 0.0,
+           ) -> Recording:
+    """Return efforts of one axis before a moment [s] and of a worn one after it."""
+    time = np.arange(0, LENGTH, 1 / RATE)
+    omega = 2 * np.pi * np.array([0.25, 0.5, 1.0])[:, None]
+    phase = omega * time + np.random.default_rng(number).uniform(0, 2 * np.pi, (3, 1))
+    size = np.array([0.08, 0.04, 0.015])[:, None]
+    motion = JointMotion((size * np.sin(phase)).sum(axis=0)[:, None],
+                         (size * omega * np.cos(phase)).sum(axis=0)[:, None],
+                         (-size * omega ** 2 * np.sin(phase)).sum(axis=0)[:, None], time=time)
+    effort = np.where((time < begins)[:, None], model.drive_forces(motion).total,
+                      worn.drive_forces(motion).total)
     noise = NOISE * np.random.default_rng(number).standard_normal(effort.shape)
-    return Recording.from_arrays(f'window {number}', time, forces.mechanism.position,
-                                 effort=effort + noise)
+    return Recording.from_arrays(f'window {number}', time, motion.position,
+                                 effort=effort + noise, drives=(AXIS,))
 
 
-@pytest.fixture(scope='module')
-def model() -> DriveModel:
-    return DriveModel.load()
+def axis(**values: Any) -> MechanismModel:
+    model = build_model({**load_model('config/single_axis.yaml').values, **values})
+    assert isinstance(model, MechanismModel)
+    return model
 
 
-@pytest.fixture(scope='module')
-def heavier(model: DriveModel) -> DriveModel:
-    return DriveModel.from_parameters(
-        {**model.values, 'masses.payload': model.values['masses.payload'] + ADDED})
+WORN = {'effects.active': ['drive_spring'], 'effects.drive_spring.axis.stiffness': SPRING,
+        'effects.drive_spring.axis.position': 0.01}
 
 
-def test_a_change_is_claimed_on_the_second_window_that_shows_it_and_withdrawn_after(
-    model: DriveModel, heavier: DriveModel,
-) -> None:
+def test_a_change_is_claimed_on_the_second_window_that_shows_it_and_withdrawn_after() -> None:
+    model, worn = axis(), axis(**WORN)
     live = LiveDiagnosis(model)
     live = live.with_window(window(model, model, 0), 0.0)
     assert live.effects == ()
-    live = live.with_window(window(model, heavier, 1, SOONER), LENGTH)
+    live = live.with_window(window(model, worn, 1, SOONER), LENGTH)
     assert live.claimed == ()  # named by one window only
     assert live.adopted() == {}
-    live = live.with_window(window(model, heavier, 2), 2 * LENGTH)
-    live = live.with_window(window(model, heavier, 3), 3 * LENGTH)
-    assert [effect.found.name for effect in live.claimed] == ['payload_mass']
+    live = live.with_window(window(model, worn, 2), 2 * LENGTH)
+    live = live.with_window(window(model, worn, 3), 3 * LENGTH)
+    assert [effect.found.name for effect in live.claimed] == ['drive_spring']
     assert live.claimed[0].since == pytest.approx(LENGTH + SOONER, abs=1.0)
-    found = live.claimed[0].found.parameters['mass']
-    assert abs(found.value - ADDED) < 4 * found.std + 0.01 * ADDED
+    found = live.claimed[0].found.parameters['axis.stiffness']
+    assert abs(found.value - SPRING) < 4 * found.std + 0.01 * SPRING
     assert live.to_dict()['confirmed'] is True
-    assert live.to_dict()['text'].startswith('payload mass: mass')
-    motion = Excitation(1.0, seed=9).motion(np.arange(0, 1.0, 0.1))
-    off = [DriveModel.from_parameters(values).drive_forces(motion).total
-           - heavier.drive_forces(motion).total for values in (model.values, live.adopted())]
-    assert np.abs(off[1]).max() < 0.05 * np.abs(off[0]).max()
+    adopted = build_model(live.adopted(), model.source)
+    assert adopted.values['effects.drive_spring.axis.stiffness'] == found.value
     beside = replace(live, effects=(*live.effects, replace(live.claimed[0], confirmed=False)))
     assert beside.adopted() == {}  # the numbers were fitted together
     live = live.with_window(window(model, model, 4), 4 * LENGTH)
     assert live.claimed == ()
-    assert [effect.found.name for effect in live.withdrawn] == ['payload_mass']
+    assert [effect.found.name for effect in live.withdrawn] == ['drive_spring']
 
 
 def test_what_numbers_within_their_tolerance_explain_keeps_no_effect_alive() -> None:
-    """The fit moves masses that are known to 5 % only, which helps in every window."""
-    values = DriveModel.load().values
-    model = DriveModel.from_parameters({**values, 'tolerances.masses.payload': 0.05})
-    real = {**values, 'masses.payload': 1.04 * values['masses.payload']}
-    pushed = {'effects.active': ('effort_offset',), 'effects.effort_offset.slide_1.force': 0.06}
-    robot = DriveModel.from_parameters(real)
+    """The fit moves a mass that is known to 5 % only, which helps in every window."""
+    mass = axis().values['axis.mass']
+    model, robot = axis(**{'tolerances.axis.mass': 0.05}), axis(**{'axis.mass': 1.04 * mass})
+    pushed = axis(**{'axis.mass': 1.04 * mass, 'effects.active': ['drive_spring'],
+                     'effects.drive_spring.axis.stiffness': SPRING,
+                     'effects.drive_spring.axis.position': 0.01})
     live = LiveDiagnosis(model)
-    live = live.with_window(window(robot, DriveModel.from_parameters({**real, **pushed}), 2), 0.0)
-    assert [effect.found.name for effect in live.effects] == ['effort_offset']
-    assert live.last is not None
-    assert 'effort_offset' not in [effect.name for effect in live.last.plain.effects]
+    live = live.with_window(window(robot, pushed, 2), 0.0)
+    assert [effect.found.name for effect in live.effects] == ['drive_spring']
     live = replace(live, effects=tuple(replace(one, confirmed=True) for one in live.effects))
     live = live.with_window(window(robot, robot, 3), LENGTH)
     assert live.claimed == ()
-    assert [effect.found.name for effect in live.withdrawn] == ['effort_offset']
+    assert [effect.found.name for effect in live.withdrawn] == ['drive_spring']
 
 
-def test_a_robot_that_stands_is_not_diagnosed(model: DriveModel, heavier: DriveModel) -> None:
-    moving = window(model, heavier, 1)
+def test_a_robot_that_stands_is_not_diagnosed() -> None:
+    model = axis()
+    moving = window(model, axis(**WORN), 1)
     encoder = 1e-6 * np.random.default_rng(0).integers(-1, 2, moving.position.shape)
     standing = Recording.from_arrays(
-        'standing', moving.time, moving.position[:1] + encoder, effort=moving.effort)
+        'standing', moving.time, moving.position[:1] + encoder, effort=moving.effort,
+        drives=(AXIS,))
     assert share_in_motion(moving.time, moving.position) > 0.9
     assert share_in_motion(standing.time, standing.position) == 0.0
     # Samples that are missing, and where the drives were taken elsewhere, are no noise.

@@ -24,7 +24,8 @@ from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.residuals.measured_effort import (
+from pprs_dynamics.inference.readings.measured_effort import (
+    effort_contents,
     find_no_measurements,
     kinds_of,
     looks_like,
@@ -175,7 +176,7 @@ def test_a_motion_that_shows_nothing_tells_nothing(tmp_path: Path) -> None:
     recording = Recording.from_arrays(
         'slow', slow.time, slow.position, slow.velocity,
         forces + np.random.default_rng(0).normal(0, 0.5, forces.shape), model.drives)
-    assert find_no_measurements(model, recording) == ()
+    assert find_no_measurements(model, effort_contents(model, recording)) == ()
 
 
 def test_nothing_is_claimed_of_what_is_no_measurement(tmp_path: Path) -> None:
@@ -252,5 +253,6 @@ CASES_OF = {
 @pytest.mark.parametrize('case', CASES_OF)
 def test_other_peoples_recordings(case: str) -> None:
     for recording, model, kinds in CASES_OF[case]:
-        found = find_no_measurements(*shared_case(case, model, recording))
+        read = shared_case(case, model, recording)
+        found = find_no_measurements(read[0], effort_contents(*read))
         assert {one.kind for one in found} == kinds, recording

@@ -25,14 +25,12 @@ from made_up_diagnosis import (
     ranked_set,
     ranked_sets,
     statement,
-    within_model_error,
 )
 from rich.console import Console
 
 from pprs_dynamics.app.commands.pprs import _parser
 from pprs_dynamics.app.report.diagnosis_figures import unknown_picture
 from pprs_dynamics.app.report.diagnosis_report import diagnosis_page, diagnosis_view
-from pprs_dynamics.app.report.terminal import as_text
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import RankedSet, RivalEffect
@@ -79,14 +77,14 @@ def everything() -> Diagnosis:
                             found_effect('asymmetric_friction', DRIVES[:5]),
                             found_effect('payload_offset', None)),
         indistinguishable=(('payload_offset', 'external_wrench'),), depends_on=(statement(),),
-        suspects=(SUSPECT,), within_model_error=(within_model_error('stribeck_friction'),),
+        suspects=(SUSPECT,),
         calibrated=(calibration(),), warnings=('effort of slide_1 looks filtered',))
 
 
 def test_an_effect_is_told_with_drive_values_errors_and_its_card() -> None:
     words = word_diagnosis(one_effect())
     assert words.headline == ('The model lacks coulomb_friction on lift_2. With it the error falls '
-                              'from 0.25 N to 0.051 N, which is the noise.')
+                              'from 0.25 N to 0.0502 N, which is the noise.')
     finding = words.effects[0]
     assert '(F) 0.600 ± 0.020 N' in finding.what
     assert 'from 0.25 N to 0.051 N' in finding.why
@@ -112,20 +110,19 @@ def test_what_changes_within_a_recording_is_not_added_throughout(kind: str, said
 def test_blocks_are_told_as_the_weaker_evidence_and_another_recording_is_not() -> None:
     blocks = word_diagnosis(one_effect()).effects[0].why
     assert 'blocks of the same recording' in blocks
-    assert 'weaker evidence' in blocks
+    assert 'stronger evidence' in blocks
     other = word_diagnosis(one_effect(held_out_on='validation')).effects[0].why
-    assert 'weaker' not in other
-    assert '--validate, which took no part in the fit, it falls from 0.26 N to 0.056 N' in other
+    assert 'stronger' not in other
+    assert 'On the --validate recordings it falls from 0.26 N to 0.056 N' in other
 
 
 def test_a_held_out_error_that_rises_stands_in_the_headline_and_forbids_adoption() -> None:
     worse = made_up_diagnosis('adequate', unconfirmed=(
-        found_effect('hysteresis', held_out_after=0.3),))
+        found_effect('hysteresis', held_out_after=0.3,
+                     objection='held-out data are predicted worse with it'),))
     words = word_diagnosis(worse)
     assert 'lacks' not in words.headline
-    assert ('hysteresis on lift_2 was fitted as well and is no finding: with it the error on '
-            'held-out data does not fall (0.26 N before, 0.3 N after)') in words.headline
-    assert words.headline.startswith('Nothing that was found holds.')  # the error is the noise
+    assert words.headline == 'No effect is supported by held-out data.'
     assert not words.effects
     assert words.following.startswith('Do not add hysteresis')
     assert 'adopt' not in words.command
@@ -144,49 +141,52 @@ def test_a_model_of_another_machine_is_fitted_before_another_motion_is_recorded(
 
 def test_an_error_above_the_noise_is_told_where_nothing_holds() -> None:
     above = made_up_diagnosis('adequate', unconfirmed=(
-        found_effect('hysteresis', held_out_after=0.3),))
+        found_effect('hysteresis', held_out_after=0.3,
+                     objection='held-out data are predicted worse with it'),))
     above = replace(above, remaining=2 * above.remaining)
-    assert re.match(r'Nothing that was found holds, and the error of 0.1\d* N is more than the '
-                    r'noise, 0.05 N\.', word_diagnosis(above).headline)
+    assert re.match(r'No effect is supported by held-out data. The error, 0.1\d* N, is more than '
+                    r'the noise, 0.05 N\.', word_diagnosis(above).headline)
     unknown = word_diagnosis(replace(above, verdict='unknown'))
-    assert unknown.headline.startswith('Something is missing. Nothing that was found holds, and')
     assert unknown.following.startswith('Do not add hysteresis')
 
 
 def test_what_is_left_above_the_noise_is_not_called_the_noise() -> None:
-    above = made_up_diagnosis(effects=(found_effect('coulomb_friction', error_after=0.08),))
+    above = made_up_diagnosis(remaining=1.6 * made_up_residuals().error,
+        effects=(found_effect('coulomb_friction'),))
     headline = word_diagnosis(above).headline
     assert 'which is the noise' not in headline
-    assert 'The noise is 0.05 N' in headline
+    assert 'the noise is 0.05 N' in headline
 
 
 def test_a_drive_that_keeps_more_than_its_noise_is_named_beside_what_was_found() -> None:
     words = word_diagnosis(made_up_diagnosis(
-        'unknown', effects=(found_effect('coulomb_friction', error_after=0.08),),
+        'unknown', remaining=1.6 * made_up_residuals().error,
+        effects=(found_effect('coulomb_friction'),),
         above_noise={'slide_3': 2.13}))
     assert words.headline.startswith(
-        'Something is missing that no effect of the catalogue explains: slide_3 keeps 2.1 times '
-        'its noise. Beside it, the model lacks coulomb_friction')
+        'An error remains that no effect of the catalogue explains: the error of slide_3 is 2.1 '
+        'times its noise. In addition, the model lacks coulomb_friction')
+    assert words.headline.endswith('; with it the error falls from 0.25 N to 0.0803 N.')
     assert words.following.startswith('Confirm it on the machine')
 
 
 def test_ambiguous_names_all_and_says_how_to_tell_them_apart() -> None:
     words = word_diagnosis(ambiguous())
-    assert 'base_tilt or external_wrench: this data cannot tell which' in words.headline
+    assert 'base_tilt or external_wrench (the data do not separate these)' in words.headline
     assert 'from external_wrench' in words.effects[0].remarks[0]
     assert words.command == 'pprs next-experiment RECORDING --output next.csv'
 
 
 def test_adequate_claims_no_more_than_the_noise_allows() -> None:
     words = word_diagnosis(made_up_diagnosis('adequate'))
-    assert words.headline.startswith('Nothing is missing beyond noise, which is 0.05 N rms.')
-    assert 'could still hide' in words.headline
+    assert words.headline.startswith('No effect is missing: the error is the noise, 0.05 N rms.')
+    assert 'cannot be seen' in words.headline
     assert words.effects == words.unexplained == ()
 
 
 def test_unknown_names_drive_variable_shape_and_share_and_nothing_of_the_catalogue() -> None:
     words = word_diagnosis(unknown())
-    assert words.headline == ('Something is missing that no effect of the catalogue explains: on '
+    assert words.headline == ('An error remains that no effect of the catalogue explains: on '
                               'slide_1, depending on position.')
     finding = words.unexplained[0]
     for part in ('slide_1', 'position', 'a shift within a range', '41%'):
@@ -210,7 +210,7 @@ def test_every_variable_has_words_a_lead_and_a_picture(variable: str) -> None:
 def test_suspects_ask_for_another_recording() -> None:
     words = word_diagnosis(made_up_diagnosis('adequate', suspects=(SUSPECT,)))
     assert words.suspects[0].startswith('effort_offset on slide_3')
-    assert 'slow noise would explain the same' in words.suspects[0]
+    assert 'slow noise explains the data as well' in words.suspects[0]
     assert 'repeat the recording' in words.suspects[0]
     assert words.following.startswith('Repeat the recording')
 
@@ -235,7 +235,7 @@ def test_negative_friction_is_said_to_be_impossible() -> None:
         diagnosis = made_up_diagnosis(effects=(found_effect('coulomb_friction', value=value),))
         remark = word_diagnosis(diagnosis).effects[0].remarks[0]
         assert 'is negative' in remark
-        assert 'There is no negative friction' in remark
+        assert 'Negative friction is impossible' in remark
         assert ('zero is within its uncertainty' not in remark) is sure
     assert word_diagnosis(one_effect()).effects[0].remarks == ()
 
@@ -252,13 +252,7 @@ def test_dry_asymmetric_friction_is_also_told_as_the_two_that_it_equals() -> Non
 def test_an_effect_of_measurement_is_never_a_command() -> None:
     for name, told in (('effort_gain', True), ('coulomb_friction', False)):
         what = word_diagnosis(made_up_diagnosis(effects=(found_effect(name),))).effects[0].what
-        assert ('never a command' in what) is told
-
-
-def test_what_is_within_model_error_names_the_effect_whose_it_is_and_its_size() -> None:
-    words = word_diagnosis(one_effect(within_model_error=(within_model_error(),)))
-    assert words.within_model_error[0].startswith(
-        'hysteresis on lift_2, 0.021 N rms, is within the model error of coulomb_friction')
+        assert ('never in a command' in what) is told
 
 
 @pytest.mark.parametrize('name', CATALOGUE)
@@ -313,7 +307,7 @@ def test_with_details_the_terminal_shows_everything_within_its_width(
     assert '…' not in text, 'nothing is cut off'
     shown = in_one_line(text)
     for sentence in (words.headline, words.following, *words.suspects, *words.calibrated,
-                     *words.within_model_error, *words.warnings):
+                     *words.barred, *words.warnings):
         assert sentence in shown
     for finding in (*words.effects, *words.unexplained):
         for sentence in (finding.what, finding.why, finding.cause, finding.confirm,
@@ -332,19 +326,6 @@ def test_verdict_fall_and_next_step_fit_25_lines_of_80_columns(make: Any) -> Non
                  'Runner-up hysteresis on lift_2 instead of coulomb_friction on lift_2: '
                  'costs 7.0 more: names + 7.0'):
         assert part in in_one_line(text)
-
-
-def test_what_is_within_model_error_stands_by_name_in_the_short_view() -> None:
-    """The runner-up is told against the best set, which holds it."""
-    def said(**options: bool) -> str:
-        diagnosis = one_effect(within_model_error=(within_model_error(),))
-        return as_text(diagnosis_view(diagnosis, word_diagnosis(diagnosis), **options), 80)
-
-    name = within_model_error().name
-    line = next(one for one in said().splitlines() if one.startswith('May be left by the forms'))
-    assert name in line
-    assert 'pprs adopt' in said()
-    assert 'pprs adopt' not in said(next_step=False)
 
 
 def test_the_runner_up_stands_beside_the_best_set_with_its_cost() -> None:
@@ -382,8 +363,8 @@ def test_why_one_set_and_not_another_is_told_by_the_terms_of_their_costs() -> No
     why = 'costs 3.6 more: fit + 2.0, coefficients - 1.3, drives + 2.8'
     assert runner_up(diagnosis) == f'rod_mass instead of coulomb_friction on lift_2: {why}'
     words = word_diagnosis(diagnosis)
-    assert f'the best set without it, rod_mass, {why}.' in words.effects[0].why
-    assert words.barred == ('payload_mass may not be, whatever it costs: its mass cannot be. It '
+    assert f'The best set without it, rod_mass, {why}.' in words.effects[0].why
+    assert words.barred == ('payload_mass is excluded: its mass cannot be. It '
                             'costs 4.0 less: fit - 4.0',)
     told = diagnosis.to_dict()
     assert told['sets'][1]['terms'] == terms.to_dict()
@@ -392,16 +373,6 @@ def test_why_one_set_and_not_another_is_told_by_the_terms_of_their_costs() -> No
     assert told['effects'][0]['without']['cost'] == pytest.approx(told['effects'][0]['evidence'])
     page = diagnosis_page(diagnosis, words, made_up_residuals(), ['a'])
     assert 'fit + 2.0, coefficients - 1.3, drives + 2.8' in page.html()
-
-
-def test_the_runner_up_says_nothing_of_what_was_never_named() -> None:
-    """What is within the model error of others is in the best set, but in no finding."""
-    best = (('coulomb_friction', ('lift_2',)), ('hysteresis', ('lift_2',)))
-    sets = (ranked_set(best, 0.0), ranked_set(best[:1], 3.0),
-            ranked_set((('rod_mass', None),), 9.0))
-    diagnosis = one_effect(sets=sets, within_model_error=(within_model_error(),))
-    assert runner_up(diagnosis).startswith('rod_mass instead of coulomb_friction on lift_2')
-    assert runner_up(one_effect(sets=sets[:2], within_model_error=(within_model_error(),))) == ''
 
 
 def test_effects_that_are_only_on_other_drives_in_the_runner_up_are_told_once() -> None:
@@ -428,7 +399,7 @@ def test_one_pattern_on_all_drives_is_one_finding() -> None:
 def test_a_rival_on_another_link_is_named_with_it() -> None:
     diagnosis = replace(ambiguous(), indistinguishable=(('base_tilt', 'link_mass:bar_upper'),))
     words = word_diagnosis(diagnosis)
-    assert 'base_tilt or link_mass on bar_upper: this data cannot tell which' in words.headline
+    assert 'base_tilt or link_mass on bar_upper (the data do not separate these)' in words.headline
     assert 'link_mass:' not in words.headline
 
 
@@ -438,10 +409,10 @@ def test_a_rival_has_its_card_with_values_and_cost_and_a_picture() -> None:
                         0.0533, 3.24, made_up_residuals().error)
     words = word_diagnosis(ambiguous(), rivals=(rival,))
     said, = words.rivals
-    assert 'In place of base_tilt, external_wrench would explain' in said.what
+    assert 'external_wrench explains the data about as well as base_tilt' in said.what
     assert '0.600 ± 0.020 N' in said.what
     assert '0.0521 N' in said.why
-    assert '3.2 above the best' in said.why
+    assert 'costs 3.2 more than the best one' in said.why
     assert said.confirm[1:-1] == CATALOGUE['external_wrench'].card.confirm[1:]
     html = diagnosis_page(ambiguous(), words, made_up_residuals(), ['a'], (), (rival,)).html()
     card = html[html.index('<h3>or external_wrench'):]

@@ -15,8 +15,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from pprs_dynamics.drives import RecordedDrives
 from pprs_dynamics.errors import MotionError, UnreadableFileError
+from pprs_dynamics.inference.readings.columns import guess_columns
 from pprs_dynamics.measurement.files.contents import Series
-from pprs_dynamics.measurement.files.guessed_columns import guess_columns
 from pprs_dynamics.measurement.files.recording import (
     Recording,
     describe,
@@ -164,7 +164,7 @@ def test_temperatures_are_guessed_by_their_names():
              for k in (0, 1)]
     series = [Series('t', 't', np.arange(50) * 0.01),
               *(Series(name, name, rng.normal(size=50)) for name in names)]
-    columns = guess_columns(series, JOINTS, (3.0, 3.0)).columns
+    columns = guess_columns(series, JOINTS).columns
     assert columns['j1', 'temperature'] == 'joint_temperature_0'
     assert columns['j2', 'temperature'] == 'joint_temperature_1'
     assert columns['j2', 'effort'] == 'tau_1'

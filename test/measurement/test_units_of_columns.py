@@ -55,3 +55,18 @@ def test_a_unit_of_efforts_that_is_not_the_si_unit(tmp_path: Path) -> None:
         'run', TIME, POSITION, None, EFFORT / 0.0980665, arm.JOINTS))
     found = read_recording(run, MechanismModel.load(path).recorded)
     np.testing.assert_allclose(found.effort, EFFORT)
+
+
+def test_a_table_below_a_preamble_with_a_line_of_units(tmp_path: Path) -> None:
+    path = arm.write_arm(tmp_path)
+    columns = {joint: {'position': f'{joint} deg', 'effort': f'{joint} f N'}
+               for joint in arm.JOINTS}
+    path.write_text(path.read_text() + f'    columns: {{time: t s, {str(columns)[1:]}\n')
+    run = tmp_path / 'run.csv'
+    np.savetxt(run, np.column_stack([TIME, POSITION, EFFORT]), delimiter=';', comments='',
+               header='Log 7\nChannels;7\nRate;100;Hz\n' + ';'.join(
+                   ['t', *arm.JOINTS, *(f'{joint} f' for joint in arm.JOINTS)]) + '\n'
+               + ';'.join(['s', *['deg'] * 3, *['N'] * 3]))
+    found = read_recording(run, MechanismModel.load(path).recorded)
+    np.testing.assert_allclose(found.position, POSITION)
+    np.testing.assert_allclose(found.effort, EFFORT)

@@ -22,8 +22,8 @@ from pprs_dynamics import DriveModel, JointMotion, MechanismModel, PprsError, lo
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import ModelError, UnreadableFileError
-from pprs_dynamics.inference.residuals.conventions import find_mistakes
-from pprs_dynamics.inference.residuals.readings import readings
+from pprs_dynamics.inference.readings.check import find_mistakes
+from pprs_dynamics.inference.readings.table import readings
 from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
 from pprs_dynamics.physics.effects.drive_effect import DriveRange
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt

@@ -15,9 +15,8 @@ import pytest
 import yaml
 from controller_rules import WAY, ControllerSettings, objection
 from node_bench import bench
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import serialize_message
 from rclpy.task import Future
-from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics import DriveModel
@@ -26,9 +25,9 @@ from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.ros import play_trajectory
 from pprs_dynamics.ros.force_command import Feedforward
 from pprs_dynamics.ros.messages import conversions
+from pprs_dynamics.ros.messages.command_writer import CommandWriter
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.measured_states import MeasuredStates
-from pprs_dynamics.ros.messages.serialisation import CommandBytes
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import reader_for
 
@@ -61,8 +60,8 @@ def forwarded(
     request = reader_for(model).read(serialize_message(message), NOW, 'reject')
     feedforward = Feedforward(model, OWN)
     drives = feedforward.ending_at_rest(feedforward.answer(request), stop_time)
-    found = deserialize_message(CommandBytes(conversions.PAPER).joint_trajectory(
-        request.start, drives.offsets, drives, drives.effort), JointTrajectory)
+    found = CommandWriter(conversions.PAPER).joint_trajectory(
+        request.start, drives.offsets, drives, drives.effort)
     assert isinstance(found, JointTrajectory)
     return found
 
@@ -421,7 +420,7 @@ def test_a_robot_has_the_names_of_the_machine_and_its_own_frame() -> None:
             continue
         request = read(serialize_message(message), NOW, 'reject')
     answer = Feedforward(model, OWN).answer(request)
-    state = deserialize_message(CommandBytes(names).joint_state(NOW, answer.effort[0]), JointState)
+    state = CommandWriter(names).joint_state(NOW, answer.effort[0])
     assert list(state.name) == ['left_slide_1', 'left_slide_2', 'left_slide_3', 'left_lift_1',
                                 'left_lift_2', 'z_axis']
     assert state.header.frame_id == 'left_base'

@@ -17,8 +17,7 @@ FILES = sorted((Path(__file__).parents[2] / 'launch').glob('*.launch.py'))
 PAPER = Path(__file__).parents[2] / 'config' / 'paper.yaml'
 
 
-@pytest.mark.parametrize('file', [file for file in FILES if 'workbench' not in file.name],
-                         ids=lambda file: file.name)
+@pytest.mark.parametrize('file', FILES, ids=lambda file: file.name)
 def test_a_model_that_does_not_exist_starts_nothing(
     file: Path, capfd: pytest.CaptureFixture[str],
 ) -> None:

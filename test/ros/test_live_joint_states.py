@@ -21,6 +21,7 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from ros_processes import executable, node_process
@@ -199,6 +200,30 @@ def test_where_one_node_refuses_none_has_the_model(
     assert 'feedforward' not in touched if refuses == 'monitor' else touched[0] == 'monitor'
 
 
+def test_the_step_of_another_program_is_not_undone(robot: Robot) -> None:
+    """Two workbenches, or a workbench and the monitor's services, on one robot."""
+    live, other = robot.live, LiveNodes(MODEL)
+    end = time.monotonic() + 25
+    try:
+        while other.machine() != live.machine():
+            assert time.monotonic() < end
+            time.sleep(0.1)
+        assert live.set_model(HEAVIER, live.machine())['is_set']
+        answer = other.set_model(build_model({**MODEL.values, 'masses.payload': 0.7}),
+                                 live.machine())
+        assert not answer['is_set']
+        assert 'changed by another program' in answer['nodes']['monitor']
+        assert [robot.values(name) for name in robot.nodes] == [SET, SET]
+    finally:
+        other.close()
+    robot.nodes['monitor'].set_parameters([Parameter('masses.payload', value=0.9)])
+    answer = live.restore(live.machine())
+    assert not answer['is_set']
+    assert 'masses.payload' in answer['nodes']['monitor']
+    assert robot.values('monitor')[0] == 0.9
+    assert live.can_restore
+
+
 def test_only_the_machine_that_was_confirmed_is_set(robot: Robot) -> None:
     live = robot.live
     machine = live.machine()
@@ -248,7 +273,7 @@ def test_a_node_takes_a_whole_model_or_nothing_of_it(ros_domain: int, tmp_path: 
 
             def payload_after(active: list[str]) -> tuple[str, float]:
                 answer = set_on_all(nodes._node.clients_of, ['monitor'], {'monitor': {
-                    'masses.payload': SET[0], 'effects.active': active}})
+                    'masses.payload': SET[0], 'effects.active': active}}, {})
                 asked = client.call_async(GetParameters.Request(names=['masses.payload']))
                 assert asking.spin_until(asked.done)
                 return answer.said['monitor'], asked.result().values[0].double_value

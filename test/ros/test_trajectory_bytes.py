@@ -14,7 +14,7 @@ import pytest
 from feedforward_bench import feedforward_bench, message_of, random_motion
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from trajectory_msgs.msg import (
@@ -26,13 +26,9 @@ from trajectory_msgs.msg import (
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.ros import feedforward
-from pprs_dynamics.ros.messages import conversions, serialisation, trajectory_request
-from pprs_dynamics.ros.messages.conversions import RobotNames
+from pprs_dynamics.ros.messages import conversions, trajectory_request
 from pprs_dynamics.ros.messages.incoming_bytes import is_whole, message_in
-from pprs_dynamics.ros.messages.serialisation import CommandBytes
 from pprs_dynamics.ros.messages.status_codes import Rejection
-from pprs_dynamics.ros.messages.trajectory_bytes import TrajectoryBytes
 from pprs_dynamics.ros.messages.trajectory_request import (
     RequestReader,
     joint_reader,
@@ -233,33 +229,6 @@ def test_big_endian_bytes_are_read_by_the_ordinary_path_or_rejected(reader: Requ
         reader.read(bytes(data), 1)
 
 
-@pytest.mark.parametrize('points', [1, 2, 17])
-def test_answers_are_the_messages_that_rclpy_would_send(points: int) -> None:
-    forces = DriveModel.load().drive_forces(random_motion(np.random.default_rng(3), points))
-    mechanism, effort = forces.mechanism, forces.total
-    written = CommandBytes(conversions.PAPER)
-    for stamp in (0, -1_500_000_000, 7_000_000_001, 2**31 * 10**9 + 5):
-        command = deserialize_message(written.commands(effort[0]), Float64MultiArray)
-        assert command == Float64MultiArray(data=effort[0].tolist())
-        for values in ((effort[0],), (effort[0], mechanism.position[0], mechanism.velocity[0])):
-            data = written.joint_state(stamp, *values)
-            state = deserialize_message(data, JointState)
-            assert state == conversions.joint_state(stamp, *values)
-        offsets = np.arange(points) * 1_234_567_891
-        data = written.joint_trajectory(stamp, offsets, forces, effort)
-        trajectory = deserialize_message(data, JointTrajectory)
-        assert len(data) == len(serialize_message(trajectory))
-        assert tuple(trajectory.joint_names) == DRIVES
-        assert trajectory.header.stamp == conversions.time(stamp)
-        for k, point in enumerate(trajectory.points):
-            for field, expected in (('positions', mechanism.position),
-                                    ('velocities', mechanism.velocity),
-                                    ('accelerations', mechanism.acceleration),
-                                    ('effort', effort)):
-                np.testing.assert_array_equal(getattr(point, field), expected[k])
-            assert point.time_from_start == conversions.duration(int(offsets[k]))
-
-
 def test_truncated_bytes_over_dds_are_counted_and_survived() -> None:
     good = message_of(random_motion(np.random.default_rng(5), 3))
     data = bytes(serialize_message(good))
@@ -324,40 +293,3 @@ def test_an_array_with_dimensions_is_whole() -> None:
     data = bytes(serialize_message(message))
     assert message_in(data, Float64MultiArray) == message
     assert not is_whole(data[:-9], Float64MultiArray)
-
-
-def test_bytes_are_used_where_rclpy_reads_them_and_objects_where_not(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    assert isinstance(serialisation.command_writer(conversions.PAPER), CommandBytes)
-    assert isinstance(serialisation.command_writer(RobotNames(('axis',), '')), CommandBytes)
-    # A middleware whose messages have another length word, and one with another layout of points.
-    for name in ('commands', 'joint_state', 'joint_trajectory'):
-        with monkeypatch.context() as patch:
-            known = getattr(CommandBytes, name)
-            patch.setattr(CommandBytes, name, lambda *a, known=known: known(*a)[:-8])
-            assert isinstance(serialisation.command_writer(conversions.PAPER),
-                              serialisation.CommandObjects)
-    # A middleware that aligns numbers otherwise.
-    patched = TrajectoryBytes._points
-    monkeypatch.setattr(TrajectoryBytes, '_points', lambda known, data, place, order: patched(
-        known, data[4:], place, order))
-    message = joint_message(2, 1)
-    assert outcome(joint_reader(LEGS).read, serialize_message(message)) == outcome(
-        read_joint_trajectory, message, LEGS)
-
-
-def test_a_node_with_objects_answers_as_one_with_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
-    message = message_of(random_motion(np.random.default_rng(9), 3))
-    answers = []
-    for known in (True, False):
-        if not known:
-            monkeypatch.setattr(feedforward, 'command_writer', serialisation.CommandObjects)
-            monkeypatch.setattr(TrajectoryBytes, 'read', lambda known, data: None)
-        with feedforward_bench() as node:
-            answer = node.answer(message)
-            assert node.bench.spin_until(lambda: node.joint_command and node.joint_trajectory)
-            command, trajectory = node.joint_command[-1], node.joint_trajectory[-1]
-            command.header.stamp = trajectory.header.stamp = conversions.time(0)
-            answers.append((answer, command, trajectory))
-    assert answers[0] == answers[1]

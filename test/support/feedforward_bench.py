@@ -97,13 +97,14 @@ def feedforward_bench(
 ) -> Iterator[FeedforwardBench]:
     """Give a running node with parameters of its own.
 
-    It never goes stale or lags, and asks no message for its age or how early it is, unless told to.
+    It never goes stale or lags, changes at once, and asks no message for its age or how early it
+    is, unless told to.
 
     Keywords are parameters with `__` for the dot, `message` on `topic` what asks the node for
     forces.
     """
     given = overrides(**{'command_timeout': 0.0, 'max_age': 0.0, 'max_ahead': 0.0,
-                         'lag_warning': 0.0, **parameters})
+                         'lag_warning': 0.0, 'ramp_time': 0.0, **parameters})
     with bench() as running:
         yield FeedforwardBench(running, message, topic, parameter_overrides=given).connect()
 

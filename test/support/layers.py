@@ -31,7 +31,7 @@ MATHEMATICS = ('numpy', 'math', 'cmath', 'scipy')
 FOLDERS = {
     'physics': ['mechanism', 'effects', 'three_pprs', 'model'],
     'measurement': ['files', 'motion'],
-    'inference': ['residuals', 'regression', 'search', 'fit', 'diagnosis', 'adoption',
+    'inference': ['residuals', 'readings', 'regression', 'search', 'fit', 'diagnosis', 'adoption',
                   'experiments'],
     'ros': ['messages', 'node'],
     'app': ['fleet', 'report', 'api', 'workbench', 'commands'],

@@ -15,19 +15,25 @@ import numpy as np
 
 from pprs_dynamics.drives import CHANNELS, RecordedDrives
 from pprs_dynamics.errors import PprsError, UnknownNameError, UnreadableFileError, meant
-from pprs_dynamics.measurement.files.array_files import is_lerobot
-from pprs_dynamics.measurement.files.bag_storage import is_storage
-from pprs_dynamics.measurement.files.contents import Contents, Series, look_into
-from pprs_dynamics.measurement.files.guessed_columns import (
+from pprs_dynamics.inference.readings.check import find_mistakes
+from pprs_dynamics.inference.readings.columns import (
+    AmbiguousColumns,
+    Guess,
+    RateError,
+    guess_columns,
+    words_of,
+)
+from pprs_dynamics.inference.readings.findings import OtherReading, Scales, columns_line
+from pprs_dynamics.inference.readings.table import (
     CURRENT,
     EFFORT,
     POSITION,
     VELOCITY,
     WORDS,
-    Guess,
-    guess_columns,
-    words_of,
 )
+from pprs_dynamics.measurement.files.array_files import is_lerobot
+from pprs_dynamics.measurement.files.bag_storage import is_storage
+from pprs_dynamics.measurement.files.contents import Contents, Series, look_into
 from pprs_dynamics.measurement.files.recording import read_recording
 from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE, read_column
 from pprs_dynamics.measurement.files.way_out import common_prefix
@@ -41,7 +47,6 @@ from pprs_dynamics.physics.mechanism.description import (
     FIXED,
     FLOATING,
     PRISMATIC,
-    TURNING,
     Description,
 )
 from pprs_dynamics.physics.mechanism.urdf import expanded, read_urdf
@@ -56,6 +61,10 @@ FILE_TIME = 'time'
 SETTLED = ('position', 'velocity', 'effort', 'current')
 SCALE_KEYS = {POSITION: 'position_scale', VELOCITY: 'velocity_scale', EFFORT: 'effort_scale',
               CURRENT: 'effort_scale'}
+
+
+# Mistakes of which a model file may have the line without a question.
+SURE_KINDS = {'position_unit', 'effort_unit', 'effort_sign', 'effort_sign_bit', 'time_unit'}
 
 
 class FirstModelError(PprsError, ValueError):
@@ -95,6 +104,8 @@ class FirstModel:
     recordings : tuple of Path
         As they are given to commands: of several files that make one, their folder or the first.
     has_efforts : bool
+    questions : tuple of str
+        Where a reading is not sure: lines, of which one is to be written.
     """
 
     path: Path
@@ -103,6 +114,7 @@ class FirstModel:
     notes: tuple[str, ...]
     recordings: tuple[Path, ...]
     has_efforts: bool
+    questions: tuple[str, ...] = ()
 
 
 def first_model(
@@ -158,20 +170,80 @@ def first_model(
     columns: list[str] = []
     guessed: list[str] = []
     found: Collection[str] = ()
+    questions: list[str] = []
     if contents is not None:
-        columns, guessed, found = _columns(given[0], files, contents, names, description, chosen,
-                                           rate)
+        try:
+            columns, guessed, found = _columns(given[0], files, contents, names, description,
+                                               chosen, rate)
+        except (AmbiguousColumns, RateError) as error:
+            notes.append(str(error))
+            questions += error.lines
         notes += guessed
+
+    def written() -> tuple[str, Model]:
+        text = _text(path, Path(output), is_mjcf, description, base or root_of(description),
+                     branch, chosen, names, columns, guessed, [one.name for one in given],
+                     CURRENT in found, questions)
+        return text, build_model(parse_parameters(text, output), source=str(output))
+
     has_efforts = bool({EFFORT, CURRENT} & {*found})
-    text = _text(path, Path(output), is_mjcf, description, base or root_of(description), branch,
-                 chosen, names, columns, guessed, [one.name for one in given], CURRENT in found)
-    model = build_model(parse_parameters(text, output), source=str(output))
+    text, model = written()
+    corrected: set[str] = set()
+    while has_efforts:
+        scales, reasons, questions = _corrections(model, given[0], corrected)
+        columns, guessed = _with_scales(columns, scales), [*guessed, *reasons]
+        notes += [*reasons, *questions]
+        text, model = written()
+        if not scales:
+            break
     if CURRENT in found:
         notes.append('efforts are currents [A]: they stay amperes until gain is given in '
                      f'{Path(output).name}')
     if given and not has_efforts:
         notes.append('no efforts were found: compare, diagnose and fit need them')
-    return FirstModel(Path(output), text, model, tuple(notes), tuple(given), has_efforts)
+    return FirstModel(Path(output), text, model, tuple(notes), tuple(given), has_efforts,
+                      tuple(questions))
+
+
+# ---------------------------------------------------------------------------------- readings
+
+
+def _corrections(model: Model, path: Path, corrected: set[str],
+                 ) -> tuple[Scales, list[str], list[str]]:
+    """Return factors with which a recording is read surely, why, and what is not sure.
+
+    What is corrected already is a question when it comes again; `corrected` gets the new kinds.
+    """
+    try:
+        mistakes = find_mistakes(model, read_recording(path, model.recorded))
+    except PprsError:
+        return (), [], []
+    readings = [each for each in mistakes if isinstance(each, OtherReading)]
+    sure = [each for each in readings if each.scales and each.kind in SURE_KINDS - corrected]
+    corrected.update(each.kind for each in sure)
+    unsure = [each for each in readings if each not in sure] if not sure else []
+    questions = [f'{each.what}: if so, write {line}' for each in unsure
+                 if (line := each.line or columns_line([each]))]
+    return (tuple(scale for each in sure for scale in each.scales),
+            [each.what for each in sure], questions)
+
+
+def _with_scales(lines: Sequence[str], scales: Scales) -> list[str]:
+    """Return lines of `columns` with factors of drives, which replace those that are there."""
+    found = list(lines)
+    for drive, key, value in scales:
+        entry, start = f'{key}: {value:.12g}', f'{scalar(drive)}: {{' if drive else f'{key}:'
+        at = next((k for k, line in enumerate(found) if line.startswith(start)), None)
+        if not drive:
+            found[slice(at, None if at is None else at + 1) if at is not None else slice(
+                len(found), None)] = [entry]
+        elif at is None:
+            found.append(f'{start}{entry}}}')
+        else:
+            inside = [part for part in found[at][len(start):-1].split(', ')
+                      if not part.startswith(f'{key}:')]
+            found[at] = start + ', '.join([*inside, entry]) + '}'
+    return found
 
 
 # ------------------------------------------------------------------------------ description
@@ -339,10 +411,9 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: N
              description: Description, drives: Sequence[str], rate: float | None,
              ) -> tuple[list[str], list[str], Collection[str]]:
     """Return the lines of `columns`, what was guessed, and which quantities there are."""
-    limits = [_limit(description, name) for name in drives]
     movable = list(description.joints)
     if files:
-        return _file_columns(path, files, drives, limits, rate, movable)
+        return _file_columns(path, files, drives, rate, movable)
     joints = tuple(names.joints.get(name, f'{names.prefix}{name}') for name in drives)
     try:
         recording = read_recording(path, RecordedDrives(
@@ -353,14 +424,14 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: N
         # Positions of joint states may have their efforts in arrays; what is left is a table.
         if contents.joints and not contents.series:
             raise
-    guess = guess_columns(contents.series, drives, limits, others=movable)
+    guess = guess_columns(contents.series, drives, others=movable, rate=rate)
     lines = []
     if guess.time is not None and guess.time not in TIME_COLUMNS:
         lines.append(f'time: {scalar(guess.time)}')
     is_bag = bool(contents.series) and all(
         str(one.column).startswith('/') for one in contents.series)
     if guess.time is None and not is_bag:
-        lines.append(_rate(path, rate))
+        lines.append(_rate(path, guess.rate))
     return ([*lines, *_drive_lines(guess, drives, contents.decimal)], guess.notes,
             {kind for _, kind in guess.columns})
 
@@ -369,16 +440,16 @@ def _rate(path: Path, rate: float | None) -> str:
     if rate is None:
         raise FirstModelError(f'{path}: there is no column of times: give --rate HZ, the samples '
                               'per second')
-    return f'rate: {rate}  # samples per second [Hz], as given'
+    return f'rate: {rate:g}  # samples per second [Hz]'
 
 
 def _file_columns(path: Path, files: Mapping[str, Path], drives: Sequence[str],
-                  limits: Sequence[float], rate: float | None, movable: Sequence[str],
+                  rate: float | None, movable: Sequence[str],
                   ) -> tuple[list[str], list[str], Collection[str]]:
     """Return the same of files of one quantity each."""
     inside = {kind: look_into(file) for kind, file in files.items()}
     inside.update(_in_turn(files, inside, len(drives)))
-    guesses = {kind: guess_columns(one.series, drives, limits, kind, movable)
+    guesses = {kind: guess_columns(one.series, drives, kind, movable, rate)
                for kind, one in inside.items() if kind != FILE_TIME}
     merged = Guess(
         guesses[POSITION].time, {key: column for one in guesses.values()
@@ -430,18 +501,13 @@ def _drive_lines(guess: Guess, drives: Sequence[str], decimal: str) -> Iterator[
             yield f'{scalar(drive)}: {{{", ".join(cells)}}}'
 
 
-def _limit(description: Description, name: str) -> float:
-    """Return the largest absolute position of a joint that turns; infinite for others."""
-    joint = description.joints[name]
-    return max(abs(joint.lower), abs(joint.upper)) if joint.kind in TURNING else np.inf
-
-
 # -------------------------------------------------------------------------------------- text
 
 
 def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, base: str,
           branch: Branch, drives: Sequence[str], names: Names, columns: Sequence[str],
-          guessed: Sequence[str], recordings: Sequence[str], currents: bool) -> str:
+          guessed: Sequence[str], recordings: Sequence[str], currents: bool,
+          questions: Sequence[str] = ()) -> str:
     place = os.path.relpath(robot.resolve(), output.resolve().parent)
     slides = all(description.joints[name].kind == PRISMATIC for name in drives)
     gain = ', '.join(['1.0'] * len(drives))
@@ -482,4 +548,5 @@ def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, ba
         lines.append('    columns:  # of tables: names, or numbers from 1')
         lines += [f'      # guessed: {note}' for note in guessed]
         lines += [f'      {line}' for line in columns]
+    lines += [f'    # not sure: {line}' for line in questions]
     return '\n'.join(lines) + '\n'

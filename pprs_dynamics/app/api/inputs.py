@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from pprs_dynamics.errors import MisreadError, PprsError, UnreadableFileError
-from pprs_dynamics.inference.residuals.conventions import with_mistakes
+from pprs_dynamics.inference.readings.check import with_mistakes
+from pprs_dynamics.inference.readings.findings import no_measurements
 from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
-from pprs_dynamics.inference.residuals.mistakes import no_measurements
 from pprs_dynamics.measurement.files.fingerprint import fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat

@@ -51,14 +51,12 @@ def add_topic(parser: argparse.ArgumentParser) -> None:
                         'holds several')
 
 
-def add_recordings(parser: argparse.ArgumentParser, required: bool = True,
-                   with_topic: bool = True) -> None:
+def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> None:
     """Declare RECORDING… and --topic."""
     parser.add_argument('recordings', metavar='RECORDING', nargs='+' if required else '*',
                         help='bag (rosbag2 folder, .mcap, .db3, ROS 1) or table (.csv, .csv.gz, '
                         '.parquet, .mat, .npz)')
-    if with_topic:
-        add_topic(parser)
+    add_topic(parser)
 
 
 def add_as_it_is(parser: argparse.ArgumentParser) -> None:

@@ -21,7 +21,8 @@ from pprs_dynamics.app.report.mechanism_description import (
 )
 from pprs_dynamics.app.report.tables import recording_table
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
-from pprs_dynamics.inference.residuals.mistakes import (
+from pprs_dynamics.inference.readings.findings import (
+    Mistake,
     OtherReading,
     columns_line,
     effort_looks_like,
@@ -80,6 +81,9 @@ def show_recordings(model: ForceModel, paths: Sequence[str], topic: str | None, 
         others = [one for one in summary.findings if isinstance(one, OtherReading)]
         if line := columns_line(others, model.recorded.columns is not None):
             screen.print(f'  if so, write into the model file  {shown(line)}')
+        for finding in summary.findings:
+            if isinstance(finding, Mistake) and finding.line:
+                screen.print(f'  if so, write into the model file  {shown(finding.line)}')
         if not summary.findings:
             screen.print('[green]nothing wrong found[/]')
     repeat = find_repeat(recordings)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from shlex import quote
 
-from pprs_dynamics.app.api.first_model import first_model
+from pprs_dynamics.app.api.first_model import FirstModel, first_model
 from pprs_dynamics.app.commands.arguments import MODEL, UsageError, number, output_file
 from pprs_dynamics.app.commands.info import show_recordings
 from pprs_dynamics.app.commands.input_output import write_json
@@ -39,6 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--drives', metavar='JOINT,JOINT', default='', help='the driven joints')
     parser.add_argument('--rate', metavar='HZ', type=number(0.0, FASTEST, 'Hz', above=True),
                         help='samples per second of a table without times')
+    parser.add_argument('--picture', metavar='FILE.png', type=output_file('.png', '.svg', '.pdf'),
+                        help='positions and efforts as they were read')
     parser.add_argument('--overwrite', action='store_true', help='replace --output where it is')
 
 
@@ -57,6 +59,11 @@ def run(options: argparse.Namespace) -> int:
         screen.print(shown(line))
     for note in first.notes:
         screen.print(f'[yellow]![/] {shown(note)}')
+    if first.model.recorded.columns is None and first.questions:
+        screen.print('[bold]Not sure[/]: write one of these lines into the model file')
+        for line in first.questions:
+            screen.print(f'  {shown(line)}')
+        return 1
     summaries = show_recordings(first.model, [str(one) for one in first.recordings], None, screen)
     screen.print(f'model: {shown(options.output)} (read its comments: they say what was guessed)')
     names = ' '.join(quote(str(one)) for one in first.recordings) or 'RECORDING'
@@ -72,8 +79,34 @@ def run(options: argparse.Namespace) -> int:
         write_json(options.json, {
             'model': options.output, 'notes': list(first.notes),
             'drives': list(first.model.drives),
-            'recordings': [asdict(summary) for summary in summaries]})
-    return 0
+            'recordings': [asdict(summary) for summary in summaries],
+            'questions': list(first.questions)})
+    if options.picture:
+        write_picture(options.picture, first)
+    if first.questions:
+        screen.print('[bold]Not sure[/]: the lines are comments in the model file; write what is '
+                     'true, or go on with --as-it-is')
+    return 1 if first.questions else 0
+
+
+def write_picture(path: str, first: FirstModel) -> None:
+    """Write positions and efforts of a first model's recording over time, a row per drive."""
+    from matplotlib.figure import Figure
+
+    from pprs_dynamics.app.report.pictures import plot_series
+    from pprs_dynamics.measurement.files.recording import read_recording
+
+    model = first.model
+    recording = read_recording(first.recordings[0], model.recorded)
+    count = len(model.drives)
+    figure = Figure(figsize=(10.0, 1.0 + 1.8 * count), layout='constrained')
+    axes = figure.subplots(count, 2, squeeze=False)
+    for d, (drive, units) in enumerate(zip(model.drives, model.units, strict=True)):
+        for k, (values, unit) in enumerate(((recording.position, units.position),
+                                            (recording.effort, units.effort))):
+            plot_series(axes[d][k], recording.time, {drive: values[:, d]},
+                        f'{("position", "effort")[k]} [{unit}]')
+    figure.savefig(path)
 
 
 def _ask(question: str, answers: Sequence[str]) -> int:

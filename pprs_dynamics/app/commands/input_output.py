@@ -39,8 +39,7 @@ def read_inputs(options: argparse.Namespace, screen: Any, whole: bool = False) -
 
     with staged_bar(screen) as progress:
         inputs = Inputs.of(options.model, options.recordings, getattr(options, 'validate', ()),
-                           getattr(options, 'topic', None), progress, whole,
-                           getattr(options, 'as_it_is', False))
+                           options.topic, progress, whole, getattr(options, 'as_it_is', False))
     for recording in (*inputs.fitted, *inputs.held_out):
         for finding in recording.findings:
             screen.print(f'[yellow]![/] {shown(recording.name)}: {shown(finding.text)}')

@@ -25,7 +25,7 @@ EXAMPLE = 'pprs next-experiment run.mcap --model robot.yaml --output next.csv'
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
-    add_recordings(parser, required=False, with_topic=False)
+    add_recordings(parser, required=False)
     add_as_it_is(parser)
     parser.add_argument('--output', metavar='FILE.csv', type=output_file(*POSES),
                         required=True, help='poses for play_trajectory; of an arm, positions, '

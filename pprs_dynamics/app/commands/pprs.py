@@ -115,7 +115,7 @@ def _ended(given: Sequence[str]) -> int:
         # What other packages and files say may hold what a terminal would obey.
         text = displayed(error)
         if is_assumed and '`pprs init ' in text:  # the recording is of another robot
-            text = f"no --model is given, must be one, or --demo for the paper's robot: {text}"
+            text += "; no --model is given, and --demo takes that of the paper's robot"
         _say(text, given)
         return 1 if isinstance(error, MisreadError) else 2
     except KeyboardInterrupt:

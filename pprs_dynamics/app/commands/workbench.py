@@ -54,6 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--host', type=_one_address, default=HOST,
                         help=f'to listen on (default {HOST}: nobody else on the network sees it)')
     parser.add_argument('--no-browser', action='store_true', help='open no browser')
+    parser.add_argument('--ros-args', nargs=argparse.REMAINDER, default=[], metavar='ARGUMENT',
+                        help='of --live, last: remappings, use_sim_time and QoS, as of a node')
 
 
 def run(options: argparse.Namespace) -> int:
@@ -103,4 +105,5 @@ def _live(options: argparse.Namespace, model: ForceModel) -> LiveSource:
     except ImportError:
         raise MissingLibraryError('rclpy', 'live data', 'ros') from None
     return LiveNodes(model, options.live_topic or options.topic or 'joint_states',
-                     'monitor', 'feedforward', options.namespace)
+                     'monitor', 'feedforward', options.namespace,
+                     ['--ros-args', *options.ros_args])

@@ -26,7 +26,7 @@ from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.residuals.conventions import find_mistakes
+from pprs_dynamics.inference.readings.check import find_mistakes
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import estimate_present
 from pprs_dynamics.measurement.files.fingerprint import fingerprint
@@ -156,7 +156,7 @@ def _as_in_model(diagnosis: Diagnosis, reported: Container[tuple[str | None, str
     for effect in diagnosis.model.effects:
         if not isinstance(effect, (DriveEffect, StructureEffect)):
             continue
-        estimates = estimate_present(selection.last, selection.reported, effect)
+        estimates = estimate_present(selection.best.fits, selection.best.fitted, effect)
         for name, estimate in estimates.items():
             drive, parameter = effect.place_and_parameter(name)
             if (drive or None, effect.name) not in reported:

@@ -16,6 +16,7 @@ from typing import Any
 from pprs_dynamics.app.report import diagnosis_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import escape, stacked, text_table, verdict_panel
+from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import RivalEffect
 from pprs_dynamics.inference.diagnosis.partial_errors import ErrorStep, error_steps
@@ -24,7 +25,6 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     listed,
     name_drives,
     plain,
-    with_drives,
 )
 from pprs_dynamics.inference.diagnosis.sentences import (
     Finding,
@@ -44,10 +44,12 @@ MOST_LISTED = 2  # places of effects whose parameters the sentences give; names 
 WIDTH = 80
 LONGEST = 400  # characters of rows, values and the runner-up without --details: five lines
 MOST_EFFECTS = 4  # that are shown without --details
+REFIT = 'its own numbers'  # of the model, fitted beside the effects
+LEAST_REFIT = 0.01  # share of the error, from which these are listed
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
-ELSEWHERE = '[dim]Why, how to confirm it, and all values: --details, or --report FILE.html[/]'
-LEGEND = '[dim]Of costs, fit: to the recording; coefficients: sizes; all else: what was chosen[/]'
-SEEN = 'What else would have been seen, each alone'
+ELSEWHERE = '[dim]Evidence, confirmation and all values: --details, or --report FILE.html[/]'
+LEGEND = '[dim]Cost terms: fit = misfit; coefficients = prior; others = model choices[/]'
+SEEN = 'Not seen, and from which size it would have been'
 METHOD = (
     'Model and measured effort get the same treatment; every effect of the catalogue, in every '
     'shape tried and on every drive, is a column of one regression beside the model\'s own numbers '
@@ -98,9 +100,8 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
         yield LEGEND
     if diagnosis.verdict == 'adequate' and (seen := word_detectable(diagnosis)):
         yield escape(seen)
-    if words.within_model_error:
-        yield ('May be left by the forms of what was found, no finding: '
-               f'{escape(_within_model_error(diagnosis))}')
+    if words.barred:
+        yield f'[blue]i[/] {escape(words.barred[0])}'
     if words.warnings:
         yield f'[yellow]![/] {escape(words.warnings[0])}'
 
@@ -108,14 +109,6 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
 def _room(line: str) -> int:
     """Return how many characters a line takes, whole lines of the screen."""
     return -(-len(line) // WIDTH) * WIDTH
-
-
-def _within_model_error(diagnosis: Diagnosis) -> str:
-    """Return the names of what was fitted as the model error of other effects, the first ones."""
-    every = diagnosis.residuals.drives
-    names = [with_drives(one.name, one.drives, every) for one in diagnosis.within_model_error]
-    more = len(names) - MOST_LISTED
-    return listed([*names[:MOST_LISTED], f'{more} more'] if more > 0 else names)
 
 
 def _following(words: Sentences) -> Iterator[Any]:
@@ -131,7 +124,7 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     if diagnosis.effects:
         held = ('the --validate recordings' if diagnosis.held_out_on == 'validation'
                 else 'blocks of the same recordings')
-        yield _table(f'Those that lower the error most first; held out: {held}',
+        yield _table(f'Effects by error reduction; held out: {held}',
                      _headings(diagnosis),
                      _effect_rows(diagnosis), right=(2, 3, 4))
     for number, finding in enumerate((*words.effects, *words.rivals, *words.unexplained), start=1):
@@ -152,10 +145,9 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
              f'{one.error_after:.3f}') for one in diagnosis.candidates], right=(2, 3))
     if rows := detectable_rows(diagnosis):
         yield _table(SEEN, ('effect', 'size'), [tuple(map(escape, row)) for row in rows])
-    yield from _list('Within their tolerance', words.calibrated, 'blue')
+    yield from _list('Calibrated within their tolerance', words.calibrated, 'blue')
     yield from _list('Suspects', words.suspects, 'yellow')
-    yield from _list('Within model error', words.within_model_error, 'blue')
-    yield from _list('Sets that may not be', words.barred, 'blue')
+    yield from _list('Excluded sets', words.barred, 'blue')
     yield from _list('Warnings', words.warnings, 'yellow')
 
 
@@ -165,10 +157,15 @@ def _headings(diagnosis: Diagnosis) -> tuple[str, ...]:
 
 
 def _effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
-    return [(one.name, sites(one.drives, diagnosis, one.places),
-             _fall(one.error_before, one.error_after),
-             _fall(one.held_out_before, one.held_out_after), f'{one.evidence:.0f}')
-            for one in diagnosis.effects]
+    rows: list[tuple[str, ...]] = [
+        (effect.name, sites(effect.drives, diagnosis, effect.places),
+             _fall(effect.error_before, effect.error_after),
+             _fall(effect.held_out_before, effect.held_out_after), f'{effect.evidence:.0f}')
+            for effect in diagnosis.effects]
+    given = root_mean_square(diagnosis.residuals.error)
+    if abs(diagnosis.refit - given) > LEAST_REFIT * given:
+        rows.append((REFIT, '', _fall(given, diagnosis.refit), '', ''))
+    return rows
 
 
 def _joined(values: Sequence[FittedValue]) -> list[tuple[str, str, str]]:
@@ -247,6 +244,7 @@ def diagnosis_page(
         As they were given to `word_diagnosis`.
     """
     page = Page(f'Diagnosis: {diagnosis.verdict}')
+    page.heading('Result')
     page.text(words.headline, 'lead')
     for text in words.reference:
         page.text(f'{text[:1].upper()}{text[1:]}.')
@@ -258,22 +256,26 @@ def diagnosis_page(
     page.command(words.following, words.command)
     page.copy('Copy as Markdown', diagnosis_markdown(diagnosis, words))
     page.folded_list('Warnings', words.warnings, is_open=True)
-    _findings(page, diagnosis, words, rivals)
-    _sets(page, diagnosis)
-    if rows := detectable_rows(diagnosis):
-        with page.fold(SEEN):
-            page.text('The size from which on each effect alone would have cost 10 less than the '
-                      'answer, at the noise of these recordings, and been more than the forms of '
-                      'what is there may leave.', 'note')
-            page.table(('effect', 'size'), rows)
+    page.heading('Evidence')
+    _findings(page, diagnosis, words)
     _contributions(page, diagnosis, steps)
     _parameters(page, diagnosis, words)
     figures.add_every_drive(page, diagnosis.residuals, after, diagnosis.noise_floors,
-                            'with the model as given and with what was found')
-    with page.fold('How it was found'):
+                            'with the input model and with the reported effects')
+    with page.fold('Method'):
         page.text(' '.join(METHOD))
-        if diagnosis.notes:
-            page.bullets(diagnosis.notes)
+        page.bullets(diagnosis.notes)
+    if words.effects:
+        page.heading('Confirm it on the machine')
+        page.bullets([f'{finding.title}: {finding.confirm}' for finding in words.effects])
+    page.heading('Alternatives')
+    _alternatives(page, diagnosis, words, rivals)
+    if rows := detectable_rows(diagnosis):
+        page.heading(SEEN)
+        with page.fold('Smallest effects that would have been reported'):
+            page.text('Each alone would have cost 10 less than the answer at the noise of these '
+                      'recordings.', 'note')
+            page.table(('effect', 'size'), rows)
     return page
 
 
@@ -304,8 +306,8 @@ def _errors(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> Non
     rows += [ErrorRow(name, first.drives[d], last.drives[d] if fell else None, floors[name])
              for d, name in enumerate(diagnosis.residuals.drives) if name in floors]
     unit = diagnosis.residuals.unit
-    page.errors(rows, f'Error, rms [{unit}], before (grey) and with what was found (blue); dotted: '
-                'the noise.' if fell else f'Error, rms [{unit}]; dotted: the noise.')
+    page.errors(rows, f'Error, rms [{unit}], before (grey) and with the reported effects (blue); '
+                'dotted: the noise.' if fell else f'Error, rms [{unit}]; dotted: the noise.')
 
 
 def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
@@ -320,31 +322,34 @@ def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
         page.figure(*figures.effect_pictures(diagnosis, diagnosis.effects[0])[0])
 
 
-def _findings(page: Page, diagnosis: Diagnosis, words: Sentences,
-              rivals: Sequence[RivalEffect]) -> None:
+def _findings(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
     kind = diagnosis.model.kind
     if words.effects:
-        with page.fold('What was found, why, and how to confirm it'):
-            for finding, one in zip(words.effects, diagnosis.effects, strict=True):
-                page.card(finding.title, _lines(finding, one.effect.card_in(kind).equation),
-                          figures.effect_pictures(diagnosis, one))
-                for said, rival in zip(words.rivals, rivals, strict=True):
-                    if rival.of == one.name:
-                        page.card(said.title,
-                                  _lines(said, rival.effect.card_in(kind).equation),
-                                  figures.effect_pictures(diagnosis, rival))
+        with page.fold('Reported effects'):
+            for finding, effect in zip(words.effects, diagnosis.effects, strict=True):
+                page.card(finding.title, _lines(finding, effect.effect.card_in(kind).equation),
+                          figures.effect_pictures(diagnosis, effect))
     if words.unexplained:
         with page.fold('What no effect of the catalogue explains'):
             for finding, group in zip(words.unexplained, unexplained_groups(diagnosis),
                                       strict=True):
-                pictures = [(figures.unknown_picture(diagnosis, one), f'{one.drive}.')
-                            for one in group]
+                pictures = [(figures.unknown_picture(diagnosis, statement), f'{statement.drive}.')
+                            for statement in group]
                 page.card(finding.title, finding_lines(finding),
                           [(figure, text) for figure, text in pictures if figure is not None])
-    page.folded_list('Suspects: effects that slow noise would explain as well', words.suspects)
-    page.folded_list('What the forms of the effects that were found may leave: no findings',
-                     words.within_model_error)
-    page.folded_list('Sets that may not be', words.barred)
+
+
+def _alternatives(page: Page, diagnosis: Diagnosis, words: Sentences,
+                  rivals: Sequence[RivalEffect]) -> None:
+    if words.rivals:
+        with page.fold('Rivals, which explain the data about as well'):
+            for finding, rival in zip(words.rivals, rivals, strict=True):
+                equation = rival.effect.card_in(diagnosis.model.kind).equation
+                page.card(finding.title, _lines(finding, equation),
+                          figures.effect_pictures(diagnosis, rival))
+    _sets(page, diagnosis)
+    page.folded_list('Suspects, which slow noise explains as well', words.suspects)
+    page.folded_list('Excluded sets', words.barred)
 
 
 def _lines(finding: Finding, equation: str) -> list[tuple[str, str]]:
@@ -356,15 +361,14 @@ def _sets(page: Page, diagnosis: Diagnosis) -> None:
     if not diagnosis.sets:
         return
     with page.fold('The best sets of effects, and their costs'):
-        page.text('Cost above that of the best set. 10 stands for odds of 150 to 1: a set that '
-                  'comes nearer is told as a rival. Of which: how much worse it fits, what its '
-                  'coefficients ask of their prior, and the prior costs of its names, drives, '
-                  'shapes and signs.', 'note')
-        page.table(('set', 'cost', 'of which'), set_rows(diagnosis))
+        page.text('Cost above that of the best set. 10 are odds of 150 to 1; a set that costs '
+                  'less is a rival. Terms: misfit, prior of the coefficients, and penalties for '
+                  'names, drives, shapes and signs.', 'note')
+        page.table(('set', 'cost', 'terms'), set_rows(diagnosis))
         if diagnosis.candidates:
             page.figure(figures.evidence_bars(diagnosis),
-                        'Evidence of each effect alone; 0 is the threshold. Blue: found. Yellow: '
-                        'a rival. Grey: explains less, or nothing beside what was found.')
+                        'Evidence of each effect alone; 0 is the threshold. Blue: reported. '
+                        'Yellow: a rival. Grey: explains less, or nothing in addition.')
 
 
 def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> None:
@@ -385,8 +389,8 @@ def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep])
             (one.name, f'{one.evidence:.0f}', f'{one.error_before:.3f}', f'{one.error_after:.3f}',
              f'{one.held_out_before:.3f}', f'{one.held_out_after:.3f}',
              sites(one.drives, diagnosis, one.places)) for one in diagnosis.effects],
-            caption='Those without which the error would be largest first, parameters fitted anew '
-            f'at every step. Held out: {where}.')
+            caption='Error before: without the force of this effect, all else as fitted. '
+            f'Held out before: fitted without it. Held out: {where}.')
         figures.add_contributions(page, diagnosis.residuals, {
             one.name: one.force for one in diagnosis.effects}, 'What each effect contributes.')
 

@@ -112,7 +112,8 @@ class Page:
 
     def record(self, lines: Iterable[tuple[str, str]]) -> None:
         """Add what the page is of, so that it can be filed: labelled lines behind a title."""
-        with self.fold('Record: when, by what, from which files'):
+        self.heading('Record')
+        with self.fold('Date, version, command and files'):
             terms = ''.join(f'<dt>{escape(label)}</dt><dd>{escape(text)}</dd>'
                             for label, text in lines)
             self._body.append(f'<dl class="record">{terms}</dl>')

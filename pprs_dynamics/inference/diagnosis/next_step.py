@@ -20,7 +20,7 @@ from pprs_dynamics.physics.model.reference_keys import reference_files
 
 if TYPE_CHECKING:  # naming files needs no diagnosis
     from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-    from pprs_dynamics.inference.residuals.mistakes import NoMeasurement
+    from pprs_dynamics.inference.readings.findings import NoMeasurement
     from pprs_dynamics.physics.model.force_model import ForceModel
 
 OWN_FRICTION = ('friction.viscous', 'friction.coulomb')  # of an arm's model file

@@ -17,7 +17,6 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     RankedEffect,
     RankedSet,
     RivalEffect,
-    WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles, next_step
 from pprs_dynamics.inference.diagnosis.quantities import (
@@ -120,7 +119,7 @@ class Sentences:
         In the order of those given to `word_diagnosis`.
     unexplained : tuple of Finding
         In the order of `unexplained_groups`.
-    suspects, within_model_error, barred, calibrated, warnings : tuple of str
+    suspects, barred, calibrated, warnings : tuple of str
     following, command : str
         What to do next, in words and for a shell.
     reference : tuple of str
@@ -132,7 +131,6 @@ class Sentences:
     rivals: tuple[Finding, ...]
     unexplained: tuple[Finding, ...]
     suspects: tuple[str, ...]
-    within_model_error: tuple[str, ...]
     barred: tuple[str, ...]
     calibrated: tuple[str, ...]
     warnings: tuple[str, ...]
@@ -161,9 +159,7 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(Finding(*describe_unexplained(group, bool(diagnosis.effects)))
               for group in unexplained_groups(diagnosis)),
         tuple(_suspect(diagnosis, suspect) for suspect in diagnosis.suspects),
-        tuple(_within_model_error(diagnosis, absorbed)
-              for absorbed in diagnosis.within_model_error),
-        tuple(f'{_set(diagnosis, ranked)} may not be, whatever it costs: {ranked.barred}. It '
+        tuple(f'{_set(diagnosis, ranked)} is excluded: {ranked.barred}. It '
               f'{_cost(ranked)}' for ranked in diagnosis.barred),
         tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated),
         diagnosis.warnings, following, command,
@@ -204,7 +200,7 @@ def detectable_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
 def word_detectable(diagnosis: Diagnosis) -> str:
     """Return the same of some common effects as one sentence; '' for none."""
     told = [f'{name} from {size}' for name, size in detectable_rows(diagnosis) if name in COMMON]
-    return f'Would have been seen, each alone: {", ".join(told)}' if told else ''
+    return f'Smallest effects that would have been seen: {", ".join(told)}' if told else ''
 
 
 def _set(diagnosis: Diagnosis, ranked: RankedSet) -> str:
@@ -228,13 +224,9 @@ def _cost(ranked: RankedSet) -> str:
 def runner_up(diagnosis: Diagnosis) -> str:
     """Return how the second best set differs from the best, and its costs; '' for none.
 
-    By what is told: what is within the model error of others was never named as missing.
+    Sets with other effects in place of the reported ones come before sets with more effects.
     """
-    within = {absorbed.name for absorbed in diagnosis.within_model_error} - {
-        effect.name for effect in diagnosis.effects}
-    untold = within & {name for fitted in diagnosis.sets[:1] for name, _ in fitted.names}
-    sets = [(fitted, {pair for pair in fitted.names if pair[0] not in untold})
-            for fitted in diagnosis.sets]
+    sets = [(fitted, set(fitted.names)) for fitted in diagnosis.sets]
     # What could stand instead says more than what could join.
     differing = [(one, names) for one, names in sets[1:] if names != sets[0][1]]
     following = next((pair for pair in differing if sets[0][1] - pair[1]),
@@ -267,80 +259,68 @@ def word_reference(since: SinceReference | None) -> tuple[str, ...]:
         return ()
     shares = listed([f'{share:.0%} on {drive}' for drive, share in since.explained.items()])
     told: tuple[str, ...] = (
-        f'{listed(since.recordings)} knows the states of {since.covered:.0%} of this recording'
-        + ('' if since.covered > MOSTLY else ': elsewhere only the model\'s numbers are known')
-        + f', and shows this share of its squared error as well: {shares}',
-        'a fault that was there in the reference cannot be seen')
+        f'{listed(since.recordings)} covers {since.covered:.0%} of the states of this recording'
+        + ('' if since.covered > MOSTLY else '; elsewhere only the model is known')
+        + f'. It explains this share of the squared error: {shares}',
+        'a fault that was already in the reference cannot be seen')
     if not 1 / ALIKE_PACE < since.pace < ALIKE_PACE:
-        told += (f'this recording moves at {since.pace:.2g} times the speed of the reference, in '
-                 'which errors that lag come at other places: do not believe a delay or a '
-                 'hysteresis that is told since then without a reference of this speed',)
+        told += (f'this recording moves at {since.pace:.2g} times the speed of the reference: '
+                 'confirm a delay or a hysteresis with a reference of this speed',)
     return (*told, since.note) if since.note else told
 
 
 def _headline(diagnosis: Diagnosis) -> str:
     held, unit = diagnosis.effects, diagnosis.residuals.unit
-    doubt = _doubt(diagnosis)
     if diagnosis.effort_looks_like:
         told = dict.fromkeys(looks.what for looks in diagnosis.effort_looks_like.values())
-        return f'{" ".join(map(sentence, told))} No effect is claimed.'
+        return f'{" ".join(map(sentence, told))} No effect is reported.'
     if diagnosis.stick_slip:
         sticking = [f'{drive} at {slip.frequency:.3g} Hz'
                     for drive, slip in diagnosis.stick_slip.items()]
-        return (f'Stick-slip: {listed(sticking)} stand, are loaded until they break away, and '
-                'slip. What else may be missing cannot be seen in such a motion: no effect is '
-                'claimed.')
+        return (f'Stick-slip on {listed(sticking)}. No missing effect can be identified in such a '
+                'motion.')
+    left = root_mean_square(diagnosis.remaining)
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
-        f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')
+        f'{change(root_mean_square(diagnosis.residuals.error), left, unit)}')
     noise = in_unit(diagnosis.noise_floor, unit)
     if diagnosis.little:
-        little = word_little(diagnosis.little, ' with what was found' if held else '')
-        beside = f' What was found: {_lacking(diagnosis)}.{fall}.' if held else ''
-        return (f'{little[:1].upper()}{little[1:]}, and no effect of the catalogue the rest.'
-                f'{beside}{doubt}')
+        little = word_little(diagnosis.little, ' with the reported effects' if held else '')
+        return (f'{little[:1].upper()}{little[1:]}. No effect of the catalogue explains the rest.')
     if not held and not diagnosis.depends_on and diagnosis.unconfirmed:
-        left = root_mean_square(diagnosis.remaining)
-        lacks = 'Something is missing. ' if diagnosis.verdict == 'unknown' else ''
-        above = (f', and the error of {in_unit(left, unit)} is more than the noise, {noise}'
+        above = (f' The error, {in_unit(left, unit)}, is more than the noise, {noise}.'
                  if left > AT_NOISE * diagnosis.noise_floor else '')
-        return f'{lacks}Nothing that was found holds{above}.{doubt}'
+        return f'No effect is supported by held-out data.{above}'
     if any(effect.course is not None and effect.course.kind != SINCE for effect in held):
-        return (f'Something changes within the recording, as if {_lacking(diagnosis)}.{fall}. No '
-                f'constant effect does that.{doubt}')
+        return ('The error changes during the recording, most likely because '
+                f'{_lacking(diagnosis)}.{fall}.')
     if diagnosis.verdict == 'unknown':
         groups = unexplained_groups(diagnosis)
         places = listed([place_on(group) for group in groups[:2]] or [
-            f'{drive} keeps {ratio:.1f} times its noise'
+            f'the error of {drive} is {ratio:.1f} times its noise'
             for drive, ratio in diagnosis.above_noise.items()])
         more = len(groups) - 2
         places += f' and in {more} more place{"s" * (more > 1)}' if more > 0 else ''
-        beside = f' Beside it, {_lacking(diagnosis)}.{fall}, not to the noise.' if held else ''
-        return ('Something is missing that no effect of the catalogue explains: '
-                f'{places}.{beside}{doubt}')
-    unseen = (f'How much of the error of {listed(diagnosis.unseen_noise)} is noise cannot be told '
-              'from this recording.') if diagnosis.unseen_noise else ''
+        beside = f' In addition, {_lacking(diagnosis)}; w{fall.strip()[1:]}.' if held else ''
+        return f'An error remains that no effect of the catalogue explains: {places}.{beside}'
+    unseen = ('The recording does not show how much of the error of '
+              f'{listed(diagnosis.unseen_noise)} is noise.') if diagnosis.unseen_noise else ''
     if diagnosis.verdict == 'adequate':
         if diagnosis.since:
-            return (f'nothing has changed beyond noise, which is {noise} rms. Changes much weaker '
-                    'than that could still hide in it.')
+            return (f'no effect has changed, the error is the noise, {noise} rms. Changes much '
+                    'weaker than the noise cannot be seen.')
         if unseen:
-            return f'Nothing stands out. {unseen}'
-        return (f'Nothing is missing beyond noise, which is {noise} rms. Effects much weaker than '
-                'that could still hide in it.')
-    left = held[-1].error_after
-    level = (f'. {unseen}' if unseen
-             else ', which is the noise.' if left <= AT_NOISE * diagnosis.noise_floor
-             else f'. The noise is {noise}; the rest is within the model error of what was found.'
-             if diagnosis.within_model_error
-             # Only the widths of reversals are fitted and yet not part of the model.
-             else f'. The noise is {noise}; the rest lies near reversals, where friction turns '
-             'over in another width than the model\'s.')
-    which = ': this data cannot tell which' if any(
+            return f'No effect stands out. {unseen}'
+        return (f'No effect is missing: the error is the noise, {noise} rms. Effects much weaker '
+                'than the noise cannot be seen.')
+    level = (f'. {unseen}' if unseen else ', which is the noise.'
+             if left <= AT_NOISE * diagnosis.noise_floor
+             else f'; the noise is {noise}.')
+    which = ' (the data do not separate these)' if any(
         _rivals(diagnosis, effect) for effect in held) else ''
     missing = _lacking(diagnosis)
     begin = 'T' if missing.startswith('the model') else missing[:1]
-    return f'{begin}{missing[1:]}{which}.{fall}{level}{doubt}'
+    return f'{begin}{missing[1:]}{which}.{fall}{level}'
 
 
 def _lacking(diagnosis: Diagnosis) -> str:
@@ -367,26 +347,8 @@ def _otherwise(diagnosis: Diagnosis, effect: FoundEffect) -> str:
     recorded = ', '.join(told(value, value.text) for value in fitted)
     rivals = _rivals(diagnosis, effect)
     other = f' (or the model lacks {listed(rivals, "or")})' if rivals else ''
-    return (f'{_title(diagnosis, effect)} is in the model with {given}; '
-            f'this recording says {recorded}{other}')
-
-
-def _doubt(diagnosis: Diagnosis) -> str:
-    """Return what was fitted and does not hold, a sentence for each."""
-    told = []
-    for effect in diagnosis.unconfirmed:
-        title = _title(diagnosis, effect)
-        if effect.objection:
-            told.append(f' {title} was fitted as well and is no finding: {effect.objection}.')
-            continue
-        unit = diagnosis.residuals.unit
-        worse = (f'with it the error on held-out data '
-                 f'{change(effect.held_out_before, effect.held_out_after, unit)}'
-                 if effect.held_out_after >= effect.held_out_before else
-                 f'held-out data are predicted worse with it, by {-effect.certainty:.2g} standard '
-                 'errors in units of the noise')
-        told.append(f' {title} was fitted as well and is no finding: {worse}.')
-    return ''.join(told)
+    return (f'{_title(diagnosis, effect)} is in the model with {given}, but this recording gives '
+            f'{recorded}{other}')
 
 
 def _or_rivals(diagnosis: Diagnosis, effect: FoundEffect) -> str:
@@ -416,8 +378,8 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect, is_first: bool) -> Findin
     what = (_otherwise(diagnosis, effect) if effect.in_model else
             f'The model lacks {title}: {_parameters(diagnosis, effect)}')
     if issubclass(effect.effect, MeasurementEffect):
-        what += ('. This is what the sensor says, not what the drive must do: it enters '
-                 'comparisons and the monitor, never a command')
+        what += ('. It describes the sensor: it is used in comparisons and by the monitor, never '
+                 'in a command')
     return Finding(
         title, f'{what}.', _why(diagnosis, effect, is_first), sentence(card.causes),
         sentence(card.confirm), sentence(card.looks_like),
@@ -430,10 +392,10 @@ def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
     held_out = '' if isnan(rival.held_out_after) else (
         f', and {in_unit(rival.held_out_after, diagnosis.residuals.unit)} on held-out data')
     return Finding(
-        f'or {title}', f'In place of {rival.of}, {title} would explain this data about as well: '
+        f'or {title}', f'{title} explains the data about as well as {rival.of}: '
         f'{_parameters(diagnosis, rival)}.',
-        f'With it the error is {in_unit(rival.error_after, diagnosis.residuals.unit)}{held_out}; '
-        f'the cost of the set is {plain(rival.cost, 2)} above the best one.', sentence(card.causes),
+        f'With it the error is {in_unit(rival.error_after, diagnosis.residuals.unit)}{held_out}. '
+        f'The set costs {plain(rival.cost, 2)} more than the best one.', sentence(card.causes),
         sentence(card.confirm), sentence(card.looks_like))
 
 
@@ -489,34 +451,33 @@ def sure_moments(effect: type[CatalogueEffect], parameters: Mapping[str, Estimat
 
 def _why(diagnosis: Diagnosis, effect: FoundEffect, is_first: bool) -> str:
     fresh, unit = diagnosis.held_out_on == 'validation', diagnosis.residuals.unit
-    held_out = ('On the recordings given with --validate, which took no part in the fit, it ' if
-                fresh else 'On blocks of the same recording, each predicted from the others, it ')
+    held_out = ('On the --validate recordings it ' if fresh else
+                'On held-out blocks of the same recording it ')
     held_out += change(effect.held_out_before, effect.held_out_after, unit)
-    if not fresh:
-        held_out += ('; that is the weaker evidence, a recording of another motion with '
-                     '--validate is the stronger' if is_first else ' (the weaker evidence)')
-    return (f'It takes away {percent(effect.share)} of the error, each drive in units of its '
-            f'noise. With it the error {change(effect.error_before, effect.error_after, unit)}. '
-            f'{held_out}. Evidence {effect.evidence:.0f}, where 0 is the threshold'
-            + ('.' if effect.without is None else
-               f': the best set without it, {_set(diagnosis, effect.without)}, '
+    if not fresh and is_first:
+        held_out += '; another motion with --validate is stronger evidence'
+    return (f'Its force alone removes {percent(effect.share)} of the error, each drive in units of '
+            'its noise. '
+            f'With it the error {change(effect.error_before, effect.error_after, unit)}. '
+            f'{held_out}. Evidence {effect.evidence:.0f} (threshold 0).'
+            + ('' if effect.without is None else
+               f' The best set without it, {_set(diagnosis, effect.without)}, '
                f'{_cost(effect.without)}.'))
 
 
 def _remarks(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
     if rivals := _rivals(diagnosis, effect):
-        yield (f'This data cannot tell {effect.name} from {listed(rivals, "or")}, which would '
-               'explain it about as well.')
+        yield f'The data do not separate {effect.name} from {listed(rivals, "or")}.'
     yield from _negative(diagnosis, effect)
     for names in effect.places:
         if len(names) > 1:
-            yield (f'No motion tells {names[0]} from {listed(names[1:], "or")}: they move alike. '
-                   'The numbers are for the one that is named with them.')
+            yield (f'No motion separates {names[0]} from {listed(names[1:], "or")}, because they '
+                   'move alike.')
     if effect.effect is AsymmetricFriction:
         yield from _two_in_one(diagnosis, effect)
     if effect.at_bound:
-        yield (f'{listed(effect.at_bound)} stand{"s" * (len(effect.at_bound) == 1)} at the edge of '
-               'what was tried: no finding but that it is there or beyond.')
+        yield (f'The value of {listed(effect.at_bound)} is at the limit of the values that were '
+               'tried; the true one may be beyond.')
 
 
 def _negative(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
@@ -529,8 +490,8 @@ def _negative(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
         kind = 'friction' if 'friction' in effect.name else what
         doubt = ('' if value + INTERVAL * one.estimate.std < lowest else
                  ', though zero is within its uncertainty')
-        yield (f'{place}: {what} is negative, {one.text}{doubt}. There is no negative {kind}: '
-               'either the model has too much of it already, or something else looks like it.')
+        yield (f'{place}: {what} is negative, {one.text}{doubt}. Negative {kind} is impossible: '
+               'the model has too much of it, or another effect looks like it.')
 
 
 def _two_in_one(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
@@ -549,16 +510,9 @@ def _two_in_one(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
 
 
 def _suspect(diagnosis: Diagnosis, ranked: RankedEffect) -> str:
-    return (f'{with_drives(ranked.name, ranked.drives, diagnosis.residuals.drives)}: may be there, '
-            f'but slow noise would explain the same (evidence {ranked.evidence:.0f}, where 0 is '
-            'the threshold); repeat the recording')
-
-
-def _within_model_error(diagnosis: Diagnosis, absorbed: WithinModelError) -> str:
-    return (f'{with_drives(absorbed.name, absorbed.drives, diagnosis.residuals.drives)}, '
-            f'{in_unit(absorbed.rms, diagnosis.residuals.unit)} rms, is within the model error of '
-            f'{listed(absorbed.of)}: a real machine is only nearly of the form that the catalogue '
-            'gives it. Not adopted')
+    return (f'{with_drives(ranked.name, ranked.drives, diagnosis.residuals.drives)}: possible, '
+            f'but slow noise explains the data as well (evidence {ranked.evidence:.0f}, threshold '
+            '0); repeat the recording')
 
 
 def _rounded(after: float, before: float) -> float:

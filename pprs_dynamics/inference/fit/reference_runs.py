@@ -12,7 +12,7 @@ from pathlib import Path
 
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.inference.fit.reference import Reference, ReferenceRunError
-from pprs_dynamics.inference.residuals.conventions import with_mistakes
+from pprs_dynamics.inference.readings.check import with_mistakes
 from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
 from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, read_recording

@@ -42,6 +42,7 @@ ZSTANDARD = ('.zst', '.zstd')
 LARGEST_UNPACKED = 2_000_000_000  # bytes
 BLOCK = 4 << 20  # characters read at a time
 NO_NUMBERS = ['', 'nan', 'NaN', 'NAN']
+PREAMBLE = 20  # lines that may stand above a table
 NO_TEXT = 'neither rosbag2 (MCAP, sqlite3) nor CSV text in UTF-8'
 
 
@@ -88,6 +89,8 @@ class CsvTable:
             Where it is no text, or empty.
         """
         separators = tuple(each for each in SEPARATORS if each != decimal)
+        if (below := cls._below_preamble(path, decimal, separators)) is not None:
+            return below
         with _text_of(path) as (file, _):
             above, remark, first = 0, '', file.readline()
             while first.startswith(REMARKS) and (line := file.readline()):
@@ -111,6 +114,31 @@ class CsvTable:
                        len(header), above, header)
         return cls(path, separator, decimal, header, len(header), above + 1,
                    _cells(path, above + 2, second, separator) if second else [])
+
+    @classmethod
+    def _below_preamble(cls, path: Path, decimal: str, separators: Sequence[str],
+                        ) -> CsvTable | None:
+        """Return a table below lines about the recording, or with a line of units.
+
+        None for a table whose header, if any, is its first line.
+        """
+        with _text_of(path) as (file, _):
+            lines = list(islice(file, PREAMBLE))
+        if not lines:
+            return None
+        for separator in separators:
+            rows = [_cells(path, number, line, separator) if line.strip() else []
+                    for number, line in enumerate(lines, 1)]
+            first = next((k for k in range(len(rows) - 1) if len(rows[k]) > 1 and all(
+                len(row) == len(rows[k]) and any(row) and all(
+                    _is_value(cell, decimal) for cell in row) for row in rows[k:k + 2])), 0)
+            titles = [row for row in rows[max(first - 2, 0):first] if len(row) == len(rows[first])]
+            if first < 2 or not titles or lines[0].startswith(REMARKS):
+                continue
+            names = [' '.join(filter(None, cells)) for cells in zip(*titles, strict=True)]
+            if len(titles) > 1 or len(rows[0]) != len(rows[first]):
+                return cls(path, separator, decimal, names, len(names), first, rows[first])
+        return None
 
     def read(self, wanted: Sequence[Column], progress: Progress | None = None) -> list[Array]:
         """Return columns, (N,) each; times of ISO 8601 as seconds since 1970.

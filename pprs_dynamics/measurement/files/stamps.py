@@ -33,6 +33,9 @@ LOST_STEPS = 1.5
 # the resolution of an encoder; longer gaps cannot be interpolated.
 GAP_STEPS = 2.5
 GAP_TIME = 0.02
+# Steps that are this much longer than the median in a twentieth of all vary by jitter: gaps are
+# longer than some of those.
+USUAL, JITTER, JITTER_STEPS = 0.95, 1.8, 2.5
 # Medians of this many steps are compared; a rate that lasts less than three of them, or differs
 # by less than this, has not changed.
 RATE_BLOCK = 100
@@ -130,7 +133,11 @@ def gaps(time: Array, part: slice) -> tuple[Indices, Indices, int]:
         nothing = np.array([], dtype=np.int64)
         return nothing, nothing, 0
     step = float(np.median(steps))
-    gap = steps > max(GAP_STEPS * step, GAP_TIME) * (1 + STAMP_ROUNDING)
+    longest = max(GAP_STEPS * step, GAP_TIME)
+    usual = float(np.quantile(steps, USUAL))
+    if usual > JITTER * step:  # steps that vary much are no gaps
+        longest = max(longest, JITTER_STEPS * usual)
+    gap = steps > longest * (1 + STAMP_ROUNDING)
     padded = np.concatenate(([step], steps, [step]))
     not_made_up = np.minimum(padded[:-2], padded[2:]) + steps > (LOST_STEPS + 1) * step
     lost = (steps > LOST_STEPS * step) & not_made_up & ~gap

@@ -342,7 +342,7 @@ NODE_KEYS = frozenset({
     'hidden_effects', 'hidden_scale', 'autostart', 'effort_limits', 'feedforward_scale',
     'limit_policy', 'missing_derivatives', 'timeout_action', 'warning_margin', 'lag_warning',
     'action', 'controller_timeout', 'demo', 'max_ahead', 'max_duration', 'ramp_time',
-    'stop_time', 'feedforward',
+    'stop_time', 'feedforward', 'tf_prefix',
     'use_sim_time', 'start_type_description_service'})
 NODE_PREFIXES = ('qos_overrides.',)
 

@@ -121,18 +121,21 @@ def joint_positions(stamp: int, names: Sequence[str], position: Array) -> JointS
     return message
 
 
-def transforms(stamp: int, base: str, links: Sequence[str], poses: Array) -> list[TransformStamped]:
+def transforms(stamp: int, base: str, links: Sequence[str], poses: Array, prefix: str = '',
+               ) -> list[TransformStamped]:
     """Return where links are on a base at a time [ns], for tf.
 
     Parameters
     ----------
     poses : (F, 7) array
         Place [m] and quaternion, x y z w.
+    prefix : str
+        Of all frames.
     """
     found = []
     for link, (x, y, z, *turn) in zip(links, poses.tolist(), strict=True):
-        one = TransformStamped(child_frame_id=link)
-        one.header.stamp, one.header.frame_id = time(stamp), base
+        one = TransformStamped(child_frame_id=prefix + link)
+        one.header.stamp, one.header.frame_id = time(stamp), prefix + base
         one.transform.translation = Vector3(x=x, y=y, z=z)
         one.transform.rotation = Quaternion(**dict(zip('xyzw', turn, strict=True)))
         found.append(one)

@@ -74,7 +74,7 @@ class ModelServices:
         # The one that drives a machine is set last: it is not touched where this one refuses.
         clients = {name: AsyncParameterClient(node, name)
                    for name in (node.get_fully_qualified_name(), other)}
-        self._steps = ModelSteps(clients, model()[1])
+        self._steps = ModelSteps(clients)
         # In a group of their own: while they wait, this node's parameters are set.
         group = ReentrantCallbackGroup()
         for name, work in (('~/adopt_confirmed', self._adopt), ('~/restore', self._restore)):
@@ -139,7 +139,7 @@ class ModelServices:
         values = self._adoptable()
         if self._other in names and (different := self._different()):
             raise NotAdoptedError(different)
-        return steps.set_model(values, names)
+        return steps.set_model(values, self._model()[1], names)
 
     def _restore(self, steps: ModelSteps, names: Sequence[str]) -> NodeAnswer:
         return steps.restore(names)

@@ -15,27 +15,23 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
+from pprs_dynamics.inference.readings.findings import OtherReading
+from pprs_dynamics.inference.readings.table import (
+    ANGLES,
+    BOTH_SIGNS,
+    CHANGES,
+    CLEARLY,
+    GOOD_FIT,
+    LEAST_PART,
+    LENGTHS,
+    NEARLY,
+    SHARP,
+    WEAK,
+    named,
+)
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of, forces_on
-from pprs_dynamics.inference.residuals.mistakes import POSITION_UNIT, OtherReading
-from pprs_dynamics.inference.residuals.readings import ANGLES, LENGTHS, named
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
-
-# What efforts may be in one part of a recording, as multiples of what they are in the other.
-FACTORS = {1e-3: 'in k{}', 1e3: 'in m{}', -1.0: 'negated'}
-# A change is believed where it fits this many times better than none, and leaves no more than
-# this: 0 is a perfect fit, 1 one without any likeness. A real drive's effort is 0.002 to 0.1.
-CLEARLY_BETTER, GOOD_FIT = 3.0, 0.25
-# Each part is this share of the recording at least: a spike is no change of a unit.
-LEAST_PART = 0.1
-# Share of the model's efforts, by their squares, that is of the other sign; of less nothing is
-# told by a sign.
-BOTH_SIGNS = 0.05
-# Drives that are this much weaker than the strongest tell nothing.
-WEAK = 0.01
-SHARP = 0.2  # [s]; a change that is known better is told as one moment
-# By how much positions on both sides of a change may be off, relatively: they move meanwhile.
-NEARLY = 0.02
 
 
 def find_changed_efforts(model: ForceModel, recording: Recording) -> Iterator[OtherReading]:
@@ -75,7 +71,7 @@ def _unsigned(recording: Recording, excerpt: Excerpt, forces: Array) -> tuple[in
         below = np.sum(np.minimum(force, 0.0) ** 2) / np.sum(force ** 2)
         known = recording.effort[:, d][np.isfinite(recording.effort[:, d])]
         if (BOTH_SIGNS < below < 1 - BOTH_SIGNS and np.all(known >= 0) and np.any(known)
-                and CLEARLY_BETTER * _unlike(effort, np.abs(force)) < _unlike(effort, force)):
+                and CLEARLY * _unlike(effort, np.abs(force)) < _unlike(effort, force)):
             found.append(d)
     return tuple(found)
 
@@ -96,7 +92,7 @@ def _changed_efforts(units: tuple[DriveUnits, ...], recording: Recording, excerp
             f'a time between {first:.4g} and {last:.4g} s')
         span = f'from {edge} on' if is_after else f'until {edge}'
         everyone = tuple(range(len(drives))) if group == tuple(told) else group
-        how = FACTORS[factor].format(units[group[0]].effort)
+        how = CHANGES[factor].format(units[group[0]].effort)
         yield OtherReading.of(
             'effort_unit' if factor > 0 else 'effort_sign', drives, everyone,
             f'the effort of {named(drives, everyone)} looks {how} {span}, unlike in the rest; the '
@@ -122,7 +118,7 @@ def _change(effort: Array, forces: Array) -> tuple[float, int, bool] | None:
     margin = max(1, int(LEAST_PART * len(e)))
     splits = np.arange(margin, len(e) - margin + 1)
     best = None
-    for factor in FACTORS:
+    for factor in CHANGES:
         other = sums(factor)
         whole = other[0][-1] / other[1][-1]
         for is_after, (one, two) in ((True, (plain, other)), (False, (other, plain))):
@@ -133,7 +129,7 @@ def _change(effort: Array, forces: Array) -> tuple[float, int, bool] | None:
             part = [two[k][-1] - two[k][splits] if is_after else one[k][splits] for k in (0, 1)]
             unlike = np.where(part[0] < GOOD_FIT * part[1], left / size, np.inf)
             at = int(np.argmin(unlike))
-            if CLEARLY_BETTER * unlike[at] < min(least, whole) and unlike[at] < GOOD_FIT and (
+            if CLEARLY * unlike[at] < min(least, whole) and unlike[at] < GOOD_FIT and (
                     best is None or unlike[at] < best[0]):
                 best = float(unlike[at]), factor, int(splits[at]), is_after
     return None if best is None else best[1:]
@@ -159,7 +155,7 @@ def find_changed_positions(recording: Recording) -> Iterator[OtherReading]:
                 part = 'until' if factor in units else 'from'
                 when = recording.time[k] if factor in units else recording.time[k + 1]
                 yield OtherReading.of(
-                    POSITION_UNIT, recording.drives, range(len(recording.drives)),
+                    'position_unit', recording.drives, range(len(recording.drives)),
                     f'the positions look like {unit} {part} {when:.4g} s'
                     f'{" on" if part == "from" else ""}, unlike in the rest; the parts must be '
                     'recordings of their own')

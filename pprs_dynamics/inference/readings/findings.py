@@ -12,10 +12,6 @@ from typing import Any, Self
 from pprs_dynamics.measurement.files.samples import Defect
 
 Scales = tuple[tuple[str, str, float], ...]
-POSITION_UNIT = 'position_unit'  # kind of mistake
-# Kinds of efforts that are no measurement of what the drive applies.
-COMMAND, POSITION_ERROR = 'command', 'position_error'
-WITHOUT_GRAVITY, NOISE_FREE = 'without_gravity', 'noise_free'
 
 
 @dataclass(frozen=True)

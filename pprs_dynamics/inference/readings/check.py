@@ -1,0 +1,452 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Whether a recording has the units, signs and order of drives that a model file says.
+
+The recording is read in every way of `table.py`, and what is more likely than the plain reading
+is reported with the line that says so. Nothing is ever changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array, root_mean_square
+from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.errors import MisreadError
+from pprs_dynamics.inference.readings.changes import find_changed_efforts, find_changed_positions
+from pprs_dynamics.inference.readings.evidence import (
+    Parts,
+    likelihood,
+    parts_of,
+    read_motion,
+    shares,
+)
+from pprs_dynamics.inference.readings.findings import (
+    Mistake,
+    OtherReading,
+    Scales,
+    columns_line,
+)
+from pprs_dynamics.inference.readings.measured_effort import (
+    effort_contents,
+    find_no_measurements,
+)
+from pprs_dynamics.inference.readings.scales import find_scales, sign_bit
+from pprs_dynamics.inference.readings.table import (
+    ALIKE,
+    ANGLES,
+    BEYOND,
+    CERTAIN,
+    CLOSE_FIT,
+    COST,
+    EFFORTS,
+    FAR,
+    FAR_OUTSIDE,
+    GOOD_FIT,
+    LENGTHS,
+    NEAR_ONE,
+    OUTSIDE,
+    QUARTERS,
+    RATE_OFF,
+    STROKE_SLACK,
+    SURE,
+    TIMES,
+    WEAK,
+    Reading,
+    named,
+    plain,
+    quarter_turn,
+    readings,
+)
+from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
+from pprs_dynamics.measurement.files.defects import SLOW_STEP
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.files.samples import Defect
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+SCALES = (1.0, -1.0, *EFFORTS, *(-unit for unit in EFFORTS))
+# Of one drive among others; other units are those of all drives.
+OF_ONE = (1.0, -1.0, 1e3, 1e-3, -1e3, -1e-3)
+SHORTEST_STEP = 1e-5  # [s]; no robot is sampled at more than 100 kHz
+STRETCHES = 8  # of an excerpt, evenly over the recording
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A reading with its score, the scale of each drive's efforts and the mean residual."""
+
+    reading: Reading
+    time_unit: float
+    score: float
+    scales: Array
+    left: float
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is the reading by names and units."""
+        return not self.reading.kind and self.time_unit == 1 and bool(np.all(self.scales == 1))
+
+
+def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False) -> Recording:
+    """Return a recording with its mistakes among its findings.
+
+    Raises
+    ------
+    MisreadError
+        With `refuse`, where its units, signs or order look otherwise than it says.
+    """
+    mistakes = find_mistakes(model, recording)
+    others = [mistake for mistake in mistakes if isinstance(mistake, OtherReading)]
+    if refuse and others:
+        raise MisreadError(recording.name, [other.what for other in others], [
+            columns_line(others, model.recorded.columns is not None),
+            *(other.line for other in others)])
+    return replace(recording, findings=(*mistakes, *recording.findings))
+
+
+def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]:
+    """Return where a recording is read better otherwise than its names and units say.
+
+    Parameters
+    ----------
+    model : ForceModel
+    recording : Recording
+        Of the model's drives.
+    """
+    for early in (find_changed_positions, sign_bit):
+        if found := tuple(early(recording)):
+            return found  # no reading of the whole is right
+    excerpts = {unit: excerpt for unit in (1.0, *_time_units(recording))
+                if (excerpt := excerpt_of(recording, unit, STRETCHES)) is not None}
+    search = Search(model, excerpts)
+    best = search.best()
+    contents = effort_contents(model, recording, excerpts.get(1.0))
+    mistakes: list[Defect] = [] if best is None else list(_of_fit(model, best))
+    if best is not None and (rival := search.rival(best)) is not None:
+        lines = [columns_line([*_of_fit(model, fit)], model.recorded.columns is not None)
+                 for fit in (best, rival)]
+        mistakes = [OtherReading.of(
+            'ambiguous', model.drives, range(len(model.drives)), f'{best.reading.what}, or '
+            f'{rival.reading.what}', ' or '.join(lines))]
+    kinds = {mistake.kind for mistake in mistakes}
+    if not mistakes:
+        mistakes += find_scales(model, contents)
+    # What explains the efforts well is in the right unit, whatever limits say.
+    if not kinds & {'position_unit', 'drive_order', 'ambiguous'} and search.plain_left > GOOD_FIT:
+        mistakes += _of_strokes(model, recording)
+    if not kinds & {'position_unit', 'position_sign', 'reversed_time'}:
+        unit = 1.0 if best is None else best.time_unit
+        mistakes += _of_velocities(model, recording, excerpts.get(unit))
+    if not any(isinstance(mistake, OtherReading) for mistake in mistakes):
+        mistakes += find_changed_efforts(model, recording)
+    if not any(isinstance(mistake, OtherReading) for mistake in mistakes):
+        mistakes += find_no_measurements(model, contents)
+    return tuple(mistakes)
+
+
+class Search:
+    """The search for a reading that is more likely than the plain one.
+
+    Parameters
+    ----------
+    model : ForceModel
+    excerpts : dict of float to Excerpt
+        Of the recording, by the unit of its times [s].
+    """
+
+    def __init__(self, model: ForceModel, excerpts: dict[float, Excerpt]) -> None:
+        self.model, self.excerpts = model, excerpts
+        self.plain_left = 1.0  # residual of the plain reading
+        self.fits: list[Fit] = []
+        self._parts: dict[tuple[float, bytes, bytes, bool], Parts | None] = {}
+
+    def best(self) -> Fit | None:
+        """Return the best reading where it is more likely than the plain one."""
+        drives = self.model.drives
+        first = plain(len(drives))
+        # What the mechanism cannot follow is as unlikely as an effort of which nothing is right.
+        start = self.fit(first, 1.0, in_pieces=True) or Fit(
+            first, 1.0, 0.0, np.ones(len(drives)), 1.0)
+        self.plain_left = start.left
+        if 1.0 in self.excerpts and start.left < CLOSE_FIT and start.is_plain and not (
+                self._outside(first, self.excerpts[1.0])):
+            return None
+        best: tuple[Fit | None, float] = (None, start.score)
+        if not start.is_plain:
+            best = start, start.score
+        for reading in (first, *readings(drives, self.model.units)):
+            if reading.kind == 'drive_order' and best[0] is not None and best[0].left < CLOSE_FIT:
+                break
+            for unit in self.excerpts:
+                fit = None if reading is first and unit == 1 else self.fit(reading, unit)
+                if fit is not None:
+                    self.fits.append(fit)
+                    best = self._better(best, fit)
+        # Zeros that are quarter turns off, one drive after another.
+        seeds = [start, *([best[0]] if best[0] else [])]
+        for seed in seeds:
+            best = self._turned(seed, best)
+        found = best[0]
+        return None if found is None or found.left > GOOD_FIT or not self._is_certain(
+            found) else found
+
+    def rival(self, best: Fit) -> Fit | None:
+        """Return another reading of positions that is nearly as likely as the best one."""
+        others = [fit for fit in self.fits if best.score - fit.score < SURE and not fit.is_plain
+                  and fit.reading.kind == best.reading.kind == 'position_unit'
+                  and not np.allclose(fit.reading.position, best.reading.position)]
+        return max(others, key=lambda fit: fit.score, default=None)
+
+    def _turned(self, seed: Fit, best: tuple[Fit | None, float]) -> tuple[Fit | None, float]:
+        if seed.left < CLOSE_FIT or seed.reading.kind not in ('', 'position_unit'):
+            return best
+        for _ in self.model.drives:
+            fits = [fit for d, units in enumerate(self.model.units) if units.turns
+                    for turn in QUARTERS
+                    if (fit := self.fit(quarter_turn(self.model.drives, d, turn, seed.reading),
+                                        seed.time_unit)) is not None]
+            next_one = max(fits, key=lambda fit: fit.score, default=None)
+            if next_one is None or next_one.score <= seed.score:
+                break
+            seed = next_one
+            best = self._better(best, seed)
+        return best
+
+    @staticmethod
+    def _better(best: tuple[Fit | None, float], fit: Fit) -> tuple[Fit | None, float]:
+        # Of readings that fit alike the first, which is the simplest, counts.
+        return (fit, fit.score) if fit.score > best[1] + 0.5 and not fit.is_plain else best
+
+    def fit(self, reading: Reading, unit: float, in_pieces: bool = False) -> Fit | None:
+        """Return a reading with its best scales of efforts; None where it cannot be."""
+        excerpt = self.excerpts.get(unit)
+        if excerpt is None or (reading.kind and not self._possible(reading, excerpt)):
+            return None
+        offset = np.asarray(reading.offset, float)
+        key = unit, reading.position.tobytes(), offset.tobytes(), reading.backwards
+        if key not in self._parts:
+            self._parts[key] = parts_of(self.model, excerpt, reading, in_pieces)
+        parts = self._parts[key]
+        if parts is None:
+            return None
+        effort, weights = reading.effort_of(excerpt.effort), self._weights(excerpt, parts)
+        weights = np.abs(reading.effort) @ weights
+        found = {(d, scale): one for d in np.flatnonzero(weights > 0).tolist() for scale in SCALES
+                 if (one := likelihood(effort[:, d], parts, d, scale)) is not None}
+        measured = sorted({d for d, _ in found})
+        if not measured:
+            return None
+        cost = (reading.cost + (COST['time_unit'] if unit != 1 else 0.0)
+                + self._outside(reading, excerpt))
+
+        def fit_of(scales: Array) -> Fit:
+            ones = [found[d, scales[d]] for d in measured]
+            weight = weights[measured]
+            return Fit(reading, unit, float(
+                sum(w * one.score for w, one in zip(weight, ones, strict=True)))
+                - cost - self._cost(scales, measured), scales,
+                float(np.exp(np.average(np.log([one.left for one in ones]), weights=weight))))
+
+        alone = np.ones(effort.shape[1])
+        for d in measured:
+            alone[d] = max(OF_ONE, key=lambda scale: found[d, scale].score
+                           - _mistakes(scale) / weights[d])
+        choices = [alone]
+        # Inertia alone may be invented: units that are no prefixes need a weight.
+        for scale in SCALES if np.nanmax(np.abs(parts.gravity)) > 0 else OF_ONE:
+            common = np.ones(effort.shape[1])
+            common[np.isfinite(effort).any(axis=0)] = scale
+            choices.append(common)
+        return max((fit_of(scales) for scales in choices), key=lambda one: one.score)
+
+    def _cost(self, scales: Array, measured: list[int]) -> float:
+        """Return the prior cost of scales: kinds of drives may share a mistake."""
+        told = scales[measured]
+        if np.all(told == told[0]):
+            return _mistakes(float(told[0]))
+        kinds = [scales[:3], scales[3:]] if self.model.drives == DRIVES else [scales]
+        return sum(_mistakes(float(kind[0])) if np.all(kind == kind[0])
+                   else sum(map(_mistakes, kind.tolist())) for kind in kinds)
+
+    def _weights(self, excerpt: Excerpt, parts: Parts) -> Array:
+        """Return what each drive counts, (D,): the strongest 1, one at rest among others 0."""
+        effort = np.sqrt(np.nanmean(np.nan_to_num(excerpt.effort) ** 2, axis=0))
+        speed = np.sqrt(np.mean(parts.velocity ** 2, axis=0))
+        moves = speed > self.model.reversal.velocity
+        force = np.sqrt(np.nanmean((parts.inertia + parts.gravity + parts.others) ** 2, axis=0))
+        sizes = np.maximum(effort / max(effort.max(), 1e-300), force / max(force.max(), 1e-300))
+        found = np.where((sizes > WEAK) & (effort > 0), np.sqrt(sizes), 0.0)
+        weights: Array = found * (moves if np.any(moves & (found > 0)) else 1.0)
+        return weights
+
+    def _is_certain(self, fit: Fit) -> bool:
+        """Whether friction says the same as weight of efforts that are negated.
+
+        Weight and inertia of a wrong model may be negative, friction may not.
+        """
+        if not np.any(fit.scales < 0):
+            return True
+        excerpt = self.excerpts[fit.time_unit]
+        parts = parts_of(self.model, excerpt, fit.reading, in_pieces=False)
+        if parts is None:
+            return False
+        effort, votes = fit.reading.effort_of(excerpt.effort), 0.0
+        width = np.broadcast_to(self.model.reversal.velocity, fit.scales.shape)
+        weights = self._weights(excerpt, parts)
+        for d in np.flatnonzero(fit.scales < 0).tolist():
+            known = np.isfinite(effort[:, d])
+            if np.ptp(effort[known, d]) > 0 and root_mean_square(parts.velocity[:, d]) > width[d]:
+                some = shares(effort[known, d], parts.rows(known), d)
+                if abs(some.friction) > CERTAIN * some.friction_by_chance:
+                    votes += float(weights[d] * np.sign(some.friction))
+        return votes <= 0
+
+    def _possible(self, reading: Reading, excerpt: Excerpt) -> bool:
+        """Return whether a reading brings positions into the strokes."""
+        lower, upper = self.model.strokes
+        with np.errstate(invalid='ignore'):
+            slack = STROKE_SLACK * (upper - lower)
+        position = excerpt.motion.position @ reading.position.T + reading.offset
+        slack = np.where(np.isfinite(slack), slack, 0.0)
+        return not np.any((position < lower - slack) | (position > upper + slack))
+
+    def _outside(self, reading: Reading, excerpt: Excerpt) -> float:
+        """Return the cost of positions and speeds that are beyond their limits."""
+        lower, upper = self.model.strokes
+        motion = read_motion(excerpt.motion, reading)
+        reach = np.abs(motion.position).max(axis=0) / np.maximum(np.abs(lower), np.abs(upper))
+        speed = np.abs(motion.velocity).max(axis=0) / self.model.speed_limits
+        most = float(np.max(np.maximum(reach, speed)))
+        return FAR_OUTSIDE if most > FAR else OUTSIDE if most > BEYOND else 0.0
+
+
+def _mistakes(scale: float) -> float:
+    return (COST['effort_sign'] if scale < 0 else 0.0) + (
+        COST['effort_unit'] if abs(scale) != 1 else 0.0)
+
+
+def _time_units(recording: Recording) -> list[float]:
+    """Return units of time in which the steps would be those of a robot's recording [s]."""
+    steps = np.concatenate([np.diff(recording.time[part]) for part in recording.segments]
+                           or [np.zeros(0)])
+    step = float(np.median(steps)) if len(steps) else 0.0
+    return [unit for unit in TIMES
+            if step > SLOW_STEP and SHORTEST_STEP <= step * unit <= SLOW_STEP]
+
+
+# --------------------------------------------------------------------------------- sentences
+
+
+def _of_fit(model: ForceModel, fit: Fit) -> Iterator[OtherReading]:
+    """Yield the mistakes of times, of positions and order, and of efforts."""
+    drives, units = model.drives, model.units
+    if fit.time_unit != 1.0:
+        yield OtherReading('time_unit', 1, f'the times look like {TIMES[fit.time_unit]}: as '
+                           f'seconds they make the motion {1 / fit.time_unit:.0f} times too slow '
+                           'for its efforts', scales=(('', 'time_scale', fit.time_unit),))
+    if fit.reading.kind:
+        yield OtherReading.of(fit.reading.kind, drives, fit.reading.drives, fit.reading.what,
+                              scales=position_scales(model, fit.reading))
+    for scale in dict.fromkeys(fit.scales.tolist()):
+        group = tuple(np.flatnonzero(fit.scales == scale).tolist())
+        if scale == 1.0:
+            continue
+        unit = ' or '.join(dict.fromkeys(EFFORTS[abs(scale)].format(units[k].effort)
+                                         for k in group)) if abs(scale) != 1 else None
+        times = 'minus' if scale == -1.0 else f'{scale:.4g} times'
+        guess = '' if unit is None else f', as if it were in {unit}'
+        is_either = scale < 0 and len(group) == len(drives)
+        other = f' (or {"its position is" if len(drives) == 1 else "positions are"} negated)'
+        yield OtherReading.of('effort_sign' if unit is None else 'effort_unit', drives, group,
+                              f'the effort of {named(drives, group)} looks like {times} what '
+                              f'the model says{guess}{other if is_either else ""}',
+                              scales=effort_scales(model, group, np.full(len(drives), 1 / scale)))
+
+
+def position_scales(model: ForceModel, reading: Reading) -> Scales:
+    """Return the factors and offsets below `columns` with which positions are read so."""
+    found = []
+    offset = np.zeros(len(model.drives)) + reading.offset
+    for k, drive in enumerate(model.drives):
+        columns = model.recorded.columns
+        before = None if columns is None else columns.drives[drive]
+        scale, start = (1.0, 0.0) if before is None else (
+            before.position_scale, before.position_offset)
+        factor = float(reading.position[k, k])
+        if k in reading.drives and factor not in (0.0, 1.0):
+            found.append((drive, 'position_scale', factor * scale))
+        if k in reading.drives and (total := factor * start + float(offset[k])) != start:
+            found.append((drive, 'position_offset', total))
+    return () if reading.kind == 'drive_order' else tuple(found)
+
+
+def effort_scales(model: ForceModel, group: tuple[int, ...], factors: Array) -> Scales:
+    """Return the factors below `columns` with which efforts are read so."""
+    before = model.recorded.columns
+    return tuple((drive, 'effort_scale', float(factors[k]) * (
+        1.0 if before is None else before.drives[drive].effort_scale))
+        for k, drive in enumerate(model.drives) if k in group)
+
+
+def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Defect]:
+    """Yield positions far beyond the strokes, which no effort is needed to recognise."""
+    lower, upper = model.strokes
+    drives, ends = recording.drives, np.maximum(-lower, upper)
+    reach = np.abs(recording.position).max(axis=0)
+    for turns, names in ((False, LENGTHS), (True, ANGLES)):
+        alike = [k for k, units in enumerate(model.units) if units.turns == turns]
+        far = tuple(k for k in alike if reach[k] > FAR * ends[k])
+        if not far:
+            continue
+        # Encoders of a robot's turning joints count alike; its rails may not.
+        group = tuple(alike) if turns else far
+        unit = next((unit for unit in names if unit < 1 and np.all(
+            reach[list(group)] * unit <= ends[list(group)])), 1.0)
+        farthest = max(far, key=lambda k: reach[k] / ends[k])
+        scale = Reading('position_unit', '', group, np.diag(
+            [unit if k in group else 1.0 for k in range(len(drives))]), np.eye(len(drives)), 0.0)
+        yield OtherReading.of(
+            'position_unit', drives, group, f'the positions of {named(drives, group)} reach '
+            f'{reach[farthest]:.4g} {model.units[farthest].position}, far out of the stroke'
+            + (f', as if they were in {names[unit]}' if unit != 1.0 else ''),
+            scales=() if unit == 1.0 else position_scales(model, scale))
+
+
+def _of_velocities(model: ForceModel, recording: Recording, excerpt: Excerpt | None,
+                   ) -> Iterator[Defect]:
+    """Yield recorded velocities that are not the derivatives of positions."""
+    if excerpt is None or excerpt.velocity is None:
+        return
+    factors = {}
+    for drive in range(len(recording.drives)):
+        known = np.isfinite(excerpt.velocity[:, drive])
+        recorded, true = (values[known, drive] for values in (
+            excerpt.velocity, excerpt.motion.velocity))
+        size = float(true @ true) * float(recorded @ recorded)
+        if size > 0 and abs(float(recorded @ true)) >= ALIKE * np.sqrt(size):
+            factors[drive] = float(recorded @ true) / float(true @ true)
+    columns = model.recorded.columns
+    rate = None if columns is None else columns.rate
+    middle = float(np.median([*factors.values()])) if factors else 1.0
+    if rate is not None and middle > 0 and abs(np.log(middle)) > RATE_OFF and np.all(
+            np.abs(np.array([*factors.values()]) / middle - 1) < RATE_OFF):
+        true_rate = float(f'{rate * middle:.4g}')
+        yield OtherReading('rate', len(recording.time), f'the recorded velocities are '
+                           f'{middle:.4g} times the derivatives of the positions at {rate:g} '
+                           f'samples per second, as if there were {true_rate:g}',
+                           scales=(('', 'rate', true_rate),))
+        return
+    groups: dict[float, list[int]] = {}
+    for drive, factor in factors.items():
+        for wrong in (-1.0, 1e-3, -1e-3, 1e3, -1e3, *(1 / unit for unit in ANGLES)):
+            if abs(factor / wrong - 1) <= NEAR_ONE:
+                groups.setdefault(wrong, []).append(drive)
+    for factor, group in groups.items():
+        times = 'minus' if factor == -1.0 else f'{factor:.4g} times'
+        yield Mistake.of('velocity', recording.drives, group, 'the recorded velocity of '
+                         f'{named(recording.drives, tuple(group))} is {times} the derivative of '
+                         'the position')

@@ -1,0 +1,593 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which columns are time, positions, velocities and efforts of joints, by names and numbers."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array, root_mean_square
+from pprs_dynamics.drives import Column
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.readings.table import (
+    ALIKE,
+    CHANNEL_WORDS,
+    CLEAR,
+    COMMANDS,
+    COPY,
+    CURRENT,
+    EFFORT,
+    LEAST_ROWS,
+    LENGTHS_OF_STEPS,
+    LETTERS,
+    MEASURED,
+    OTHERS,
+    PLURALS,
+    POSITION,
+    RATE_OFF,
+    SAME_UNIT,
+    SHORTEST,
+    SINCE_BOOT,
+    SLOWEST,
+    TIME_WORDS,
+    UNIT_WORDS,
+    UNLIKE,
+    VELOCITY,
+    VELOCITY_FACTORS,
+    WORDS,
+)
+from pprs_dynamics.measurement.files.contents import Series
+from pprs_dynamics.measurement.files.table_files import LATEST_SECOND, TIME_COLUMNS, TIME_LIKE
+
+
+class GuessError(PprsError, ValueError):
+    """Columns whose quantity cannot be decided."""
+
+
+class AmbiguousColumns(GuessError):
+    """Columns that can be read in two ways.
+
+    Parameters
+    ----------
+    joints : sequence of str
+    readings : sequence of mapping of str to list of int
+        Places of columns by quantity.
+    series : sequence of Series
+    """
+
+    def __init__(self, joints: Sequence[str], readings: Sequence[Mapping[str, Sequence[int]]],
+                 series: Sequence[Series]) -> None:
+        self.lines = tuple(', '.join(
+            f'{joint}: {{' + ', '.join(f'{kind}: {series[places[k]].column}'
+                                       for kind, places in reading.items()) + '}'
+            for k, joint in enumerate(joints)) for reading in readings)
+        super().__init__('two readings of the columns are as likely, write one of them: '
+                         + ' or '.join(f'columns: {{{line}}}' for line in self.lines))
+
+
+class RateError(GuessError):
+    """A sampling rate that velocities contradict."""
+
+    def __init__(self, given: float, found: float) -> None:
+        self.lines = (f'rate: {found:g}', f'rate: {given:g}')
+        super().__init__(f'--rate {given:g}: the recorded velocities are the derivatives of the '
+                         f'positions at {found:g} samples per second: give --rate {found:g}, or '
+                         f'write rate: {given:g} and the velocity_scale of each joint')
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Which columns are what.
+
+    Parameters
+    ----------
+    time : str, int or None
+    columns : dict of (joint, quantity) to str or int
+    scales : dict of (joint, quantity) to float
+        Where they are not 1.
+    time_scale : float or None
+    notes : list of str
+        What was decided and why, for comments.
+    rate : float, optional
+        Samples per second of a table without times [Hz].
+    """
+
+    time: Column | None
+    columns: dict[tuple[str, str], Column]
+    scales: dict[tuple[str, str], float] = field(default_factory=dict)
+    time_scale: float | None = None
+    notes: list[str] = field(default_factory=list)
+    rate: float | None = None
+
+
+def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str | None = None,
+                  others: Collection[str] = (), rate: float | None = None) -> Guess:
+    """Return which columns are what.
+
+    Parameters
+    ----------
+    series : sequence of Series
+        All columns with numbers, in the order of the file.
+    joints : sequence of D str
+        From the base to the tool.
+    quantity : str, optional
+        What all columns are of, where the file's name says so.
+    others : collection of str
+        Further joints of the robot: columns with their names are no columns of these.
+    rate : float, optional
+        Samples per second, as given [Hz].
+
+    Raises
+    ------
+    GuessError
+        Where positions of the joints cannot be found, or two readings are as likely.
+    """
+    time, time_scale, notes = _time(series, rate is not None)
+    left = [one for one in series if time is None or one.column != time.column]
+    # pandas numbers rows in a column without a title.
+    titled = [one for one in left if one.title]
+    if titled:
+        columns, found = _by_names(titled, joints, quantity, others)
+    else:
+        count = max((len(each.values) for each in left), default=0)
+        stamps = np.arange(count) / (rate or 1.0) if time is None else time.values
+        columns, found = _by_numbers(left, joints, stamps, quantity, notes), []
+    notes += found
+    main = quantity or POSITION
+    known = [joint for joint in joints if (joint, main) in columns]
+    if not known:
+        raise GuessError(
+            f'no columns of {main}s are told by their names: {_listed(left)}; write them '
+            f'into columns, e.g. {{{joints[0]}: {{{main}: {_first(left)}}}}}')
+    by_column = {one.column: one for one in series}
+    scales = {key: scale for key, column in columns.items()
+              if (scale := _scale(by_column[column].title, key[1])) is not None}
+    guess = Guess(None if time is None else time.column, columns, scales, time_scale, notes, rate)
+    return guess if quantity else _judge_velocities(guess, by_column, time, rate)
+
+
+def words_of(title: str) -> list[str]:
+    """Return the words and numbers that a name is made of, in lower case."""
+    parts = re.sub(r'([a-z])([A-Z])', r'\1 \2', title)
+    return [each for word in re.findall(r'[a-z]+|\d+', parts.lower()) for each in _split(word)]
+
+
+def _split(word: str) -> list[str]:
+    """Return a word, and apart from it a last letter that says actual or desired: posa, qd_d."""
+    known = {each for words in WORDS.values() for each in words}
+    if word[:-1] in known and len(word) > 3 and word not in known and word[-1] in LETTERS:
+        return [word[:-1], LETTERS[word[-1]]]
+    return [word]
+
+
+def _listed(series: Sequence[Series]) -> str:
+    return ', '.join(one.title or str(one.column) for one in series[:12]) or 'none'
+
+
+def _first(series: Sequence[Series]) -> str:
+    return str(series[0].column) if series else 'q1'
+
+
+# ------------------------------------------------------------------------------------- time
+
+
+def _time(series: Sequence[Series], has_rate: bool,
+          ) -> tuple[Series | None, float | None, list[str]]:
+    """Return the column of times, its unit [s] where it is not seconds, and comments."""
+    rising = [each for each in series if _rises(each.values)]
+    named = [each for each in rising if each.title in TIME_COLUMNS] or [
+        each for each in rising if {*words_of(each.title)} & {'time', 'zeit', *TIME_LIKE}]
+    found = next(iter(named), None)
+    notes: list[str] = []
+    if found is None:
+        # Positions may rise as well: with a rate no column is needed.
+        even = [] if has_rate else [each for each in rising if not each.title
+                                    and _is_even(each.values)]
+        if not even:
+            return None, None, notes
+        found = even[0]
+        notes.append(f'column {found.column} rises all the time: taken as time')
+    scale = next((TIME_WORDS[word] for word in words_of(found.title) if word in TIME_WORDS), None)
+    known = found.values[np.isfinite(found.values)]
+    if known[0] > LATEST_SECOND:  # since 1970, in a unit that the size of the stamps tells
+        parts = 1.0
+        while known[0] * parts > LATEST_SECOND:
+            parts /= 1e3
+        step = float(np.median(np.diff(known)))
+        if scale is None and step * parts < SHORTEST:  # since boot
+            scale = next(unit for unit in SINCE_BOOT if step * unit <= SLOWEST)
+            notes.append(f'times rise by {step:g}: taken as units of {scale:g} s since boot')
+        parts = scale or parts
+        return replace(found, values=found.values * parts), scale, notes
+    step = float(np.median(np.diff(known)))
+    if scale is None and step > SLOWEST:
+        scale = next(unit for unit in SINCE_BOOT if step * unit <= SLOWEST)
+        notes.append(f'times rise by {step:g}: taken as units of {scale:g} s')
+    return replace(found, values=found.values * (scale or 1.0)), scale, notes
+
+
+def _rises(values: Array) -> bool:
+    steps = np.diff(values[np.isfinite(values)])
+    # Episodes of a dataset begin again.
+    return bool(len(steps) > 2 and np.median(steps) > 0 and np.mean(steps > 0) > 0.95)
+
+
+def _is_even(values: Array) -> bool:
+    steps = np.diff(values[np.isfinite(values)])
+    return bool(np.mean(np.abs(steps - np.median(steps)) < 4 * np.median(steps)) > 0.9)
+
+
+# ------------------------------------------------------------------------------------ names
+
+
+def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | None,
+              others: Collection[str]) -> tuple[dict[tuple[str, str], Column], list[str]]:
+    groups: dict[tuple[str, ...], dict[str, Column]] = {}
+    unnamed = []
+    for one in series:
+        words = words_of(one.title)
+        place = _joint_in(words, list(dict.fromkeys((*joints, *others))))
+        if place is None:
+            unnamed.append(one)
+        elif place[0] in joints:
+            joint, at, length = place
+            key = (*words[:at], '*', *words[at + length:])
+            groups.setdefault(key, {}).setdefault(joint, one.column)
+    notes = []
+    for key, numbers in _numbered(unnamed).items():
+        if key not in groups and (len(numbers) >= len(joints) or len(joints) == 1):
+            chosen = [numbers[number] for number in sorted(numbers)][:len(joints)]
+            groups[key] = dict(zip(joints, chosen, strict=False))
+            if len(joints) > 1 and len(numbers) > len(joints):
+                notes.append(f'{" ".join(key)}: {len(numbers)} columns, of which the first '
+                             f'{len(joints)} are taken as the joints from base to tool')
+    if len(joints) == 1:
+        for one in series:
+            groups.setdefault(tuple(words_of(one.title)), {}).setdefault(joints[0], one.column)
+    columns: dict[tuple[str, str], Column] = {}
+    wanted = (quantity,) if quantity else (POSITION, VELOCITY, EFFORT, CURRENT)
+    for each in wanted:
+        best = max(groups, key=lambda key: _fit(key, groups[key], each, quantity), default=None)
+        if best is None or _fit(best, groups[best], each, quantity)[0] <= 0:
+            continue
+        if each == CURRENT and any(kind == EFFORT for _, kind in columns):
+            continue
+        if {*best} & COMMANDS:
+            notes.append(f'{each}: only commands are there ({" ".join(best)})')
+        columns.update({(joint, each): column for joint, column in groups[best].items()})
+    for channel, telling in CHANNEL_WORDS.items() if quantity is None else ():
+        told = [key for key in groups if {*key} & telling and not {*key} & COMMANDS]
+        if told:
+            columns.update({(joint, channel): column for joint, column in groups[max(
+                told, key=lambda key: len(groups[key]))].items()})
+    return columns, notes
+
+
+def _fit(key: tuple[str, ...], members: dict[str, Column], quantity: str, given: str | None,
+         ) -> tuple[float, ...]:
+    """Return how well a group of columns fits a quantity; not at all below 0."""
+    told = {kind for kind, words in WORDS.items() if {*key} & {*words}}
+    if {*key} & {'joint', 'joints', 'state'} and len(told) > 1:
+        told.discard(POSITION)  # "joint torque" is no position
+    if {*key} & {*WORDS[POSITION][:7]}:
+        told.add(POSITION)
+    if CURRENT in told and EFFORT in told:
+        told.discard(EFFORT)
+    # The name of the joint alone is a position, as in `shoulder_pan`.
+    plain = not told and not {*key} - {'*', 'observation'}
+    fits = given is not None or quantity in told or (quantity == POSITION and plain)
+    if quantity == POSITION and VELOCITY in told:
+        fits = False
+    if not fits or {*key} & OTHERS:
+        return (-1.0,)
+    return (float(len(members)), float(not {*key} & COMMANDS), float(bool({*key} & MEASURED)),
+            -float(len(key)))
+
+
+def _joint_in(words: Sequence[str], joints: Sequence[str]) -> tuple[str, int, int] | None:
+    """Return the joint whose name is among the words, where, and how long it is."""
+    best: tuple[str, int, int] | None = None
+    for joint in joints:
+        own = words_of(joint)
+        shorter = [word for word in own if word != 'joint'] or own
+        for name in (own, shorter):
+            if name == ['joint'] or all(word.isdigit() for word in name):
+                continue
+            for at in range(len(words) - len(name) + 1):
+                if list(words[at:at + len(name)]) == name and (
+                        best is None or len(name) > best[2]):
+                    best = (joint, at, len(name))
+    return best
+
+
+def _numbered(series: Sequence[Series]) -> dict[tuple[str, ...], dict[int, Column]]:
+    """Return columns that differ in a number alone, by their other words; gaps end them."""
+    found: dict[tuple[str, ...], dict[int, Column]] = {}
+    for one in series:
+        words = words_of(one.title)
+        for at, word in enumerate(words):
+            if word.isdigit() and len(word) < 4:
+                key = (*words[:at], '*', *words[at + 1:])
+                found.setdefault(key, {}).setdefault(int(word), one.column)
+    return {key: numbers for key, numbers in found.items()
+            if len(numbers) > 1 and max(numbers) - min(numbers) == len(numbers) - 1}
+
+
+# ------------------------------------------------------------------------------- derivatives
+
+
+@dataclass(frozen=True)
+class Links:
+    """Which columns are derivatives of which, from M columns of N samples.
+
+    Parameters
+    ----------
+    correlation, slope : (M, M) arrays
+        Of column j with the derivative of column i, over steps of several lengths; NaN where one
+        of them does not move.
+    alike : (M, M) array
+        Correlation of the changes of columns.
+    """
+
+    correlation: Array
+    slope: Array
+    alike: Array
+
+    @classmethod
+    def of(cls, values: Array, time: Array) -> Links:
+        """Compare changes of every column, (N, M), with the integral of every other one.
+
+        Integrals forgive quantisation and noise, which differences multiply.
+        """
+        known = np.isfinite(values).all(axis=1) & np.isfinite(time)
+        known[known] = np.concatenate([[True], np.diff(time[known]) > 0])
+        values, time = values[known], time[known]
+        count = values.shape[1]
+        best = [np.full((count, count), np.nan) for _ in range(3)]
+        if len(time) < LEAST_ROWS:
+            return cls(*best)
+        steps = np.diff(time)[:, None]
+        area = np.vstack([np.zeros(count), np.cumsum(
+            0.5 * (values[1:] + values[:-1]) * steps, axis=0)])
+        for length in (step for step in LENGTHS_OF_STEPS if step < len(time) // 4):
+            change, covered = (each[length:] - each[:-length] for each in (values, area))
+            change, covered = change - change.mean(axis=0), covered - covered.mean(axis=0)
+            with np.errstate(divide='ignore', invalid='ignore'):
+                sizes, areas = (np.sqrt(np.sum(each ** 2, axis=0)) for each in (change, covered))
+                product = change.T @ covered
+                found = product / np.outer(sizes, areas)
+                slope = np.outer(1 / sizes, areas) / np.where(found == 0, np.nan, found)
+                alike = change.T @ change / np.outer(sizes, sizes)
+            better = ~(np.abs(found) <= np.abs(best[0])) & np.isfinite(found)
+            slope = (np.sum(covered ** 2, axis=0)[None, :]
+                     / np.where(product == 0, np.nan, product))
+            best = [np.where(better, new, old) for new, old in zip(
+                (found, slope, alike), best, strict=True)]
+        return cls(*best)
+
+
+def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
+                quantity: str | None, notes: list[str]) -> dict[tuple[str, str], Column]:
+    """Return columns without names by what they are of each other, in any order."""
+    count = len(joints)
+    values = np.column_stack([each.values for each in series])
+    if quantity:
+        return {(joint, quantity): each.column
+                for joint, each in zip(joints, series, strict=False)}
+    links = Links.of(values, time)
+    kinds = _chains(links, count) or _layout(values, time, count)
+    if not kinds:
+        raise GuessError(
+            f'there is no header, and {len(series)} columns beside time are no blocks of {count} '
+            f'joints ({", ".join(joints)}), nor are there as many positions with their '
+            f'velocities: write columns: {{time: 1, {joints[0]}: {{position: 2, effort: …}}}} '
+            'with numbers from 1')
+    position = values[:, kinds[POSITION]]
+    used = {place for places in kinds.values() for place in places}
+    rest = [place for place in range(len(series)) if place not in used
+            and not _is_known(links, place, used)]
+    if EFFORT not in kinds and rest:
+        groups = [rest[k:k + count] for k in range(0, len(rest) - count + 1, count)]
+        shares = [_explained(values[:, group], position, time) for group in groups]
+        order = sorted(range(len(shares)), key=lambda k: -shares[k])
+        if len(order) > 1 and shares[order[0]] - shares[order[1]] < CLEAR and not _are_alike(
+                values, groups[order[0]], groups[order[1]]):
+            first, second = (groups[k] for k in order[:2])
+            raise AmbiguousColumns(joints, [
+                {**kinds, EFFORT: group} for group in (first, second)], series)
+        if order:
+            # Of what is the same but for its scale, as measured and asked efforts, the first.
+            kinds[EFFORT] = next(group for group in groups if group is groups[order[0]] or
+                                 _are_alike(values, group, groups[order[0]]))
+    told = [f'{_span(series, places)} taken as {PLURALS[kind]}'
+            for kind, places in kinds.items()]
+    unused = [place for place in range(len(series))
+              if place not in {k for places in kinds.values() for k in places}]
+    notes.append('no header: ' + ', '.join(told) + (
+        f'; {_span(series, unused)} not used' if unused else ''))
+    return {(joint, kind): series[place].column for kind, places in kinds.items()
+            for joint, place in zip(joints, places, strict=False)}
+
+
+def _are_alike(values: Array, block: Sequence[int], other: Sequence[int]) -> bool:
+    """Return whether two blocks are the same but for scales."""
+    pairs = [np.corrcoef(values[:, a], values[:, b])[0, 1]
+             for a, b in zip(block, other, strict=False)
+             if np.ptp(values[:, a]) > 0 and np.ptp(values[:, b]) > 0]
+    return bool(pairs) and min(pairs) > COPY
+
+
+def _span(series: Sequence[Series], places: Sequence[int]) -> str:
+    columns = [str(series[place].column) for place in places]
+    if len(places) > 1 and [*places] == [*range(places[0], places[-1] + 1)]:
+        return f'columns {columns[0]} to {columns[-1]}'
+    return f'column{"s" * (len(columns) > 1)} {", ".join(columns)}'
+
+
+def _chains(links: Links, count: int) -> dict[str, list[int]]:
+    """Return positions and velocities by derivatives; empty where not each joint has both."""
+    with np.errstate(invalid='ignore'):
+        derived = (links.correlation > ALIKE) & (links.slope > 0)
+        same = links.alike > COPY
+    np.fill_diagonal(derived, False)
+    # What is asked for moves as what is measured, which the velocity follows more exactly.
+    places = [i for i in range(len(derived)) if derived[i].any() and not derived[:, i].any()]
+    groups: list[list[int]] = []
+    for i in places:
+        group = next((group for group in groups if same[group[0], i]), None)
+        if group is None:
+            groups.append([i])
+        else:
+            group.append(i)
+    pairs = []
+    for group in groups:
+        i, j = max(((i, j) for i in group for j in np.flatnonzero(derived[i]).tolist()),
+                   key=lambda pair: round(float(links.correlation[pair]), 5))
+        pairs.append((i, j))
+    pairs.sort()
+    # Velocities of one robot are in one unit.
+    slopes = [float(np.log(links.slope[pair])) for pair in pairs]
+    if len(pairs) != count or len({j for _, j in pairs}) != count or np.ptp(slopes) > SAME_UNIT:
+        return {}
+    return {POSITION: [i for i, _ in pairs], VELOCITY: [j for _, j in pairs]}
+
+
+def _layout(values: Array, time: Array, count: int) -> dict[str, list[int]]:
+    """Return the blocks, or every so many columns, that explain efforts best as positions."""
+    width = values.shape[1]
+    if width % count or not width:
+        return {}
+    number = width // count
+    if number == 1:
+        return {POSITION: [*range(count)]}
+    layouts = [[[*range(b * count, (b + 1) * count)] for b in range(number)]]
+    if count > 1:
+        layouts.append([[*range(b, width, number)] for b in range(number)])
+    found = []
+    for layout in layouts:
+        links = [[_linked(values, layout[a], layout[b], time) for b in range(number)]
+                 for a in range(number)]
+        for p in range(number):
+            for e in range(number):
+                if e != p and not links[p][e] and not any(links[a][p] for a in range(number)):
+                    found.append((_explained(values[:, layout[e]], values[:, layout[p]], time),
+                                  -p, layout, p, e, links[p]))
+    if not found:
+        return {}
+    _, _, layout, p, e, of_p = max(found, key=lambda one: (round(one[0], 2), one[1]))
+    kinds = {POSITION: layout[p]}
+    speeds = [b for b in range(number) if b not in (p, e) and of_p[b]]
+    if speeds:
+        kinds[VELOCITY] = layout[speeds[0]]
+    return {**kinds, EFFORT: layout[e]}
+
+
+def _linked(values: Array, block: Sequence[int], other: Sequence[int], time: Array) -> bool:
+    """Return whether a block has the derivatives of another, of the joints that move."""
+    count = len(block)
+    links = Links.of(values[:, [*block, *other]], time)
+    found = np.diagonal(links.correlation[:count, count:])
+    return bool(np.isfinite(found).any() and np.nanmedian(found) > ALIKE)
+
+
+def _is_known(links: Links, place: int, used: Collection[int]) -> bool:
+    """Return whether a column is the derivative of a used one in its units, or alike one."""
+    for k in used:
+        if links.alike[k, place] > COPY or (links.correlation[k, place] > COPY and any(
+                abs(links.slope[k, place] / links.slope[i, j] - 1) < SAME_UNIT
+                for i in used for j in used if links.correlation[i, j] > ALIKE)):
+            return True
+    return False
+
+
+def _explained(efforts: Array, position: Array, time: Array) -> float:
+    """Return the share of efforts that gravity, friction and inertia of any size explain."""
+    known = (np.isfinite(efforts).all(axis=1) & np.isfinite(position).all(axis=1)
+             & np.isfinite(time))
+    efforts, position, time = efforts[known], position[known], time[known]
+    if len(time) < LEAST_ROWS or not np.all(np.diff(time) > 0):
+        return 0.0
+    half = max(1, len(time) // 400)
+    speed = np.zeros_like(position)
+    speed[half:-half] = (position[2 * half:] - position[:-2 * half]) / (
+        time[2 * half:] - time[:-2 * half])[:, None]
+    rate = np.gradient(speed, time, axis=0)
+    total = np.cumsum(position, axis=1)
+    width = root_mean_square(speed) / 10 or 1.0
+    columns = np.column_stack([
+        np.ones(len(time)), np.sin(position), np.cos(position), np.sin(total), np.cos(total),
+        speed, np.tanh(speed / width), rate])
+    columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    rest = efforts - columns @ np.linalg.lstsq(columns, efforts, rcond=1e-8)[0]
+    swing = np.var(efforts, axis=0)
+    moves = swing > 0
+    if not np.any(moves):
+        return -1.0
+    # What is explained exactly is computed from positions: no measurement.
+    return float(np.mean(1 - np.var(rest, axis=0)[moves] / swing[moves]))
+
+
+# ------------------------------------------------------------------------------------ units
+
+
+def _scale(title: str, quantity: str) -> float | None:
+    known = UNIT_WORDS.get(quantity, {})
+    return next((known[word] for word in words_of(title) if word in known), None)
+
+
+def _judge_velocities(guess: Guess, series: Mapping[Column, Series], time: Series | None,
+                      rate: float | None) -> Guess:
+    """Return a guess with the units of velocities and the rate that derivatives show.
+
+    Raises
+    ------
+    RateError
+        For a rate that they contradict.
+    """
+    slopes = {}
+    for joint, kind in guess.columns:
+        if kind != POSITION or (joint, VELOCITY) not in guess.columns:
+            continue
+        pair = np.column_stack([series[guess.columns[joint, each]].values
+                                for each in (POSITION, VELOCITY)])
+        stamps = time.values if time is not None else np.arange(len(pair)) / (rate or 1.0)
+        links = Links.of(pair, stamps[:len(pair)])
+        if links.correlation[0, 1] > ALIKE:
+            slopes[joint] = float(links.slope[0, 1])
+        elif np.isfinite(links.correlation[0, 1]) and abs(links.correlation[0, 1]) < UNLIKE:
+            guess.notes.append(
+                f'{guess.columns[joint, VELOCITY]} is called a velocity, but is not the '
+                f'derivative of {guess.columns[joint, POSITION]} (correlation '
+                f'{links.correlation[0, 1]:.2f}): not used')
+            del guess.columns[joint, VELOCITY]
+    if not slopes:
+        return guess
+    middle = float(np.median([*slopes.values()]))
+    if time is None:
+        if rate is None:
+            found = float(f'{middle:.3g}')
+            guess.notes.append(f'rate {found:g} Hz: the velocities are the derivatives of the '
+                               'positions at this rate')
+            return replace(guess, rate=found)
+        is_unit = any(abs(middle / factor - 1) < RATE_OFF for factor in (
+            1.0, *VELOCITY_FACTORS, *(1 / factor for factor in VELOCITY_FACTORS)))
+        if not is_unit:
+            raise RateError(rate, float(f'{rate * middle:.3g}'))
+    scales = dict(guess.scales)
+    for joint, slope in slopes.items():
+        factor = scales.get((joint, POSITION), 1.0)
+        if (joint, VELOCITY) in scales or abs(slope - 1) < SAME_UNIT:
+            continue
+        exact = min((1.0, *VELOCITY_FACTORS), key=lambda unit: abs(
+            math.log(unit * slope / factor)))
+        if abs(exact * slope / factor - 1) < SAME_UNIT:
+            scales[joint, VELOCITY] = exact
+            guess.notes.append(f'the velocity of {joint} is {slope:.4g} times the derivative of '
+                               f'its position: velocity_scale {exact:g}')
+    return replace(guess, scales=scales)

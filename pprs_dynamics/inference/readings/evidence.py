@@ -1,0 +1,250 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""How likely a reading is: the regression of efforts on a model's inertia, gravity and friction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import nnls
+
+from pprs_dynamics.arrays import Array, root_mean_square
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.readings.table import (
+    CLOSEST,
+    CONSTANT,
+    FRICTION,
+    FRICTION_MOST,
+    MASSES,
+    MASSES_MOST,
+    SAMPLES,
+    STEADY,
+    WEAK,
+    Reading,
+)
+from pprs_dynamics.inference.residuals.excerpt import PIECE, Excerpt
+from pprs_dynamics.inference.residuals.reconstruction import follow
+from pprs_dynamics.measurement.motion.drive_motion import DriveMotion
+from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.reversal import smooth_sign
+from pprs_dynamics.physics.model.force_model import RIGID_BODY, ForceModel
+
+CONDITION = 1e-6  # of a column beside others: less is rounding
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A model's forces on an excerpt, (N, D) each; NaN where the mechanism cannot follow."""
+
+    inertia: Array
+    gravity: Array
+    others: Array
+    velocity: Array
+    direction: Array
+
+    def rows(self, which: Array) -> Parts:
+        """Return some of the samples."""
+        return Parts(*(part[which] for part in (
+            self.inertia, self.gravity, self.others, self.velocity, self.direction)))
+
+
+def parts_of(model: ForceModel, excerpt: Excerpt, reading: Reading, in_pieces: bool,
+             ) -> Parts | None:
+    """Return a model's forces on an excerpt in a reading; None where it cannot follow at all."""
+    motion = read_motion(excerpt.motion, reading)
+    position = motion.position
+    moved = replace(motion, position=position - model.position_error(position))
+    count = len(position)
+    rows = [slice(k, min(k + PIECE, count)) for part in motion.segments
+            for k in range(part.start, part.stop, PIECE)] if in_pieces else [slice(0, count)]
+    found = np.full((3, count, position.shape[1]), np.nan)
+    for part in rows:
+        try:
+            found[:, part] = _forces(model, _taken(moved, part), excerpt.time[part])
+        except (PprsError, np.linalg.LinAlgError):
+            if not in_pieces:
+                return None
+    if not np.isfinite(found).any():
+        return None
+    width = np.broadcast_to(model.reversal.velocity, (position.shape[1],))
+    return Parts(found[0], found[1], found[2], motion.velocity, smooth_sign(motion.velocity, width))
+
+
+def read_motion(motion: DriveMotion, reading: Reading) -> DriveMotion:
+    """Return a recorded motion in a reading."""
+    turn = -1.0 if reading.backwards else 1.0
+    return replace(motion, position=motion.position @ reading.position.T + reading.offset,
+                   velocity=turn * motion.velocity @ reading.position.T,
+                   acceleration=motion.acceleration @ reading.position.T)
+
+
+def _taken(motion: DriveMotion, part: slice) -> DriveMotion:
+    segments = motion.segments if part.stop - part.start == len(motion.position) else (
+        slice(0, part.stop - part.start),)
+    return replace(motion, position=motion.position[part], velocity=motion.velocity[part],
+                   acceleration=motion.acceleration[part], index=motion.index[part],
+                   segments=segments)
+
+
+def _forces(model: ForceModel, motion: DriveMotion, time: Array) -> Array:
+    """Return forces by inertia, by gravity and by all else, (3, N, D)."""
+    bodies = {RIGID_BODY, DriveInertia.name, *(
+        effect.name for effect in model.effects if isinstance(effect, BodyEffect))}
+    still = np.zeros_like(motion.velocity)
+    rigid, others = [], np.zeros_like(still)
+    with np.errstate(all='ignore'):
+        for each in (motion, replace(motion, velocity=still, acceleration=still)):
+            followed = follow(model, time, each).motion.with_time(time)
+            forces = model.drive_forces(followed)
+            rigid.append(np.sum([forces.parts[name] for name in forces.parts if name in bodies],
+                                axis=0))
+            if not len(rigid) > 1:
+                others = forces.total - rigid[0]
+    return np.stack([rigid[0] - rigid[1], rigid[1], others])
+
+
+@dataclass(frozen=True)
+class Likelihood:
+    """How well the efforts of a drive follow a model, by constrained least squares.
+
+    Parameters
+    ----------
+    score : float
+        Log-likelihood of the effort less the cost of its coefficients [nats].
+    left : float
+        Residual over the effort, squared.
+    """
+
+    score: float
+    left: float
+
+
+def likelihood(effort: Array, parts: Parts, drive: int, scale: float) -> Likelihood | None:
+    """Return how likely efforts, (N,), are `scale` times those of a drive; None where all is 0.
+
+    Inertia and gravity are the model's within its tolerance, friction opposes the motion with any
+    size, and a constant is small beside them.
+    """
+    columns = [part[:, drive] for part in (parts.inertia, parts.gravity, parts.others,
+                                           parts.velocity, parts.direction)]
+    known = np.isfinite(effort) & np.isfinite(columns[0])
+    total = float(np.sum(effort[known] ** 2))
+    swing = float(np.var(effort[known])) * int(known.sum()) + WEAK ** 2 * total
+    count = int(known.sum())
+    if count < len(columns) + 2 or not total > 0:
+        return None
+    inertia, gravity, *resisting = (column[known] for column in columns)
+    ones = np.full(count, root_mean_square(effort[known]) / abs(scale))
+    matrix = np.column_stack([inertia, gravity, *resisting, ones, -ones]) * scale
+    # Coefficients in units of the model's forces: mean and standard deviation of each.
+    mean = np.array([1.0, 1.0, *[0.0] * (matrix.shape[1] - 2)])
+    width = np.array([MASSES, MASSES, *[np.inf] * len(resisting), CONSTANT, CONSTANT])
+    triangle = np.asarray(np.linalg.qr(np.column_stack([matrix, effort[known]]), mode='r'))
+    variance = total / count
+    for _ in range(3):
+        weight = np.sqrt(variance * count / SAMPLES) / width
+        found, _ = nnls(np.vstack([triangle[:, :-1], np.diag(weight)]),
+                        np.concatenate([triangle[:, -1], weight * mean]))
+        rest = triangle[:, -1] - triangle[:, :-1] @ found
+        variance = max(float(rest @ rest), CLOSEST * swing) / count
+    misfit = 0.5 * ((found - mean) / width) ** 2
+    # Masses are off by factors.
+    misfit[:2] = 0.5 * (np.log(np.maximum(found[:2], CONDITION)) / MASSES) ** 2
+    rigid = matrix[:, :2]
+    moves = np.linalg.norm(rigid, axis=0) > WEAK * np.linalg.norm(rigid)
+    if abs(scale) != 1 and np.all(misfit[:2][moves] > MASSES_MOST):
+        return Likelihood(-MASSES_MOST, 1.0)  # neither weight nor inertia has this unit
+    cost = float(np.sum(np.minimum(misfit[:2], MASSES_MOST)[moves]) + np.sum(misfit[2:]))
+    # Friction beyond some times the rigid body's forces is unlikely.
+    friction, weight_of = (root_mean_square(each) + 1e-300 for each in (
+        matrix[:, 2:5] @ found[2:5], rigid @ np.ones(2)))
+    excess = float(np.log(friction / weight_of / FRICTION))
+    cost += min(0.5 * max(excess, 0.0) ** 2, FRICTION_MOST)
+    score = -0.5 * SAMPLES * float(np.log(variance * count / swing)) - cost
+    # A residual that is larger than the effort is no worse than one that is as large.
+    return Likelihood(max(score, -MASSES_MOST), variance * count / float(np.sqrt(swing * total)))
+
+
+@dataclass(frozen=True)
+class Shares:
+    """What an effort consists of, by least squares on a model's parts.
+
+    Parameters
+    ----------
+    inertia, gravity : float
+        Shares of the model's in the effort.
+    inertia_doubt, gravity_doubt : float
+        By how much each changes if the whole residual is attributed to it; infinite where the
+        motion does not show it.
+    viscous, dry : float
+        Friction, over the swing of the effort; the former with its sign.
+    friction, friction_by_chance : float
+        Both together, negative where they drive the motion; and the friction that the residual
+        alone would show.
+    left : float
+        Residual, over the swing of the effort.
+    """
+
+    inertia: float
+    inertia_doubt: float
+    gravity: float
+    gravity_doubt: float
+    viscous: float
+    dry: float
+    friction: float
+    friction_by_chance: float
+    left: float
+
+    @property
+    def scale(self) -> tuple[float, float]:
+        """Factor of weight and inertia over the model's, and its doubt."""
+        weights = [1 / max(doubt, 1e-6) ** 2 for doubt in (self.gravity_doubt, self.inertia_doubt)]
+        if not sum(weights) > 0:
+            return 0.0, float('inf')
+        mean = float(np.average([self.gravity, self.inertia], weights=weights))
+        return mean, float(1 / np.sqrt(sum(weights)))
+
+
+def shares(effort: Array, parts: Parts, drive: int) -> Shares:
+    """Return what efforts, (N,), of a drive consist of."""
+    inertia, gravity, velocity, direction = (part[:, drive] for part in (
+        parts.inertia, parts.gravity, parts.velocity, parts.direction))
+    swing = float(np.std(effort))
+    columns = [inertia, gravity, velocity, direction]
+    found, doubts, left = fitted(effort, [*columns, np.ones_like(effort)])
+    share, doubt = found[1], doubts[1]
+    if np.std(gravity) < STEADY * root_mean_square(gravity):
+        # A weight that hardly changes cannot be separated from a constant: it is taken for one.
+        alone, alone_doubts, _ = fitted(effort, columns)
+        share, doubt = alone[1], alone_doubts[1]
+    resistance = found[2] * velocity + found[3] * direction
+    friction = root_mean_square(resistance) * float(np.sign(np.mean(resistance * velocity)))
+    return Shares(found[0], doubts[0], share, doubt, found[2] * float(np.std(velocity)) / swing,
+                  abs(found[3]) * float(np.std(direction)) / swing, friction / swing,
+                  left * float(np.sqrt(2 / len(effort))) / swing, left / swing)
+
+
+def fitted(effort: Array, columns: Sequence[Array]) -> tuple[list[float], list[float], float]:
+    """Return coefficients, their doubts and the residual's root mean square.
+
+    Columns that are combinations of others, or 0, have the coefficient 0 and infinite doubt.
+    """
+    matrix = np.column_stack(columns)
+    sizes = np.sqrt(np.mean(matrix ** 2, axis=0))
+    used = np.flatnonzero(sizes > 0)
+    unit = matrix[:, used] / sizes[used]
+    solution = np.linalg.lstsq(unit, effort, rcond=CONDITION)[0]
+    left = root_mean_square(effort - unit @ solution)
+    values, doubts = [0.0] * len(columns), [np.inf] * len(columns)
+    for k, column in enumerate(used):
+        others = np.delete(unit, k, axis=1)
+        beyond = unit[:, k] - others @ np.linalg.lstsq(others, unit[:, k], rcond=CONDITION)[0]
+        alone = root_mean_square(beyond)
+        if alone > CONDITION:
+            values[column] = float(solution[k] / sizes[column])
+            doubts[column] = left / (alone * float(sizes[column]))
+    return values, doubts, left

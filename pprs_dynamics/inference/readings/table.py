@@ -1,0 +1,288 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Everything that decides a reading: units, names, prior costs and thresholds, and the hypotheses.
+
+A hypothesis is a way to read a recording. Its score is a log-likelihood, from the regression of
+`evidence.py`, less its prior cost. The plain reading, by names and units, has no cost.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES, DriveUnits
+
+# ------------------------------------------------------------------------------------- units
+
+TICK = 2 * math.pi / 4096
+LENGTHS = {1e-3: 'millimetres', 1e-2: 'centimetres', 1e-6: 'micrometres'}
+ANGLES = {math.pi / 180: 'degrees', 2 * math.pi: 'turns', TICK: 'ticks of 4096 per turn'}
+TIMES = {1e-3: 'milliseconds', 1e-6: 'microseconds', 1e-9: 'nanoseconds'}
+# Multiples of N m and N that files have, and what a unit of effort is called in a sentence.
+EFFORTS = {1e3: 'm{}', 1e-3: 'k{}', 1 / 0.0980665: 'kgf cm'}
+# Efforts in percent and per mille of the largest of each drive, as multiples of that.
+SHARES = {0.01: 'percent', 1e-3: 'per mille'}
+QUARTERS = {math.pi / 2: 90, -math.pi / 2: -90, math.pi: 180}
+
+# ------------------------------------------------------------------------ likelihood and priors
+
+# A model's error is alike at all samples: an excerpt counts as this many independent ones.
+SAMPLES = 12.0
+# Residual, as a share of the effort's squared swing, below which fits are equal.
+CLOSEST = 2e-4
+# Standard deviation of a model's inertia and gravity, relative, and what it can cost at most.
+MASSES, MASSES_MOST = 0.35, 6.0
+# Standard deviation of a constant effort, as a share of the effort.
+CONSTANT = 0.3
+# Times the rigid body's forces, beyond which friction is unlikely, and what it can cost at most.
+FRICTION, FRICTION_MOST = 3.0, 9.0
+# Prior costs of mistakes [nats].
+COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'position_offset': 8.0,
+        'reversed_time': 8.0, 'time_unit': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0}
+FEW = 3.0  # more, of positions of some drives in another unit than those of the others
+ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
+OUTSIDE, FAR_OUTSIDE = 4.0, 8.0  # of positions beyond a stroke, and far beyond it
+BEYOND, FAR = 2.0, 10.0  # multiples of the ends of a stroke, or of the speed limit
+STROKE_SLACK = 0.05  # share of a stroke
+SURE = 3.0  # nats by which the best hypothesis must win
+GOOD_FIT = 0.25  # residual with which a hypothesis other than the plain one is credible
+CLOSE_FIT = 2e-3  # residual that leaves nothing to look for
+WEAK = 0.01  # efforts and swings that are this much smaller than others tell nothing
+
+# ------------------------------------------------------------------------- scales of efforts
+
+NEAR_UNIT = 0.15  # relative distance from a unit's constant
+SAME_MASSES = 3.0  # factor by which masses of a description are off at most
+ONE_FACTOR, SEVERAL_FACTORS = 0.25, 0.5  # spread of logarithms: one factor, several factors
+LARGEST_OVERLOAD = 4.0  # largest effort over the rated one
+CERTAIN = 3.0  # standard errors
+
+# ---------------------------------------------------------------- efforts that are not measured
+
+COMMAND, POSITION_ERROR, EXTERNAL = 'command', 'position_error', 'external'
+WITHOUT_GRAVITY, NOISE_FREE = 'without_gravity', 'noise_free'
+LEAST_SHARE = 0.5  # of the model's inertia or gravity: with less an effort has none
+LEFT_GRAVITY = 0.2  # share that another model leaves; counterweights leave more
+LEAST_FRICTION = 0.05  # over the swing of an effort: drives with gears have more
+FOLLOWS = 0.9  # share of variance from which an effort follows the velocity and nothing else
+LARGEST_COMPLIANCE = 0.02  # [rad/(N m), m/N]: controllers are stiffer than 50 N m/rad
+LEAST_NOISE, LEAST_LEFT = 1e-5, 5e-4  # over the swing of an effort, of real sensors and drives
+LEAST_MEANS = 50  # of an excerpt
+STEADY = 0.1  # a weight whose swing is a smaller share of its size is a constant
+NOISE_STEP, NOISE_ORDER = 0.01, 4  # differences that separate noise from motion [s]
+
+# ------------------------------------------------------------------- changes within a recording
+
+CHANGES = {1e-3: 'in k{}', 1e3: 'in m{}', -1.0: 'negated'}
+CLEARLY = 3.0  # times that a changed reading fits better
+LEAST_PART = 0.1  # share of a recording that a change lasts
+SHARP = 0.2  # [s]; a change that is known better is reported as one moment
+NEARLY = 0.02  # relative error of a step of positions
+BOTH_SIGNS = 0.05  # share of the model's squared efforts of the other sign
+
+# ----------------------------------------------------------------------- columns by their names
+
+POSITION, VELOCITY, EFFORT, CURRENT = 'position', 'velocity', 'effort', 'current'
+# Words of a title, and the quantity that they tell.
+WORDS = {
+    POSITION: ('position', 'positions', 'pos', 'q', 'angle', 'angles', 'theta', 'state', 'qpos',
+               'joint', 'joints', 'x', 'actual'),
+    VELOCITY: ('velocity', 'velocities', 'vel', 'dq', 'qd', 'qdot', 'dtheta', 'speed', 'omega',
+               'qvel', 'dpos', 'v'),
+    EFFORT: ('effort', 'efforts', 'tau', 'torque', 'torques', 'trq', 'force', 'moment', 'load',
+             'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'f'),
+    CURRENT: ('current', 'currents', 'cur', 'curr', 'amp', 'amps', 'ampere', 'amperes', 'i', 'iq',
+              'ma'),
+}
+# The same of what may be measured beside.
+CHANNEL_WORDS = {'temperature': {'temperature', 'temperatures', 'temp', 'temps'},
+                 'pressure': {'pressure', 'pressures'}}
+PLURALS = {POSITION: 'positions', VELOCITY: 'velocities', EFFORT: 'efforts', CURRENT: 'currents'}
+# Titles with one of these tell of something else than a joint's measured motion or effort.
+OTHERS = frozenset((
+    'acc', 'acceleration', 'accelerations', 'ddq', 'qdd', 'qddot', 'temp', 'temperature',
+    'temperatures', 'voltage', 'power', 'tcp', 'cartesian', 'pose', 'ee', 'twist', 'wrench',
+    'gravity', 'limit', 'error', 'err', 'action', 'reward', 'index', 'episode', 'frame', 'done',
+    'tracking'))
+# These tell of a command: taken only where nothing measured is there.
+COMMANDS = frozenset((
+    'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'des', 'desired', 'ref',
+    'reference', 'goal', 'setpoint', 'sp', 'set', 'demand', 'demanded'))
+LETTERS = {'a': 'actual', 'm': 'measured', 'd': 'desired', 'c': 'commanded', 'r': 'reference'}
+MEASURED = frozenset((
+    'meas', 'measured', 'actual', 'act', 'real', 'fb', 'feedback', 'msr', 'sensor', 'link'))
+UNIT_WORDS = {POSITION: {'deg': math.pi / 180, 'degs': math.pi / 180, 'degree': math.pi / 180,
+                     'degrees': math.pi / 180, 'mm': 1e-3, 'mrad': 1e-3},
+          VELOCITY: {'deg': math.pi / 180, 'degs': math.pi / 180, 'rpm': math.pi / 30,
+                     'mm': 1e-3, 'mms': 1e-3},
+          EFFORT: {'mnm': 1e-3, 'nmm': 1e-3, 'knm': 1e3},
+          CURRENT: {'ma': 1e-3}}
+TIME_WORDS = {'ms': 1e-3, 'msec': 1e-3, 'millis': 1e-3, 'milliseconds': 1e-3, 'us': 1e-6,
+              'usec': 1e-6, 'micros': 1e-6, 'ns': 1e-9, 'nsec': 1e-9, 'nanoseconds': 1e-9}
+
+# --------------------------------------------------------------------- columns by their numbers
+
+COPY = 0.995  # correlation of the changes of a column with those of what it was asked to be
+UNLIKE = 0.5  # correlation below which a column that is called a velocity is none
+SAME_UNIT = 0.05  # relative distance of a slope from a unit's
+CLEAR = 0.05  # share of the explained efforts by which one block of columns must win
+LEAST_ROWS = 30
+LENGTHS_OF_STEPS = (1, 2, 4, 8, 16, 32, 64, 128)  # [samples]
+VELOCITY_FACTORS = (math.pi / 180, 2 * math.pi, math.pi / 30, 1e-3, 1e-6)
+SLOWEST, SHORTEST = 0.5, 1e-5  # [s]; steps of a robot's recording
+SINCE_BOOT = (1e-3, 1e-6, 1e-9)  # units of stamps [s]
+
+# --------------------------------------------------------------------------------- velocities
+
+ALIKE = 0.9  # correlation of a velocity with the derivative of its position
+NEAR_ONE = 0.2  # relative distance of a velocity's factor from a known one
+RATE_OFF = 0.03  # relative error of a sampling rate that is reported
+
+SLIDES, LIFTS = (0, 1, 2), (3, 4, 5)  # of the six drives, in drive order
+# Columns in the order chain by chain, and last to first, under names in drive order.
+OTHER_ORDERS = ((0, 2, 4, 1, 3, 5), (0, 3, 1, 4, 2, 5), (5, 4, 3, 2, 1, 0))
+MOST_PERMUTED = 4  # drives of which all orders are tried; of more, exchanges of two
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A way to read the columns of a recording.
+
+    Parameters
+    ----------
+    kind : str
+        Key of `COST`; empty for the plain reading.
+    what : str
+        The mistake as a clause.
+    drives : tuple of int
+        Those it concerns.
+    position, effort : (D, D) arrays
+        From recorded to true values, for a row of drives.
+    cost : float
+        Prior cost [nats].
+    offset : (D,) array, optional
+        Added to positions.
+    backwards : bool
+        Whether time runs the other way.
+    """
+
+    kind: str
+    what: str
+    drives: tuple[int, ...]
+    position: Array
+    effort: Array
+    cost: float
+    offset: Array | float = 0.0
+    backwards: bool = False
+
+    def effort_of(self, effort: Array) -> Array:
+        """Return recorded efforts, (N, D), in this reading; NaN where not measured."""
+        known = np.isfinite(effort)
+        read: Array = np.where(known, effort, 0.0) @ self.effort.T
+        # A drive that was not measured must not make the others so.
+        read[(~known).astype(float) @ np.abs(self.effort).T > 0] = np.nan
+        return read
+
+
+def plain(count: int) -> Reading:
+    """Return the reading of D drives by names and units."""
+    same = np.eye(count)
+    return Reading('', '', (), same, same, 0.0)
+
+
+def readings(drives: tuple[str, ...], units: Sequence[DriveUnits]) -> Iterator[Reading]:
+    """Yield all readings of D drives but the plain one; those that need a close look last."""
+    count = len(drives)
+    same, every = np.eye(count), tuple(range(count))
+    for names, turns in ((LENGTHS, False), (ANGLES, True)):
+        alike = tuple(k for k in every if units[k].turns == turns)
+        for unit, name in names.items():
+            for group in _groups(drives, alike):
+                scale = np.diag(_scaled(count, group, unit))
+                cost = COST['position_unit'] + (0.0 if len(group) == len(alike) else FEW)
+                what = f'the {_position(drives, group)} like {name}'
+                yield Reading('position_unit', what, group, scale, same, cost)
+                if unit == TICK:
+                    middle = np.where(_scaled(count, group, -1.0) < 0, -math.pi, 0.0)
+                    yield Reading('position_unit', f'{what} with the zero at 2048', group, scale,
+                                  same, cost + 1, middle)
+    for group in _groups(drives, every):
+        yield Reading('position_sign', f'the {_position(drives, group)} negated', group,
+                      np.diag(_scaled(count, group, -1.0)), same, COST['position_sign'] + (
+                          ALL_NEGATED if len(group) == count > 1 else 0.0))
+    yield Reading('reversed_time', 'the recording looks as if it were played backwards: friction '
+                  'drives the motion', every, same, same, COST['reversed_time'], backwards=True)
+    for order in _orders(drives):
+        moved = tuple(k for k in every if order[k] != k)
+        listed = ', '.join(f'{drives[order[k]]} like {drives[k]}' for k in moved)
+        turned = same[list(order)]
+        for noun, position, effort in (('drives', turned, turned), ('positions', turned, same),
+                                       ('efforts', same, turned)):
+            yield Reading('drive_order', f'the {noun} look recorded in another order: {listed}',
+                          moved, position, effort, COST['drive_order'])
+
+
+def quarter_turn(drives: tuple[str, ...], drive: int, turn: float, before: Reading) -> Reading:
+    """Return another reading, with the zero of one drive a quarter turn or two elsewhere."""
+    offset = np.zeros(len(drives)) + before.offset
+    offset[drive] += turn
+    group = tuple(np.flatnonzero(offset).tolist())
+    listed = ', '.join(f'{QUARTERS.get(float(offset[k]), np.rad2deg(offset[k])):g} degrees '
+                       f'({drives[k]})' for k in group)
+    return Reading('position_offset', f'the zero of {named(drives, group)} looks off: {listed} are '
+                   'to be added to its positions, or the base is mounted otherwise than the model '
+                   'says (gravity)', group, before.position, before.effort,
+                   before.cost + COST['position_offset'], offset)
+
+
+def named(drives: tuple[str, ...], group: tuple[int, ...]) -> str:
+    """Return how a sentence names some of the drives."""
+    if len(group) == len(drives) > 1:
+        return 'all drives'
+    if drives == DRIVES and group in (SLIDES, LIFTS):
+        return 'the slides' if group == SLIDES else 'the lifts'
+    return ', '.join(drives[k] for k in group)
+
+
+def _position(drives: tuple[str, ...], group: tuple[int, ...]) -> str:
+    return ('position of ' + named(drives, group) + ' looks' if len(group) == 1
+            else 'positions of ' + named(drives, group) + ' look')
+
+
+def _groups(drives: tuple[str, ...], alike: tuple[int, ...]) -> list[tuple[int, ...]]:
+    """Return all of some drives together, those of a kind, and each alone."""
+    if not alike:
+        return []
+    return list(dict.fromkeys((alike, *((SLIDES, LIFTS) if drives == DRIVES else ()),
+                               *((k,) for k in alike))))
+
+
+def _orders(drives: tuple[str, ...]) -> list[tuple[int, ...]]:
+    """Return orders of D drives; of those that fit alike the one that moves least comes first."""
+    count = len(drives)
+    same = tuple(range(count))
+    if drives == DRIVES:
+        within = [(*first, *second) for first in permutations(SLIDES)
+                  for second in permutations(LIFTS)]
+        found = {*within, *(order[3:] + order[:3] for order in within), *OTHER_ORDERS}
+    elif count <= MOST_PERMUTED:
+        found = {*permutations(same)}
+    else:
+        found = {same[::-1], *(tuple(j if k == i else i if k == j else k for k in same)
+                               for i in same for j in same[:i])}
+    return sorted(found - {same}, key=lambda order: (
+        sum(k != place for place, k in enumerate(order)),
+        sum(k % 3 != place % 3 for place, k in enumerate(order)), order))
+
+
+def _scaled(count: int, group: tuple[int, ...], factor: float) -> Array:
+    scale = np.ones(count)
+    scale[list(group)] = factor
+    return scale
