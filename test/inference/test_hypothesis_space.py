@@ -168,7 +168,7 @@ def test_costs_do_not_depend_on_what_was_fitted_before() -> None:
             assert again.cost == pytest.approx(one.cost, abs=1e-9, rel=1e-12)
 
 
-@pytest.mark.parametrize('number', range(12))
+@pytest.mark.parametrize('number', range(4))
 def test_an_effect_alone_is_on_the_drives_where_it_costs_least(number: int) -> None:
     """Otherwise it would be no rival of what is found in its place."""
     rng = np.random.default_rng(number)

@@ -100,8 +100,7 @@ def test_static_friction_of_a_drive_that_stands_is_no_unexplained_effort():
     assert {'lift_1', 'lift_2', 'lift_3'} <= set(zero.unexplained())
 
 
-@pytest.mark.parametrize('rate', [10, 20, 50, 200])
-@pytest.mark.parametrize('jitter', [0.0, 0.01, 0.05])
+@pytest.mark.parametrize(('rate', 'jitter'), [(10, 0.05), (50, 0.01), (200, 0.0), (200, 0.05)])
 def test_an_exact_model_has_no_error_at_any_rate_and_with_any_jitter(rate, jitter):
     """Samples at their stamps, whose steps are uneven by a share of them."""
     model, span = DriveModel.load(), 10.0

@@ -275,8 +275,8 @@ def test_noise_comes_out_as_its_gain_says_and_is_known_from_the_data():
     assert_allclose(found, RESOLUTION / np.sqrt(12), rtol=0.05)
 
 
-@pytest.mark.parametrize('resolution', [1e-7, 1e-6, 1e-5])
-@pytest.mark.parametrize('motion', MOTIONS)
+@pytest.mark.parametrize(('motion', 'resolution'), [
+    (MOTIONS[0], 1e-5), (MOTIONS[1], 1e-6), (MOTIONS[2], 1e-6), (MOTIONS[3], 1e-7)])
 def test_window_from_the_data_is_nearly_the_best(motion, resolution):
     real = truth(*motion).drives
     q = np.round(real.position / resolution) * resolution

@@ -35,9 +35,9 @@ def test_without_a_model_it_does_not_start_and_says_what_to_write(
     assert 'demo:=true' in said
 
 
-@pytest.mark.parametrize('given', [
-    {}, {'masses.payload': 2.0}, {'demo': False}, {'command_timeout': 0.5}])
-@pytest.mark.parametrize('kind', [FeedforwardNode, MonitorNode])
+@pytest.mark.parametrize(('kind', 'given'), [
+    (FeedforwardNode, {}), (FeedforwardNode, {'masses.payload': 2.0}),
+    (MonitorNode, {'demo': False})])
 def test_changes_of_the_papers_robot_are_no_model(kind: type, given: dict[str, object]) -> None:
     with bench() as running, pytest.raises(PprsError, match='given no model'):
         running.add(kind, parameter_overrides=[

@@ -78,18 +78,11 @@ def test_poses_without_twists_get_those_of_a_spline_through_them(tmp_path: Path)
 MISTAKES = {
     'feedforward masses.payload:=-1.0': 'masses.payload is -1.0, must be at least',
     'feedforward masses.paylod:=1.0': 'did you mean masses.payload',
-    'feedforward max_age:=-1.0': 'max_age is -1.0',
-    'play_trajectory rate:=0.0': 'rate is 0.0',
     'play_trajectory source:=spiral': "source is 'spiral'",
     'play_trajectory source:=csv': "file is ''",
-    'play_trajectory file:=5': 'file is 5',
-    'play_trajectory repeat:=0': 'repeat is 0',
     'play_trajectory ratee:=5.0': 'unknown parameter ratee (did you mean rate?)',
     'feedforward geometry.base_radius:=0.2': 'equations is missing, must',
-    'feedforward timeout_action:=brake': "timeout_action is 'brake'",
     'feedforward effort_limits:=[1.0,2.0]': 'effort_limits is [1.0, 2.0]',
-    'feedforward feedforward_scale:=2.0': 'feedforward_scale is 2.0, must be',
-    'play_trajectory points:=0': 'points is 0',
 }
 
 
@@ -128,10 +121,9 @@ def test_help_is_answered_and_starts_nothing(ros_domain: int, name: str) -> None
     assert not done.stderr
 
 
-@pytest.mark.parametrize('name', NODES)
-@pytest.mark.parametrize('arguments', [
-    ('--params-file', str(PAPER)), ('robot.yaml',),
-    ('--ros-args', '-p', 'rate:=50.0', '--', '--params-file', str(PAPER))])
+@pytest.mark.parametrize(('name', 'arguments'), [
+    ('feedforward', ('--params-file', str(PAPER))), ('monitor', ('robot.yaml',)),
+    ('play_trajectory', ('--ros-args', '-p', 'rate:=50.0', '--', '--params-file', str(PAPER)))])
 def test_what_ros_would_pass_over_is_refused_with_usage(
     ros_domain: int, name: str, arguments: tuple[str, ...],
 ) -> None:

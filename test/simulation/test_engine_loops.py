@@ -51,7 +51,8 @@ def test_loops_are_closed_without_the_model(tmp_path: Path, name: str,
     expected = model.mechanism(motion).links.motion
     engine = MechanismEngine(model)
     engine.home()
-    for one in ('follow', 'forces', 'found', 'friction', 'twists'):
+    for one in ('forward_kinematics', 'forces', 'inverse_dynamics', 'friction',
+                'link_jacobians'):
         monkeypatch.delattr(type(model.robot.structure.evaluation), one)
     closed = engine.loops.follow(motion)
     t = model.robot.structure.tables
