@@ -16,14 +16,14 @@ from typing import Any
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_model import linear_error
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.ranking import Ranking
 from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.table import ModelTable
 from pprs_dynamics.physics.effects.catalogue import catalogue
 
 RIVALS = 6  # proposals that are fitted
 
 
-def consult(selection: Ranking, truth: Mapping[str, Any]) -> dict[str, Any]:
+def consult(selection: ModelTable, truth: Mapping[str, Any]) -> dict[str, Any]:
     """Return `best_error` [N], and `separable`: no other effect alone comes near its cost.
 
     Empty where nothing, several effects or none of the catalogue are hidden, or where the model

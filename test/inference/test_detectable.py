@@ -11,7 +11,6 @@ import pytest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.sentences import detectable_rows, word_detectable
-from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.robot_block import AXIS
@@ -53,22 +52,20 @@ def test_an_effect_of_twice_the_size_is_seen_and_one_of_a_quarter_is_not(
         assert told(seed, size / 4 * LAWS[name]).verdict == 'adequate'
 
 
-def test_more_noise_hides_more_but_for_friction_that_the_models_own_may_leave(
-        adequate: Diagnosis) -> None:
+def test_more_noise_hides_more(adequate: Diagnosis) -> None:
     loud = {one.effect.name: one.size for one in told(
         5, 2 * NOISE * np.random.default_rng(6).standard_normal(len(TIME))).detectable}
     quiet = {one.effect.name: one.size for one in adequate.detectable}
-    assert loud['drive_inertia'] > 1.5 * quiet['drive_inertia']
-    assert quiet['coulomb_friction'] == pytest.approx(loud['coulomb_friction'], rel=0.2)
-    assert quiet['coulomb_friction'] > 0.9 * DECISIONS.own_form_share * COULOMB
+    for name in ('drive_inertia', 'coulomb_friction'):
+        assert loud[name] > 1.5 * quiet[name]
 
 
 def test_what_was_found_or_is_in_the_model_is_not_listed(adequate: Diagnosis) -> None:
-    size = next(one.size for one in adequate.detectable if one.effect.name == 'effort_offset')
-    found = told(2, 20 * size)
-    assert [one.name for one in found.effects] == ['effort_offset']
+    size = next(one.size for one in adequate.detectable if one.effect.name == 'viscous_friction')
+    found = told(2, 20 * size * Q_DOT)
+    assert [one.name for one in found.effects] == ['viscous_friction']
     names = {one.effect.name for one in found.detectable}
-    assert 'effort_offset' not in names
+    assert 'viscous_friction' not in names
     assert 'drive_inertia' in names
 
 

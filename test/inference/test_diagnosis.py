@@ -241,14 +241,15 @@ def test_the_page_is_told_the_runner_up_and_evidence_is_the_difference_of_costs(
     assert [one.cost for one in found.sets] == sorted(one.cost for one in found.sets)
     assert found.selection is not None
     # Whatever stands there instead: without a payload another effect takes on what it can.
-    without = [one for one in found.selection.sets
-               if 'payload_mass' not in {c.name for c in one.effects}]
-    rival = min(without, key=lambda one: one.cost)
+    table = found.selection
+    without = [row for row in table.rows
+               if 'payload_mass' not in {c.name for c in row.effects}]
+    rival = min(without, key=lambda row: row.cost)
     assert rival.effects
-    assert found.effects[0].evidence == pytest.approx(rival.cost - found.selection.map_set.cost)
-    assert found.effects[0].evidence < found.selection.nothing.cost - found.selection.map_set.cost
-    for told, one in zip(found.sets, found.selection.sets, strict=False):
-        assert told.cost == pytest.approx(one.cost - found.selection.map_set.cost)
+    assert found.effects[0].evidence == pytest.approx(rival.cost - table.best.cost)
+    assert found.effects[0].evidence < table.nothing.cost - table.best.cost
+    for told, row in zip(found.sets, table.rows, strict=False):
+        assert told.cost == pytest.approx(row.cost - table.best.cost)
         assert sum(told.terms.to_dict().values()) == pytest.approx(told.cost)
     assert found.effects[0].without is not None
     assert {name for name, _ in found.effects[0].without.names} == {c.name for c in rival.effects}
@@ -301,7 +302,7 @@ def test_what_shows_beside_others_alone_is_confirmed() -> None:
     assert sorted(one.name for one in found.effects) == sorted(names)
     assert not found.unconfirmed
     assert found.selection is not None
-    fits, one = found.selection.last, {each.name: each for each in found.selection.order}
+    fits, one = found.selection.last, {each.name: each for each in found.selection.best.effects}
     without_tilt = fits.evaluate((one['friction_drift'],))
     with_tilt = fits.evaluate((one['friction_drift'], one['base_tilt']))
     assert linear_error(fits, with_tilt) > linear_error(fits, without_tilt)

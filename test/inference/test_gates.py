@@ -30,8 +30,8 @@ from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_d
 from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.inference.search.form_error import DIRECTIONS, FormErrors
 from pprs_dynamics.inference.search.held_out import BLOCKS, PredictiveGain, predictive_gain
-from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.model_file import build_model
 
@@ -228,6 +228,11 @@ def test_a_rival_that_explains_as_much_is_not_objected_to() -> None:
     refused, = others('drive_spring', found, evidence=2.0)
     assert refused == ('coulomb_friction on lift_2 explains these recordings better: evidence '
                        '120.4 against 2')
+    # Of several reported effects the first is the best.
+    weak = replace(found_effect('viscous_friction'), evidence=10.0)
+    two = made_up_diagnosis(effects=(found_effect('coulomb_friction'), weak))
+    refused, = others('drive_spring', two, evidence=50.0)
+    assert 'coulomb_friction on lift_2 explains these recordings better' in refused
     structure = made_up_diagnosis(effects=(found_effect('payload_mass', None),))
     refused, = others('drive_spring', structure)
     assert refused.startswith('payload_mass explains these recordings better')
@@ -270,6 +275,9 @@ class Rows:
 
     def __init__(self, parts: dict[str, np.ndarray]) -> None:
         self.residuals = SimpleNamespace(parts=parts)
+        self.drives = (0,)
+        self.series = {0: SimpleNamespace(transform=lambda force: force,
+                                          spread=lambda weights: 1.0)}
 
     @staticmethod
     def weights(_: Any, __: int) -> np.ndarray:
@@ -279,9 +287,6 @@ class Rows:
     def products(first: Any, others: Any, d: int) -> list[np.ndarray]:
         return [(first.rows[d] @ one.rows[d].T)[None] for one in others]
 
-    @staticmethod
-    def whitened(_: Any, d: int, force: np.ndarray) -> np.ndarray:
-        return force
 
 
 def set_of(**columns: tuple[str, float, float]) -> Any:
@@ -306,14 +311,18 @@ def set_of(**columns: tuple[str, float, float]) -> Any:
                                if candidate is one])
 
 
-DECIDED = Decisions(form_share=0.1, exact_share=0.02, own_form_share=0.05)
+DECIDED = Decisions(form_share=0.1 * DIRECTIONS ** 0.5, exact_share=0.02)
 
 
 def share(found: Any, which: int, parts: dict[str, np.ndarray] | None = None,
           model: Any = PLAIN) -> tuple[float, tuple[str, ...]]:
+    """Return the force of a candidate over the form errors beside it, and whose they are."""
     design: Any = SimpleNamespace(given=model, carried=None)
     regression: Any = Rows(parts or {})
-    return discrepancy_ratio(design, regression, DECIDED, found, found.candidates[which])
+    errors, candidate = FormErrors(design, regression, DECIDED), found.candidates[which]
+    allowed, names = errors.beside(found, candidate, set(found.blocks_of(candidate)[0].rows))
+    own = errors._beyond_others(found, candidate)
+    return float(np.sqrt(own / max(allowed, 1e-300))), names
 
 
 def test_an_idealised_effect_may_leave_a_tenth_in_another_and_a_fiftieth_in_an_exact_one() -> None:
@@ -348,17 +357,6 @@ def test_lack_of_fit_adds_up_in_squares_and_counts_that_of_the_model() -> None:
                    c=('viscous_friction', 10.0, 1.0))
     size, names = share(found, 2)
     assert (size, names) == (pytest.approx(10 / 5), ('drive_spring', 'coulomb_friction'))
-    # The model's own friction: 5 % of 200, more than the others leave, or 5 % of 20.
-    parts = {'active_friction': np.full((4, 6), 100.0), 'rigid_body': np.full((4, 6), 1e6)}
-    size, names = share(found, 2, parts)
-    assert names == ("the model's own friction",)
-    assert size == pytest.approx(10 / (5 ** 2 + 10 ** 2) ** 0.5)
-    size, names = share(found, 2, {'active_friction': np.full((4, 6), 10.0)})
-    assert names == ('drive_spring', 'coulomb_friction')
-    assert size == pytest.approx(10 / (5 ** 2 + 1) ** 0.5)
-    # Which looks like no mass.
-    exact = set_of(a=('drive_spring', 30.0, 1.0), b=('drive_inertia', 10.0, 1.0))
-    assert share(exact, 1, parts)[0] == pytest.approx(10 / 0.6)
 
 
 def test_an_adopted_effect_leaves_as_much_as_one_that_is_found() -> None:

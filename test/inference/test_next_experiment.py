@@ -52,8 +52,7 @@ from pprs_dynamics.inference.search.candidates import (
 )
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.ranking import Ranking, Rival
-from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.table import ModelTable, Rival, Row
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -371,15 +370,14 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
         return fits.evaluate((EffectCandidate.of([component]),))
 
     adopted = fitted('coulomb_friction', 'force')
-    ranking = Ranking.of(fits, Search(fits), adopted)
-    assert ranking.reported is adopted
-    assert question_after(ranking, []).kind == 'estimate'
+    table = ModelTable(fits, fits)
+    assert table.reported is adopted
+    assert question_after(table, []).kind == 'estimate'
     free = fitted('asymmetric_friction', 'force_forward', 'force_backward')
     other = fitted('load_friction', 'coefficient')
-    ranking = Ranking.of(fits, Search(fits), adopted)
-    question = question_after(ranking, [
-        Rival(free, ('coulomb_friction',), ('asymmetric_friction',)),
-        Rival(other, ('coulomb_friction',), ('load_friction',))])
+    question = question_after(ModelTable(fits, fits), [
+        Rival(Row(fits, free), ('coulomb_friction',), ('asymmetric_friction',)),
+        Rival(Row(fits, other), ('coulomb_friction',), ('load_friction',))])
     assert question.kind == 'separate'
     pairs = {(one.truth.name, one.rival.name) for one in question.contests}
     assert ('coulomb_friction', 'load_friction') in pairs

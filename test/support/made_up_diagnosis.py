@@ -17,7 +17,6 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     FoundEffect,
     RankedEffect,
     RankedSet,
-    WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
@@ -85,7 +84,7 @@ def made_up_diagnosis(verdict: str = 'effect', **changes: Any) -> Diagnosis:
         'verdict': verdict, 'effects': (), 'indistinguishable': (), 'unconfirmed': (),
         'candidates': tuple(
             RankedEffect(one.name, one.drives, one.evidence, one.error_after) for one in effects),
-        'suspects': (), 'depends_on': (), 'within_model_error': (), 'sets': (), 'barred': (),
+        'suspects': (), 'depends_on': (), 'sets': (), 'barred': (),
         'calibrated': (), 'warnings': (), 'noise': dict.fromkeys(DRIVES, white_noise()),
         'noise_floors': dict.fromkeys(DRIVES, NOISE),
         'notes': (), 'model': model, 'adopted': model, 'residuals': given,
@@ -96,11 +95,6 @@ def made_up_diagnosis(verdict: str = 'effect', **changes: Any) -> Diagnosis:
 def white_noise() -> NoiseSpectrum:
     """Return the noise between model and effort."""
     return NoiseSpectrum(np.array([1.0]), np.array([NOISE ** 2, 0.0]), PERIOD)
-
-
-def within_model_error(of: str = 'coulomb_friction') -> WithinModelError:
-    """Return a small further effect that may be the lack of fit of another."""
-    return WithinModelError('hysteresis', ('lift_2',), 0.021, (of,))
 
 
 def ranked_set(names: tuple[tuple[str, tuple[str, ...] | None], ...], cost: float) -> RankedSet:

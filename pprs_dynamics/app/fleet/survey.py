@@ -156,7 +156,7 @@ def _as_in_model(diagnosis: Diagnosis, reported: Container[tuple[str | None, str
     for effect in diagnosis.model.effects:
         if not isinstance(effect, (DriveEffect, StructureEffect)):
             continue
-        estimates = estimate_present(selection.last, selection.reported, effect)
+        estimates = estimate_present(selection.best.fits, selection.best.fitted, effect)
         for name, estimate in estimates.items():
             drive, parameter = effect.place_and_parameter(name)
             if (drive or None, effect.name) not in reported:

@@ -16,6 +16,7 @@ from typing import Any
 from pprs_dynamics.app.report import diagnosis_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import escape, stacked, text_table, verdict_panel
+from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import RivalEffect
 from pprs_dynamics.inference.diagnosis.partial_errors import ErrorStep, error_steps
@@ -24,7 +25,6 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     listed,
     name_drives,
     plain,
-    with_drives,
 )
 from pprs_dynamics.inference.diagnosis.sentences import (
     Finding,
@@ -44,6 +44,8 @@ MOST_LISTED = 2  # places of effects whose parameters the sentences give; names 
 WIDTH = 80
 LONGEST = 400  # characters of rows, values and the runner-up without --details: five lines
 MOST_EFFECTS = 4  # that are shown without --details
+REFIT = 'its own numbers'  # of the model, fitted beside the effects
+LEAST_REFIT = 0.01  # share of the error, from which these are listed
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
 ELSEWHERE = '[dim]Evidence, confirmation and all values: --details, or --report FILE.html[/]'
 LEGEND = '[dim]Cost terms: fit = misfit; coefficients = prior; others = model choices[/]'
@@ -98,9 +100,8 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
         yield LEGEND
     if diagnosis.verdict == 'adequate' and (seen := word_detectable(diagnosis)):
         yield escape(seen)
-    if words.within_model_error:
-        yield ('Not reported, smaller than the model error: '
-               f'{escape(_within_model_error(diagnosis))}')
+    if words.barred:
+        yield f'[blue]i[/] {escape(words.barred[0])}'
     if words.warnings:
         yield f'[yellow]![/] {escape(words.warnings[0])}'
 
@@ -108,14 +109,6 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
 def _room(line: str) -> int:
     """Return how many characters a line takes, whole lines of the screen."""
     return -(-len(line) // WIDTH) * WIDTH
-
-
-def _within_model_error(diagnosis: Diagnosis) -> str:
-    """Return the names of what was fitted as the model error of other effects, the first ones."""
-    every = diagnosis.residuals.drives
-    names = [with_drives(one.name, one.drives, every) for one in diagnosis.within_model_error]
-    more = len(names) - MOST_LISTED
-    return listed([*names[:MOST_LISTED], f'{more} more'] if more > 0 else names)
 
 
 def _following(words: Sentences) -> Iterator[Any]:
@@ -154,7 +147,6 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
         yield _table(SEEN, ('effect', 'size'), [tuple(map(escape, row)) for row in rows])
     yield from _list('Calibrated within their tolerance', words.calibrated, 'blue')
     yield from _list('Suspects', words.suspects, 'yellow')
-    yield from _list('Within model error', words.within_model_error, 'blue')
     yield from _list('Excluded sets', words.barred, 'blue')
     yield from _list('Warnings', words.warnings, 'yellow')
 
@@ -165,10 +157,15 @@ def _headings(diagnosis: Diagnosis) -> tuple[str, ...]:
 
 
 def _effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
-    return [(one.name, sites(one.drives, diagnosis, one.places),
-             _fall(one.error_before, one.error_after),
-             _fall(one.held_out_before, one.held_out_after), f'{one.evidence:.0f}')
-            for one in diagnosis.effects]
+    rows: list[tuple[str, ...]] = [
+        (effect.name, sites(effect.drives, diagnosis, effect.places),
+             _fall(effect.error_before, effect.error_after),
+             _fall(effect.held_out_before, effect.held_out_after), f'{effect.evidence:.0f}')
+            for effect in diagnosis.effects]
+    given = root_mean_square(diagnosis.residuals.error)
+    if abs(diagnosis.refit - given) > LEAST_REFIT * given:
+        rows.append((REFIT, '', _fall(given, diagnosis.refit), '', ''))
+    return rows
 
 
 def _joined(values: Sequence[FittedValue]) -> list[tuple[str, str, str]]:
@@ -352,8 +349,6 @@ def _alternatives(page: Page, diagnosis: Diagnosis, words: Sentences,
                           figures.effect_pictures(diagnosis, rival))
     _sets(page, diagnosis)
     page.folded_list('Suspects, which slow noise explains as well', words.suspects)
-    page.folded_list('Not reported, smaller than the uncertainty of the reported effects',
-                     words.within_model_error)
     page.folded_list('Excluded sets', words.barred)
 
 
@@ -394,7 +389,8 @@ def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep])
             (one.name, f'{one.evidence:.0f}', f'{one.error_before:.3f}', f'{one.error_after:.3f}',
              f'{one.held_out_before:.3f}', f'{one.held_out_after:.3f}',
              sites(one.drives, diagnosis, one.places)) for one in diagnosis.effects],
-            caption=f'By error reduction, parameters refitted at every step. Held out: {where}.')
+            caption='Error before: without the force of this effect, all else as fitted. '
+            f'Held out before: fitted without it. Held out: {where}.')
         figures.add_contributions(page, diagnosis.residuals, {
             one.name: one.force for one in diagnosis.effects}, 'What each effect contributes.')
 

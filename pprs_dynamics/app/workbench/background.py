@@ -198,15 +198,16 @@ def main() -> None:
     os.nice(NICENESS)
 
     def send(kind: str, value: Any) -> None:
-        answers.write(pickle.dumps((kind, value), pickle.HIGHEST_PROTOCOL))
-        answers.flush()
+        try:
+            answers.write(pickle.dumps((kind, value), pickle.HIGHEST_PROTOCOL))
+            answers.flush()
+        except BrokenPipeError:
+            os._exit(1)  # the workbench has ended: nobody reads the answer or an error
     try:
         sys.path[:] = pickle.load(sys.stdin.buffer)
         work, arguments = pickle.load(sys.stdin.buffer)
         result = work(*arguments, progress=lambda share: send(SHARE, share))
         content = pickle.dumps((RESULT, result), pickle.HIGHEST_PROTOCOL)
-    except BrokenPipeError:
-        return  # nobody waits any more
     except Exception as error:
         send(ERROR, _carried(error))
         return

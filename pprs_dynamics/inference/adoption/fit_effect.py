@@ -27,8 +27,8 @@ from pprs_dynamics.inference.search.estimates import (
 from pprs_dynamics.inference.search.fitted_model import fitted_model
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import HeldOut, hold_out
-from pprs_dynamics.inference.search.relinearisation import SettledSet, relinearised
-from pprs_dynamics.inference.search.reversal_widths import estimate_widths
+from pprs_dynamics.inference.search.relinearisation import relinearised
+from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.added_body import AddedBody
@@ -131,7 +131,7 @@ def fit_effect(
     candidate = found.effects[0]
     said = estimate(last, found, candidate, request.drives is not None)
     moved = [one for one in calibrations(last, found, widths) if _is_move(design, one)]
-    final = _with_numbers(SettledSet(last, found, widths).model, model, moved)
+    final = _with_numbers(with_widths(fitted_model(last, found), last.design, widths), model, moved)
     prefix = f'effects.{request.name}.'
     parameters = {key: Estimate(float(final.values[prefix + key]), one.std, one.unit)
                   for key, one in said.parameters.items() if prefix + key in final.values}

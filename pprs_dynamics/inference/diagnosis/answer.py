@@ -1,17 +1,17 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What is to be said of a ranking: effects with errors and values, rivals, and the verdict."""
+"""The answer of a table of models: effects with errors and values, rivals, and the verdict."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
-from pprs_dynamics.arrays import root_mean_square
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.cautions import find_cautions
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
@@ -20,30 +20,25 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     RankedEffect,
     RankedSet,
     RivalEffect,
-    WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.localisation import levels
-from pprs_dynamics.inference.diagnosis.quantities import plain
-from pprs_dynamics.inference.diagnosis.statements import (
-    Statement,
-    word_statement,
-)
+from pprs_dynamics.inference.diagnosis.quantities import listed, plain
+from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
+from pprs_dynamics.inference.regression.terms import OperatingPoint
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import rms
-from pprs_dynamics.inference.search.absorbed import Absorbed
 from pprs_dynamics.inference.search.candidates import (
     DURING,
     SINCE,
-    Candidate,
     CandidateSet,
     EffectCandidate,
+    UnknownCandidate,
 )
 from pprs_dynamics.inference.search.constraints import empty_totals
-from pprs_dynamics.inference.search.cost_terms import CostTerms
-from pprs_dynamics.inference.search.courses import changing_drives, with_courses
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.estimates import (
+    Estimate,
     Estimates,
     averaged,
     calibrations,
@@ -52,242 +47,221 @@ from pprs_dynamics.inference.search.estimates import (
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
-    fitted_model,
     linear_error,
     linear_residual,
     model_at,
     parts_of,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.held_out import hold_out, predictive_gain
+from pprs_dynamics.inference.search.held_out import (
+    HeldOut,
+    PredictiveGain,
+    hold_out,
+    predictive_gain,
+)
 from pprs_dynamics.inference.search.noise_floors import noise_floors
 from pprs_dynamics.inference.search.possible_values import why_impossible
-from pprs_dynamics.inference.search.ranking import Ranking
-from pprs_dynamics.inference.search.relinearisation import settled
+from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
+from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.force_model import ForceModel
 
-MOST_SETS, MOST_BARRED = 8, 3  # that are told with their costs, and those that may not be
+MOST_SETS, MOST_BARRED = 8, 3  # rows and inadmissible sets that are listed
 MOST_AVERAGED = 5  # sets that estimates are averaged over
 
 
+def model_of(fits: FittedSets, fitted: CandidateSet) -> ForceModel:
+    """Return the model of a set, with the effects that are there at the end and stay.
+
+    Raises
+    ------
+    ModelError
+        For values that no model may have.
+    """
+    base, placed = parts_of(fits, fitted)
+    return model_at(fits.design, base, [effect for effect, component in zip(
+        placed, fitted.blocks, strict=True)
+        if component.course is None or component.course.kind == SINCE])
+
+
 class Answer:
-    """What is to be said of a ranking."""
+    """What a row of a table says.
 
-    def __init__(self, ranking: Ranking, validate: Sequence[Recording],
-                 decisions: Decisions, try_courses: bool = True) -> None:
-        self.ranking, self.validate, self.decisions = ranking, validate, decisions
-        self.fits, self.map_set, self.reported = ranking.last, ranking.map_set, ranking.reported
-        self.design = self.fits.design
-        self.drives = self.design.drives
-        self.final = settled(self.fits, self.reported)
-        self.remaining = ranking.first.design.residuals.measured - exact_forces(
-            self.design, self.final.model) - self.design.carried_forces(
-                self.final.fitted.fit.coefficients)
+    Parameters
+    ----------
+    table : ModelTable
+    row : Row
+        The reported one.
+    validate : sequence of Recording
+        Held-out recordings; blocks of the fitted ones without any.
+    decisions : Decisions
+    """
+
+    def __init__(self, table: ModelTable, row: Row, validate: Sequence[Recording],
+                 decisions: Decisions) -> None:
+        self.table, self.row, self.validate, self.decisions = table, row, validate, decisions
+        self.fits, self.fitted, self.widths = row.fits, row.fitted, dict[int, float]()
+        self.design, self.given = row.fits.design, table.first.design.residuals
+        self.drives, self.adopted = self.design.drives, model_of(row.fits, row.fitted)
+        self.remaining = self._remaining()
+        if not row.fitted.is_dated:
+            self._fit_widths()
+        self.noise: dict[str, NoiseSpectrum] = {
+            self.drives[d]: spectrum
+            for d, spectrum in self.fits.regression.noise(self.fitted.fit).items()}
+        known = noise_floors(table.last, best=table.reported.fit)
+        # Where the noise is unknown, the residual of the reported set is an upper bound.
+        self.floors = {self.drives[d]: known.get(self.drives[d], self.fits.regression.noise_floor(
+            self.fitted.fit, d)) for d in self.fits.regression.drives}
+        self.unseen = tuple(name for name in self.floors if name not in known)
+
+    def _remaining(self) -> Array:
+        """Return measured minus what the reported model predicts, (M, D) [N]."""
+        if self.fitted.is_dated:
+            return linear_residual(self.fits, self.fitted)
+        remaining = self.given.measured - exact_forces(
+            self.design, self.adopted) - self.design.carried_forces(self.fitted.fit.coefficients)
         for d, series in self.fits.regression.series.items():
-            self.remaining[:, d] -= series.open_forces(self.remaining[:, d])
-        # Before a constant form is believed.
-        self.dated_fits, self.dated = self._with_courses() if try_courses else (
-            self.fits, self.reported)
-        self.is_dated, self.adopted = self.dated is not self.reported, self.final.model
-        if self.is_dated:
-            self.remaining = linear_residual(self.dated_fits, self.dated)
-            self.adopted = self._dated_model()
-        self.effects = self._dated_effects() if self.is_dated else self._effects_reported()
+            remaining[:, d] -= series.open_forces(remaining[:, d])
+        return remaining
 
-    def _with_courses(self) -> tuple[FittedSets, CandidateSet]:
-        """Return the best set in which effects may begin, end or grow, with what it is a set of.
+    def _fit_widths(self) -> None:
+        """Fit the velocities within which friction reverses, where the error falls with them."""
+        widths = estimate_widths(self.fits, self.fitted)
+        if not (widths and self.fitted.effects):
+            return
+        before = vars(self).copy()
+        base, effects = parts_of(self.fits, self.fitted)
+        model = with_widths(self.adopted, self.design, widths)
+        self.fits = FittedSets(self.design.around(OperatingPoint(model, base, effects), alone=True),
+                               self.fits.decisions, self.fits.regression.error_scale)
+        self.fitted = self.fits.refined(self.fits.evaluate(self.fitted.candidates))
+        self.design, self.widths = self.fits.design, widths
+        self.adopted = with_widths(model_of(self.fits, self.fitted), self.design, widths)
+        self.remaining = self._remaining()
+        if root_mean_square(self.remaining) > root_mean_square(before['remaining']):
+            vars(self).update(before)
 
-        Where what was found bends the columns, around the model as given, too, and without it: what
-        is there all the time may imitate what begins, which does not show around its model.
-        What held-out data refute is not tried again.
-        """
-        ranking, reported = self.ranking, self.reported
-        alone = [] if ranking.is_less else list(ranking.alone.values())
-        # Beside the MAP set: what is within the model error of others is none with a date, either.
-        constant = reported if ranking.is_less else self.map_set
-        if not changing_drives(self.fits, constant, alone):
-            return self.fits, reported
-        fits, found = with_courses(self.fits, constant, alone)
-        if alone and ranking.first is not self.fits:
-            kept = ranking.first.evaluate(tuple(
-                candidate for candidate in reported.effects if not candidate.effect.nonlinear))
-            given, there = with_courses(ranking.first, kept, alone,
-                                        min(found.cost, self.map_set.cost))
-            if there is not kept:
-                return given, there
-        return fits, reported if found is constant else found
+    def force(self, candidate: EffectCandidate | UnknownCandidate) -> Array:
+        """Return what a candidate of the row contributes, (M, D) [N]."""
+        return self.fits.components.force(self.fitted, candidate, self.remaining.shape)
+
+    def over_noise(self, error: Array) -> float:
+        """Return the root of the mean square of errors (M, D), each drive over its noise [1]."""
+        return root_mean_square([
+            root_mean_square(error[:, d]) / max(self.floors[self.drives[d]], 1e-300)
+            for d in self.fits.regression.drives])
+
+    def diagnosis(self, unconfirmed: tuple[FoundEffect, ...] = ()) -> Diagnosis:
+        """Return the answer; `unconfirmed`: effects of the table's best row that it lacks."""
+        table, effects = self.table, self.effects
+        rivals = self._rivals()
+        depends = (*self._passing(), *self._depends_on())
+        above = self._above_noise()
+        little = little_explained(self.adopted, table.first.design.residuals, self.remaining,
+                                  self.decisions, self.floors)
+        drifts = any(effect.course is not None and effect.course.kind != SINCE
+                     for effect in effects)
+        verdict = ('unknown' if unconfirmed or depends or above or little or drifts
+                   else 'ambiguous' if rivals else 'effect' if effects else 'adequate')
+        moved = [number for number in calibrations(self.fits, self.fitted, self.widths)
+                 if abs(number.after - number.before) > self.decisions.sure * number.std]
+        refit = root_mean_square(self.remaining + sum(
+            (effect.force for effect in effects), np.zeros_like(self.remaining)))
+        first = table.first.design
+        return Diagnosis(
+            verdict, effects, rivals, unconfirmed, self._candidates(), self._suspects(), depends,
+            self._sets(), self._barred(), tuple(moved),
+            find_cautions(table.last, table.reported, effects), first.notes, first.given,
+            self.adopted, self.given, self.remaining, self.noise, self.floors,
+            root_mean_square(list(self.floors.values())), refit, above, little, self.unseen,
+            'validation' if self.validate else 'blocks', selection=table,
+            decisions=self.decisions)
+
+    # Effects
+
+    @cached_property
+    def effects(self) -> tuple[FoundEffect, ...]:
+        """Effects of the row; those whose force removes most of the error first."""
+        found = [self._effect(candidate) for candidate in Row(self.fits, self.fitted).effects]
+        return tuple(sorted(found, key=lambda effect: -effect.share))
+
+    def _effect(self, candidate: EffectCandidate) -> FoundEffect:
+        fits, fitted, force = self.fits, self.fitted, self.force(candidate)
+        estimates = averaged(estimate(fits, fitted, candidate, fitted.is_dated),
+                             self._nearly(candidate))
+        parameters = estimates.parameters
+        without = self.table.without(candidate)
+        with_force, less = self.over_noise(self.remaining), self.over_noise(self.remaining + force)
+        before, after, gain = self._held_out(candidate)
+        begun = self.table.first.design.reconstructions[0].start
+        course = candidate.course
+        return FoundEffect(
+            candidate.effect, self.design.named(candidate.drives), parameters, force,
+            without.cost - self.table.best.cost, root_mean_square(self.remaining + force),
+            root_mean_square(self.remaining), before, after, estimates.at_bound,
+            (less - with_force) / max(self.over_noise(self.given.error), 1e-300),
+            float('nan') if gain is None else gain.certainty,
+            self._objection(candidate, parameters, less / max(with_force, 1e-300), gain),
+            self._ranked_set(without), self._in_model(candidate, parameters),
+            None if course is None else replace(
+                course, begin=course.begin - begun, end=course.end - begun), estimates.moments)
+
+    def _objection(self, candidate: EffectCandidate, parameters: Mapping[str, Estimate],
+                   ratio: float, gain: PredictiveGain | None) -> str:
+        """Return why an effect of the row is no finding, as a clause; '' where it is one."""
+        impossible = why_impossible(candidate.effect, parameters, self.decisions)
+        if impossible:
+            return impossible
+        if self.fitted.terms.feasibility > self.decisions.rival_margin:
+            for component in candidate.components:
+                if component.drive is not None:
+                    for of in empty_totals(self.design, self.fitted, component):
+                        return (f'{self.drives[component.drive]} would have less than no {of} '
+                                'with what the model has')
+        if ratio < 1 - self.decisions.error_rise:
+            return f'without its force the error is {1 - ratio:.0%} smaller'
+        if gain is None or not np.isfinite(gain.certainty):
+            return 'held-out data cannot confirm it'
+        if gain.certainty < -self.decisions.sure:
+            return ('held-out data are predicted worse with it, by '
+                    f'{-gain.certainty:.2g} standard errors in units of the noise')
+        if gain.losing and gain.certainty < self.decisions.sure:
+            return f'held-out data of {listed(gain.losing)} are predicted worse with it'
+        return ''
 
     @property
     def raises_the_error(self) -> bool:
-        """Whether a model with what is reported is clearly worse than the given one.
+        """Whether the error with the reported effects is larger than that of the input model."""
+        return bool(self.row.effects) and self.over_noise(self.remaining) > (
+            1 + self.decisions.error_rise) * self.over_noise(self.given.error)
 
-        Where the linear forces of a set mean nothing, as of a recording in other units.
-        """
-        given = root_mean_square(self.ranking.first.design.residuals.error)
-        return root_mean_square(self.remaining) > (1 + self.decisions.noise_accuracy) * given
-
-    def diagnosis(self, unconfirmed: tuple[FoundEffect, ...]) -> Diagnosis:
-        first, final, effects = self.ranking.first.design, self.final, self.effects
-        regression = self.fits.regression
-        noise = {self.drives[d]: spectrum
-                 for d, spectrum in regression.noise(self.map_set.fit).items()}
-        seen = noise_floors(self.fits, best=self.map_set.fit)
-        # Where the noise cannot be told it is at most what the best set leaves.
-        floors = {self.drives[d]: seen.get(self.drives[d], regression.noise_floor(
-            self.map_set.fit, d)) for d in regression.drives}
-        rivals = self._rivals()
-        if self.is_dated:
-            # What imitates a constant form is no rival of one that changes.
-            rivals = {}
-            noise, floors = self._noise_beside_courses()
-        depends = self._depends_on(noise)
-        if self.is_dated:
-            depends = (*self._passing(), *depends)
-        sets = tuple((name, *others) for name, others in rivals.items() if others)
-        above = self._above_noise(floors)
-        little = little_explained(self.adopted, first.residuals, self.remaining, self.decisions)
-        passing = any(effect.course is not None and effect.course.kind != SINCE
-                      for effect in effects)
-        verdict = ('unknown' if depends or above or little or passing else 'ambiguous' if sets
-                   else 'effect' if effects else 'adequate')
-        moved = [number for number in calibrations(final.fits, final.fitted, final.widths)
-                 if abs(number.after - number.before) > self.decisions.sure * number.std]
-        absorbed = () if self.is_dated else self.ranking.absorbed
-        return Diagnosis(
-            verdict, tuple(effects), sets, unconfirmed, self._candidates(),
-            self._suspects(), depends, tuple(map(self._within_model_error, absorbed)),
-            self._sets(), self._barred(), tuple(moved),
-            find_cautions(self.fits, self.map_set, effects), first.notes,
-            first.given, self.adopted, first.residuals, self.remaining, noise, floors,
-            root_mean_square(list(floors.values())), above, little,
-            tuple(name for name in floors if name not in seen),
-            'validation' if self.validate else 'blocks', selection=self.ranking,
-            decisions=self.decisions)
-
-    def _effects_reported(self) -> list[FoundEffect]:
-        """Return the effects of the reported set, with the errors as one after another joins."""
-        order, path = self.ranking.order, self.ranking.path
-        if not order:
-            return []
-        errors = [root_mean_square(self.ranking.first.design.residuals.error),
-                  *(linear_error(self.fits, step) for step in path[1:-1]),
-                  root_mean_square(self.remaining)]
-        held_out = self._errors_held_out(errors[0])
-        return [self._effect(candidate, self.ranking.shares[k], errors[k:k + 2], held_out[k:k + 2])
-                for k, candidate in enumerate(order)]
-
-    def _errors_held_out(self, given: float) -> list[float]:
-        """Return the held-out errors of the given model, and with one effect after the other."""
-        path = self.ranking.path
+    def _held_out(self, candidate: EffectCandidate) -> tuple[float, float, PredictiveGain | None]:
+        """Return held-out errors without and with an effect, and its gain where it is known."""
+        fits, fitted = self.fits, self.fitted
+        less = fitted.without(candidate)
         if not self.validate:
-            # Nothing is fitted in the model as given: all of its error is held out.
-            return [given, *(hold_out(self.fits, step).error for step in path[1:])]
-        models = [self.ranking.first.design.given,
-                  *(settled(self.fits, step).model for step in path[1:-1]), self.final.model]
-        return [rms(measure_residuals(model, self.validate)[0]) for model in models]
+            without = hold_out(fits, fits.at_noise_of(fitted, less))
+            return without.error, self._blocks.error, without.gain(self._blocks)
+        try:
+            before, after = (measure_residuals(model, self.validate)[0] for model in (
+                model_of(fits, fits.evaluate(less)), self.adopted))
+        except PprsError:
+            return float('nan'), float('nan'), None
+        return rms(before), rms(after), predictive_gain(before, after)
 
-    def _effect(self, candidate: EffectCandidate, share: float, errors: Sequence[float],
-                held_out: Sequence[float]) -> FoundEffect:
-        """Return an effect of the reported set, with the errors before it and with it."""
-        final = self.final
-        last = next(c for c in final.fitted.effects if c.effect is candidate.effect)
-        estimates = averaged(estimate(final.fits, final.fitted, last), self._nearly(candidate))
-        parameters = estimates.parameters
-        without = self._told(self.ranking.best_without(candidate),
-                             self.ranking.best_with(candidate))
-        impossible = why_impossible(candidate.effect, parameters, self.decisions) or (
-            self._why_less_than_nothing(candidate))
-        return FoundEffect(
-            candidate.effect, self.design.named(candidate.drives), parameters,
-            final.fits.components.force(final.fitted, last, self.remaining.shape), without.cost,
-            errors[0], errors[1], held_out[0], held_out[1], estimates.at_bound, share,
-            self._certainty(candidate), impossible, without,
-            self._in_model(candidate, parameters), moments=estimates.moments)
-
-    def _why_less_than_nothing(self, candidate: EffectCandidate) -> str:
-        """Return where recordings speak for less than no friction or inertia, as a clause."""
-        if self.reported.terms.feasibility <= self.decisions.rival_margin:
-            return ''
-        return next((f'{self.drives[component.drive]} would have less than no {of} with what the '
-                     'model has' for component in candidate.components
-                     if component.drive is not None
-                     for of in empty_totals(self.design, self.reported, component)), '')
-
-    def _dated_effects(self) -> list[FoundEffect]:
-        """Return the effects where some begin, end or grow within the recordings."""
-        fits, found = self.dated_fits, self.dated
-        begun = self.ranking.first.design.reconstructions[0].start
-        given = self.ranking.first.design.residuals.error
-        steps = [fits.evaluate(found.effects[:k]) for k in range(1, len(found.effects))] + [found]
-        errors = [root_mean_square(given), *(linear_error(fits, step) for step in steps)]
-        held_out = [errors[0], *(hold_out(fits, step).error for step in steps)]
-        effects = []
-        for k, candidate in enumerate(found.effects):
-            course = candidate.course
-            if course is not None and course.kind == DURING:
-                continue  # what passes is no property of the machine
-            estimates = estimate(fits, found, candidate, are_drives_known=True)
-            effects.append(FoundEffect(
-                candidate.effect, self.design.named(candidate.drives), estimates.parameters,
-                fits.components.force(found, candidate, self.remaining.shape),
-                fits.evaluate(found.without(candidate)).total - found.total, errors[k],
-                errors[k + 1], held_out[k], held_out[k + 1], estimates.at_bound,
-                (errors[k] - errors[k + 1]) / errors[0],
-                objection=why_impossible(candidate.effect, estimates.parameters, self.decisions),
-                in_model=self._in_model(candidate, estimates.parameters),
-                course=None if course is None else replace(
-                    course, begin=course.begin - begun, end=course.end - begun),
-                moments=estimates.moments))
-        return effects
-
-    def _passing(self) -> list[Statement]:
-        """Return what was there for a stretch alone, drive by drive."""
-        residuals = self.ranking.first.design.residuals
-        begun = self.ranking.first.design.reconstructions[0].start
-        found, fits = self.dated, self.dated_fits
-        statements = []
-        for candidate in found.effects:
-            course = candidate.course
-            if course is None or course.kind != DURING:
-                continue
-            force = fits.components.force(found, candidate, self.remaining.shape)
-            span = (course.begin - begun, course.end - begun)
-            inside = (residuals.time >= course.begin) & (residuals.time < course.end)
-            evidence = fits.evaluate(found.without(candidate)).total - found.total
-            for d in np.flatnonzero(np.any(force, axis=0)):
-                squares = np.square(residuals.error[:, d])
-                share = float(np.nansum(squares[inside]) / np.nansum(squares))
-                size = root_mean_square(force[inside, d])
-                statements.append(Statement(
-                    self.drives[d], 'time', span, share, float(np.mean(inside)),
-                    f'{self.drives[d]}: from {span[0]:.4g} s to {span[1]:.4g} s alone its error is '
-                    f'another, {plain(size)} {residuals.units_of(self.drives[d]).effort} rms, as '
-                    f'of a contact, a stop or a hand ({candidate.name} would explain it): what '
-                    'passes is no property of the machine',
-                    evidence, 'range', size, float(np.mean(force[:, d] ** 2))))
-        return statements
-
-    def _dated_model(self) -> ForceModel:
-        """Return the model with what is there at the end, and stays."""
-        base, placed = parts_of(self.dated_fits, self.dated)
-        there = [effect for effect, component in zip(placed, self.dated.blocks, strict=True)
-                 if component.course is None or component.course.kind == SINCE]
-        return model_at(self.design, base, there)
-
-    def _noise_beside_courses(self) -> tuple[dict[str, NoiseSpectrum], dict[str, float]]:
-        regression, fit = self.dated_fits.regression, self.dated.fit
-        return ({self.drives[d]: spectrum for d, spectrum in regression.noise(fit).items()},
-                {self.drives[d]: regression.noise_floor(fit, d) for d in regression.drives})
+    @cached_property
+    def _blocks(self) -> HeldOut:
+        return hold_out(self.fits, self.fitted)
 
     def _in_model(self, candidate: EffectCandidate, keys: Iterable[str]) -> dict[str, float]:
-        """Return what the given model says of an effect; nothing where it lacks it.
+        """Return the parameters that the input model has of an effect; none where it lacks it.
 
-        Of links and joints only those that it is on are told.
+        Of links and joints only those that the effect is on.
         """
         found = {}
         for component in candidate.components:
-            values = self.ranking.first.design.present(component.effect, component.drive)
+            values = self.table.first.design.present(component.effect, component.drive)
             prefix = '' if component.drive is None else f'{self.drives[component.drive]}.'
             found.update({prefix + name: float(value) for name, value in (values or {}).items()
                           if prefix + name in keys})
@@ -298,87 +272,104 @@ class Answer:
             if c.name in component.names) else {}
 
     def _nearly(self, candidate: EffectCandidate) -> list[tuple[float, Estimates]]:
-        """Return what sets that are nearly as good say of an effect, and what they cost more."""
-        near = self.ranking.nearly(self.decisions.rival_margin)[:MOST_AVERAGED]
-        return [(cost, estimate(self.fits, fitted, same)) for cost, fitted in near
-                for same in fitted.effects if same.effect is candidate.effect]
+        """Return estimates of an effect by sets that cost nearly as little, and what they cost."""
+        near = self.table.near(self.decisions.rival_margin)[:MOST_AVERAGED]
+        return [(cost, estimate(self.table.last, fitted, same)) for cost, fitted in near
+                for same in fitted.effects
+                if same.effect is candidate.effect and same.course == candidate.course]
 
-    def _certainty(self, candidate: EffectCandidate) -> float:
-        """Return by how many standard errors held-out data are predicted better with an effect."""
-        without = self.ranking.without[candidate]
-        if not self.validate:
-            at_noise = self.fits.at_noise_of(self.reported, without.candidates)
-            return hold_out(self.fits, at_noise).gain(hold_out(self.fits, self.reported)).certainty
-        before, after = (measure_residuals(one, self.validate)[0] for one in (
-            settled(self.fits, without).model, self.final.model))
-        return predictive_gain(before, after).certainty
-
-    def _above_noise(self, floors: Mapping[str, float]) -> dict[str, float]:
-        """Return the drives that keep more than noise and forms leave, as multiples of noise."""
-        found = {}
-        for d in self.fits.regression.drives:
-            floor = max(floors[self.drives[d]], 1e-300)
-            # A constant that slow noise would show as well is none of it.
-            kept = float(np.nanstd(self.remaining[:, d])) / floor
-            allowed = np.hypot(self.decisions.left_ratio, self._lack_of_fit[d] / floor)
-            if kept > allowed and self._is_worth_a_word(d):
-                found[self.drives[d]] = kept
-        return found
-
-    def _is_worth_a_word(self, d: int) -> bool:
-        """Return whether what is left on a drive is more than a negligible share of its effort."""
-        effort = self.ranking.first.design.residuals.measured[:, d]
-        return float(np.nanstd(self.remaining[:, d])) > (
-            self.decisions.negligible * float(np.nanstd(effort)))
-
-    def _evidence(self, candidate: Candidate) -> float:
-        return self.ranking.without[candidate].total - self.reported.total
-
-    def _rivals(self) -> dict[str, list[str]]:
-        """Return, for each adopted effect, what stands for it in sets that are nearly as good."""
-        rivals: dict[str, list[str]] = {c.name: [] for c in self.reported.effects}
-        for rival in self.ranking.rivals(self.decisions.rival_margin):
-            for name in rival.missing:
-                rivals[name] += [one for one in rival.instead if one not in rivals[name]]
-        return rivals
-
-    def _depends_on(self, noise: dict[str, NoiseSpectrum]) -> tuple[Statement, ...]:
-        statements = []
-        by_drive = {pattern.d: pattern for pattern in self.ranking.patterns}
-        for candidate in self.dated.unknowns:
-            evidence = (self.dated_fits.evaluate(self.dated.without(candidate)).total
-                        - self.dated.total if self.is_dated else self._evidence(candidate))
-            for d, block in candidate.parts.items():
-                statements.append(word_statement(
-                    by_drive[d], candidate, self.dated.fit.of(block), evidence))
-        drifting = levels(self.fits.regression.residuals, dict(noise), self.decisions)
-        statements += [statement for name, statement in drifting.items()
-                       if statement.amplitude > self._lack_of_fit[self.drives.index(name)]]
-        return tuple(sorted(statements, key=lambda one: -one.evidence))
+    # Residual
 
     @cached_property
-    def _lack_of_fit(self) -> list[float]:
-        """What the forms of the adopted effects may leave, by drive, rms [N].
+    def _form_error(self) -> list[float]:
+        """Form error of the idealised effects of the row, by drive, rms [N].
 
-        A share of their sum: what others nearly cancel is no force of a machine.
+        A share of the sum of their forces: two forces that cancel are no force of a machine.
         """
         force = np.zeros(self.remaining.shape)
-        for candidate in self.dated.effects:
+        for candidate in self.fitted.effects:
             if candidate.effect.idealised:
-                force += self.dated_fits.components.force(self.dated, candidate,
-                                                          self.remaining.shape)
+                force += self.force(candidate)
         return [self.decisions.form_share * root_mean_square(of_drive) for of_drive in force.T]
+
+    def _above_noise(self) -> dict[str, float]:
+        """Return the drives with more residual than noise and forms explain, over the noise."""
+        found = {}
+        for d in self.fits.regression.drives:
+            floor = max(self.floors[self.drives[d]], 1e-300)
+            # A constant may be slow noise.
+            ratio = float(np.nanstd(self.remaining[:, d])) / floor
+            allowed = min(float(np.hypot(self.decisions.left_ratio, self._form_error[d] / floor)),
+                          self.decisions.most_left)
+            effort = float(np.nanstd(self.given.measured[:, d]))
+            if ratio > allowed and ratio * floor > self.decisions.negligible * effort:
+                found[self.drives[d]] = ratio
+        return found
+
+    def _passing(self) -> Iterator[Statement]:
+        """Yield a statement for each drive on which something is there for a stretch alone."""
+        residuals = self.table.first.design.residuals
+        begun = self.table.first.design.reconstructions[0].start
+        for candidate in self.fitted.effects:
+            course = candidate.course
+            if course is None or course.kind != DURING:
+                continue
+            force = self.force(candidate)
+            span = (course.begin - begun, course.end - begun)
+            inside = (residuals.time >= course.begin) & (residuals.time < course.end)
+            evidence = (self.fits.evaluate(self.fitted.without(candidate)).total
+                        - self.fitted.total)
+            for d in np.flatnonzero(np.any(force, axis=0)):
+                squares = np.square(residuals.error[:, d])
+                share = float(np.nansum(squares[inside]) / np.nansum(squares))
+                size = root_mean_square(force[inside, d])
+                yield Statement(
+                    self.drives[d], 'time', span, share, float(np.mean(inside)),
+                    f'{self.drives[d]}: from {span[0]:.4g} s to {span[1]:.4g} s alone its error is '
+                    f'another, {plain(size)} {residuals.units_of(self.drives[d]).effort} rms, as '
+                    f'of a contact, a stop or a hand ({candidate.name} would explain it): what '
+                    'passes is no property of the machine',
+                    evidence, 'range', size, float(np.mean(force[:, d] ** 2)))
+
+    def _depends_on(self) -> tuple[Statement, ...]:
+        """Return patterns of no catalogue, and drives whose slow noise exceeds that of others."""
+        statements = []
+        by_drive = {pattern.d: pattern for pattern in self.table.patterns}
+        for candidate in self.fitted.unknowns:
+            evidence = (self.fits.evaluate(self.fitted.without(candidate)).total
+                        - self.fitted.total)
+            for d, block in candidate.parts.items():
+                statements.append(word_statement(
+                    by_drive[d], candidate, self.fitted.fit.of(block), evidence))
+        statements += [
+            statement for name, statement in levels(
+                self.fits.regression.residuals, dict(self.noise), self.decisions).items()
+            if statement.amplitude > self._form_error[self.drives.index(name)]]
+        return tuple(sorted(statements, key=lambda statement: -statement.evidence))
+
+    # Queries on the table
+
+    def _rivals(self) -> tuple[tuple[str, ...], ...]:
+        """Return each reported effect that has rivals, with their names."""
+        rivals: dict[str, list[str]] = {c.name: [] for c in self.row.effects}
+        for rival in self.table.rivals(self.decisions.rival_margin):
+            for name in rival.missing:
+                if name in rivals:
+                    rivals[name] += [other for other in rival.instead if other not in rivals[name]]
+        return tuple((name, *others) for name, others in rivals.items() if others)
 
     def _candidates(self) -> tuple[RankedEffect, ...]:
         """Return the effects that were fitted as the only one, the best first."""
-        none = self.ranking.nothing.cost
-        return tuple(self._ranked(self.ranking.first, fitted, fitted.effects[0], none - fitted.cost)
-                     for fitted in self.ranking.alone.values())
+        first = self.table.first
+        none = first.evaluate(()).cost
+        return tuple(self._ranked(first, fitted, fitted.effects[0], none - fitted.cost)
+                     for fitted in self.table.alone.values())
 
     def _suspects(self) -> tuple[RankedEffect, ...]:
-        """Return effects that nearly pay beside those adopted: slow noise would do as well."""
-        return tuple(self._ranked(self.fits, fitted, candidate, self.map_set.cost - fitted.cost)
-                     for candidate, fitted in self.ranking.suspects(self.decisions.suspect_margin))
+        """Return effects that are nearly worth their prior cost beside the reported ones."""
+        return tuple(
+            self._ranked(row.fits, row.fitted, candidate, self.table.best.cost - row.cost)
+            for candidate, row in self.table.suspects(self.decisions.suspect_margin))
 
     def _ranked(self, fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
                 evidence: float) -> RankedEffect:
@@ -386,46 +377,58 @@ class Answer:
                             linear_error(fits, fitted))
 
     def _sets(self) -> tuple[RankedSet, ...]:
-        if self.is_dated:
-            # Those of the search are of constant forms.
-            return (RankedSet(tuple((c.name, self.design.named(c.drives))
-                                    for c in self.dated.candidates), CostTerms()),)
-        # Of a linear set the cost is that in the first design. Less than the best, of which the
-        # exact one is known, it is where that design means nothing any more.
-        best, *others = self._of_each_name(self.ranking.sets, MOST_SETS)
-        return (best, *sorted((fitted for fitted in others if fitted.cost >= 0),
-                              key=lambda fitted: fitted.cost))
+        return tuple(map(self._ranked_set, self.table.rows[:MOST_SETS]))
+
+    def _ranked_set(self, row: Row) -> RankedSet:
+        names = tuple((c.name, self.design.named(c.drives)) for c in row.fitted.candidates)
+        return RankedSet(names, row.terms - self.table.best.terms)
 
     def _barred(self) -> tuple[RankedSet, ...]:
-        """Return the sets that would be rivals, or better, and may not be."""
-        return self._of_each_name(self.ranking.barred(self.decisions.rival_margin), MOST_BARRED)
-
-    def _of_each_name(self, sets: Iterable[CandidateSet], most: int) -> tuple[RankedSet, ...]:
-        """Return the first set of every choice of names."""
+        """Return inadmissible sets that would be rivals or better, the cheapest of each names."""
         found: dict[frozenset[str], RankedSet] = {}
-        for fitted in sets:
-            told = self._told(fitted, self.map_set)
-            found.setdefault(frozenset(name for name, _ in told.names), told)
-            if len(found) == most:
-                break
-        return tuple(found.values())
+        for fitted in self.table.barred(self.decisions.rival_margin):
+            names = tuple((c.name, self.design.named(c.drives)) for c in fitted.candidates)
+            found.setdefault(frozenset(name for name, _ in names), RankedSet(
+                names, fitted.terms - self.table.best.terms, fitted.barred))
+        return tuple(found.values())[:MOST_BARRED]
 
-    def _told(self, fitted: CandidateSet, best: CandidateSet) -> RankedSet:
-        """Return a set against another one."""
-        names = tuple((c.name, self.design.named(c.drives)) for c in fitted.candidates)
-        return RankedSet(names, self.ranking.difference(fitted, best), fitted.barred)
 
-    def _within_model_error(self, absorbed: Absorbed) -> WithinModelError:
-        force = self.fits.components.force(absorbed.beside, absorbed.candidate,
-                                           self.design.residuals.measured.shape)
-        return WithinModelError(
-            absorbed.candidate.name, self.design.named(absorbed.candidate.drives),
-            float(np.sqrt(np.mean(force ** 2, axis=0)).max()), absorbed.of)
+def answer_of(table: ModelTable, validate: Sequence[Recording], decisions: Decisions) -> Diagnosis:
+    """Return the answer of a table.
+
+    Its effects are those of the row of least cost. Where one of them is no finding, the verdict is
+    `unknown`, and it is listed as unconfirmed; where it is impossible or the error rises, so are
+    all that were fitted beside it.
+    """
+    answer = Answer(table, table.best, validate, decisions)
+    unconfirmed: list[FoundEffect] = []
+    if answer.raises_the_error:
+        unconfirmed = [replace(effect, objection='the error of a model with the reported effects '
+                               'is larger than without') for effect in answer.effects]
+    else:
+        unconfirmed = _objected(answer)
+    if unconfirmed:
+        names = {effect.name for effect in unconfirmed}
+        rest = tuple(c for c in table.best.fitted.candidates if c.name not in names)
+        fits = table.best.fits
+        answer = Answer(table, Row(fits, fits.evaluate(rest), 0.0), validate, decisions)
+    return answer.diagnosis(tuple(unconfirmed))
+
+
+def _objected(answer: Answer) -> list[FoundEffect]:
+    """Return the effects that are no finding."""
+    objected = [effect for effect in answer.effects if effect.objection]
+    impossible = [effect.name for effect in objected if not effect.is_only_refuted]
+    if not impossible:
+        return objected
+    return [*objected, *(
+        replace(effect, objection=f'it was found beside {listed(impossible)}, which cannot be')
+        for effect in answer.effects if not effect.objection)]
 
 
 def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
                   ) -> tuple[RivalEffect, ...]:
-    """Return each rival that a diagnosis names, from the best set that holds it.
+    """Return each rival that a diagnosis names, from the cheapest row that has it.
 
     Parameters
     ----------
@@ -433,33 +436,33 @@ def rival_effects(diagnosis: Diagnosis, validate: Sequence[Recording] = (),
     validate : sequence of Recording, optional
         Those of the diagnosis; without them held-out errors are taken on blocks.
     """
-    selection = diagnosis.selection
-    if selection is None:
+    table = diagnosis.selection
+    if table is None:
         return ()
     found = []
-    adopted = {c.name: c.placed_name for c in selection.reported.effects}
+    adopted = {c.name: c.placed_name for c in table.best.effects}
     for of, name in ((names[0], name) for names in diagnosis.indistinguishable
                      for name in names[1:]):
-        best = next((fitted for fitted in selection.sets
-                     if any(name in (c.name, c.placed_name) for c in fitted.effects)
-                     and adopted[of] not in {c.placed_name for c in fitted.effects}), None)
-        if best is None:
+        row = next((row for row in table.rows
+                    if any(name in (c.name, c.placed_name) for c in row.effects)
+                    and adopted[of] not in row.placed_names), None)
+        if row is None:
             continue
-        fits = selection.fits_of(best)
-        candidate = next(c for c in best.effects if name in (c.name, c.placed_name))
-        remaining = linear_residual(fits, best)
+        candidate = next(c for c in row.effects if name in (c.name, c.placed_name))
+        remaining = linear_residual(row.fits, row.fitted)
         found.append(RivalEffect(
-            candidate.effect, fits.design.named(candidate.drives),
-            estimate(fits, best, candidate).parameters,
-            fits.components.force(best, candidate, remaining.shape), of, linear_error(fits, best),
-            _held_out(fits, best, validate), best.cost - selection.map_set.cost, remaining))
+            candidate.effect, row.fits.design.named(candidate.drives),
+            estimate(row.fits, row.fitted, candidate).parameters,
+            row.fits.components.force(row.fitted, candidate, remaining.shape), of,
+            linear_error(row.fits, row.fitted), _held_out_error(row, validate),
+            row.cost - table.best.cost, remaining))
     return tuple(found)
 
 
-def _held_out(fits: FittedSets, fitted: CandidateSet, validate: Sequence[Recording]) -> float:
+def _held_out_error(row: Row, validate: Sequence[Recording]) -> float:
     if not validate:
-        return hold_out(fits, fitted).error
+        return hold_out(row.fits, row.fitted).error
     try:
-        return rms(measure_residuals(fitted_model(fits, fitted), validate)[0])
+        return rms(measure_residuals(model_of(row.fits, row.fitted), validate)[0])
     except PprsError:
         return float('nan')

@@ -9,9 +9,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
-from pprs_dynamics.inference.search.candidates import SINCE, CandidateSet
+from pprs_dynamics.inference.search.candidates import SINCE, CandidateSet, Component
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.physics.effects.catalogue import catalogue
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint
 from pprs_dynamics.physics.effects.laws.lost_motion import LostMotion
 
@@ -22,7 +25,7 @@ def find_cautions(
     """Return sentences, the graver first."""
     return (*fits.design.given.faults, *_courses(effects), *_length(fits, best), *_motion(fits),
             *_filtered(fits), *_second_encoders(fits, effects),
-            *_unexcited(fits, best), *_bounds(effects))
+            *_unexcited(fits, best), *_bounds(effects), *_one_load(fits, effects))
 
 
 def _length(fits: FittedSets, best: CandidateSet) -> Iterator[str]:
@@ -143,3 +146,23 @@ def _bounds(effects: Sequence[FoundEffect]) -> Iterator[str]:
         if effect.at_bound:
             yield (f'{effect.name}: {", ".join(effect.at_bound)} stands at the edge of what was '
                    'tried; its value is not to be trusted')
+
+
+def _one_load(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterator[str]:
+    """Name friction by load that friction which does not follow the load replaces nearly."""
+    for effect in effects:
+        other = catalogue().get(effect.effect.at_one_load)
+        if other is None or not issubclass(other, DriveEffect):
+            continue
+        for name in effect.drives or ():
+            d = fits.design.drives.index(name)
+            force = effect.force[:, d]
+            rows = np.concatenate([fits.components.term(Component.of(
+                other, d, {}, names)).rows[d] for names in other.variants[-1:]])
+            moving = fits.design.moving(d) & np.isfinite(force)
+            wanted, columns = force[moving], rows[:, moving]
+            rest = wanted - np.linalg.lstsq(columns.T, wanted, rcond=None)[0] @ columns
+            if root_mean_square(rest) < fits.decisions.one_load * root_mean_square(wanted):
+                yield (f'{effect.name} on {name} and {other.name} differ by less than '
+                       f'{fits.decisions.one_load:.0%} here: the load hardly varies. Record '
+                       'another load to separate them')

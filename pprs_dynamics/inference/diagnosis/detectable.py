@@ -11,13 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.regression.base_columns import units_of
-from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.model_discrepancy import lack_of_fit
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 
@@ -54,7 +51,7 @@ def detectable_sizes(fits: FittedSets, fitted: CandidateSet) -> tuple[Detectable
 
     Each by itself, at the noise of the set, as it stands: where the deviance is expected to fall
     by the prior cost of the effect, and by as much again as rivals are apart; and where its force
-    is beyond the lack of fit of all else, or stands out of the noise of a drive. For a coefficient
+    is beyond the form errors of the other effects. For a coefficient
     c of own information S and prior precision L the deviance falls by
     (c S)^2 / (S + L) - ln(1 + S / L).
 
@@ -78,11 +75,9 @@ def detectable_sizes(fits: FittedSets, fitted: CandidateSet) -> tuple[Detectable
         candidate = EffectCandidate.of([component])
         asked = (fits.components.prior_cost(candidate).total
                  + fits.decisions.rival_margin + np.log1p(information / prior))
-        lack, _ = lack_of_fit(fits.design, fits.regression, fits.decisions, fitted, candidate,
-                              set(block.rows))
-        beyond_forms = min(np.sqrt(lack / information),
-                           _standing_out(fits, fitted, block, information))
-        c = np.array([max(np.sqrt(asked * (information + prior)) / information, beyond_forms)])
+        beside, _ = fits.form_errors.beside(fitted, candidate, set(block.rows), False)
+        c = np.array([max(np.sqrt(asked * (information + prior)) / information,
+                          np.sqrt(beside / information))])
         units = units_of(fits.design.given, component.drive)
         values = component.values(c)
         numbers = [p for p in component.effect.linear if values[p.name]]
@@ -93,17 +88,6 @@ def detectable_sizes(fits: FittedSets, fitted: CandidateSet) -> tuple[Detectable
         found.append(DetectableSize(component.effect, drive, parameter,
                                     abs(values[parameter.name]), units.of(parameter.unit)))
     return tuple(found)
-
-
-def _standing_out(fits: FittedSets, fitted: CandidateSet, block: Block, information: float,
-                  ) -> float:
-    """Return the coefficient with which what is left of a drive stands out of its noise."""
-    regression = fits.regression
-    share = information / sum(float(rows[0] ** 2 @ regression.series[d].spread(
-        regression.weights(fitted.fit, d))) for d, rows in block.rows.items())
-    sizes = [root_mean_square(rows) / max(regression.noise_floor(fitted.fit, d), 1e-300)
-             for d, rows in block.rows.items()]
-    return float(np.sqrt((fits.decisions.left_ratio ** 2 - 1) / share)) / max(sizes)
 
 
 def _of_one_number(fits: FittedSets) -> Iterator[Component]:

@@ -9,15 +9,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from pprs_dynamics.errors import MotionError
-from pprs_dynamics.inference.diagnosis.answer import Answer
+from pprs_dynamics.inference.diagnosis.answer import Answer, answer_of
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
-from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
-from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.diagnosis.statements import word_stick_slip
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.readings.measured_effort import looks_like
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
-from pprs_dynamics.inference.search.ranking import select, without_search
+from pprs_dynamics.inference.search.table import input_model_alone, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.measurement.motion.stick_slip import sticking_drives
@@ -68,43 +66,15 @@ def diagnose(
         drive: slip for drive, slip in sticking_drives(recordings).items()
         if slip.share > decisions.stick_slip}
     if other or sticking:
-        bare = Answer(without_search(model, recordings, decisions, report), validate, decisions,
-                      try_courses=False).diagnosis(())
+        table = input_model_alone(model, recordings, decisions, report)
+        bare = Answer(table, table.best, validate, decisions).diagnosis()
         return replace(bare, verdict='unknown', warnings=(), effort_looks_like=other,
                        stick_slip=sticking, depends_on=tuple(
                            word_stick_slip(drive, slip, bare.residuals)
                            for drive, slip in sticking.items()))
-    answer = Answer(select(model, recordings, decisions, lambda share: report(0.9 * share),
-                           None if reference is None else reference.carried_over),
-                    validate, decisions)
-    since = None if reference is None else SinceReference.of(
-        reference, answer.ranking.first.design)
-    refuted: list[FoundEffect] = []
-    while not (answer.raises_the_error or any(effect.objection for effect in answer.effects)):
-        weak = [effect for effect in answer.effects if effect.certainty < -decisions.sure]
-        if not weak:
-            report(1.0)
-            return replace(answer.diagnosis(tuple(refuted)), since=since)
-        refuted.append(min(weak, key=lambda one: one.evidence))
-        gone = answer.ranking.order[answer.effects.index(refuted[-1])]
-        answer = Answer(answer.ranking.less(gone), validate, decisions)
-    # Whatever stands for what cannot be, or beside it, would be as wrong.
-    found = _raising(answer.effects) if answer.raises_the_error else _all_objected(answer.effects)
-    nothing = Answer(answer.ranking.reporting_nothing(), validate, decisions, try_courses=False)
+    table = tabulate(model, recordings, decisions, lambda share: report(0.9 * share),
+                     None if reference is None else reference.carried_over)
+    since = None if reference is None else SinceReference.of(reference, table.first.design)
+    found = replace(answer_of(table, validate, decisions), since=since)
     report(1.0)
-    return replace(nothing.diagnosis((*refuted, *found)), verdict='unknown', since=since)
-
-
-def _raising(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
-    """Return effects with which the error rises, each with that objection."""
-    return tuple(replace(effect, objection='the error of a model with what was found is larger '
-                         'than without') for effect in effects)
-
-
-def _all_objected(effects: Sequence[FoundEffect]) -> tuple[FoundEffect, ...]:
-    """Return effects of which one cannot be: that first, and the others as found beside it."""
-    impossible = [effect for effect in effects if effect.objection]
-    beside = listed([one.name for one in impossible])
-    return (*impossible,
-            *(replace(effect, objection=f'it was found beside {beside}, which cannot be')
-              for effect in effects if not effect.objection))
+    return found

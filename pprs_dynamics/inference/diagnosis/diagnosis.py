@@ -12,13 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
+from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.diagnosis.detectable import DetectableSize, detectable_sizes
 from pprs_dynamics.inference.diagnosis.found_effects import (
     FoundEffect,
     RankedEffect,
     RankedSet,
-    WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.fit.reference import Reference
@@ -30,7 +29,7 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.estimates import Calibration
 from pprs_dynamics.inference.search.explained_effort import explained_shares
-from pprs_dynamics.inference.search.ranking import Ranking
+from pprs_dynamics.inference.search.table import ModelTable
 from pprs_dynamics.measurement.motion.stick_slip import StickSlip
 from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.system.numbers import finite
@@ -89,7 +88,7 @@ class Diagnosis:
     ----------
     verdict : {'unknown', 'ambiguous', 'effect', 'adequate'}
     effects : tuple of FoundEffect
-        What lowers the error most first.
+        Those of the row of least cost; whose force removes most of the error first.
     indistinguishable : tuple of tuple of str
         Each an adopted effect and its rivals.
     unconfirmed : tuple of FoundEffect
@@ -98,7 +97,6 @@ class Diagnosis:
     candidates, suspects : tuple of RankedEffect
     depends_on : tuple of Statement
         What no effect explains.
-    within_model_error : tuple of WithinModelError
     sets : tuple of RankedSet
         The best sets of the search, the best first.
     barred : tuple of RankedSet
@@ -120,6 +118,8 @@ class Diagnosis:
         Root of the mean square of the noise of each drive [N].
     noise_floor : float
         The same over drives [N].
+    refit : float
+        Error of the input model with its numbers fitted beside the effects, without these [N].
     above_noise : mapping of str to float
         How many times its noise a drive keeps, where that is more than what was found may leave.
     little : mapping of str to float
@@ -134,8 +134,8 @@ class Diagnosis:
         Drives that stick and slip for much of the time: then nothing else is claimed.
     since : SinceReference, optional
         The reference run since which it is told what has changed; None: what the model lacks.
-    selection : Ranking, optional
-        All that was tried, for looking closer.
+    selection : ModelTable, optional
+        All rows that were fitted.
     decisions : Decisions
         With which it was made.
     """
@@ -147,7 +147,6 @@ class Diagnosis:
     candidates: tuple[RankedEffect, ...]
     suspects: tuple[RankedEffect, ...]
     depends_on: tuple[Statement, ...]
-    within_model_error: tuple[WithinModelError, ...]
     sets: tuple[RankedSet, ...]
     barred: tuple[RankedSet, ...]
     calibrated: tuple[Calibration, ...]
@@ -160,6 +159,7 @@ class Diagnosis:
     noise: dict[str, NoiseSpectrum]
     noise_floors: dict[str, float]
     noise_floor: float
+    refit: float = np.nan
     above_noise: Mapping[str, float] = field(default_factory=dict)
     little: Mapping[str, float] = field(default_factory=dict)
     unseen_noise: tuple[str, ...] = ()
@@ -167,7 +167,7 @@ class Diagnosis:
     effort_looks_like: Mapping[str, NoMeasurement] = field(default_factory=dict)
     stick_slip: Mapping[str, StickSlip] = field(default_factory=dict)
     since: SinceReference | None = None
-    selection: Ranking | None = field(default=None, repr=False, compare=False)
+    selection: ModelTable | None = field(default=None, repr=False, compare=False)
     decisions: Decisions = DECISIONS
 
     @cached_property
@@ -183,6 +183,8 @@ class Diagnosis:
         return {
             'verdict': self.verdict,
             'effects': [effect.to_dict() for effect in self.effects],
+            'refit': {'error_before': root_mean_square(self.residuals.error),
+                      'error_after': finite(self.refit)},
             'indistinguishable': [list(names) for names in self.indistinguishable],
             'unconfirmed': [effect.to_dict() for effect in self.unconfirmed],
             'candidates': [candidate.to_dict() for candidate in self.candidates],

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Parts of a diagnosis: effects found and their rivals, ranked sets, what is within model error."""
+"""Parts of a diagnosis: reported effects, their rivals, and ranked sets."""
 
 from __future__ import annotations
 
@@ -94,17 +94,18 @@ class FoundEffect(FittedEffect):
     ----------
     evidence : float
         By which the best set without it, whatever stands there, costs more than that with it.
-    error_before, error_after, held_out_before, held_out_after : float
-        [N], with the effects before it, and with it as well.
+    error_before, error_after : float
+        Without its force, all else as it was fitted, and with it [N].
+    held_out_before, held_out_after : float
+        On held-out data: fitted without it, and with it [N].
     at_bound : tuple of str
         Parameters whose value is none: at the edge of what was tried.
     share : float
-        Of the error that it takes away, beside the effects before it: of the root mean square
-        over drives, each as a multiple of its noise.
+        By which its force alone lowers the error, over the error of the input model: of the root
+        mean square over drives, each in units of its noise.
     certainty : float
-        Standard errors by which all that was found predicts held-out data better than without it,
-        in units of the noise: see `PredictiveGain`. In their rms slow noise and the model's own
-        numbers have a share.
+        Standard errors by which the reported effects predict held-out data better than without
+        it, in units of the noise: see `PredictiveGain`. NaN where that is unknown.
     objection : str
         Why it is no finding whatever the error does, as a clause; '' where nothing speaks against.
     without : RankedSet, optional
@@ -125,12 +126,17 @@ class FoundEffect(FittedEffect):
     held_out_after: float
     at_bound: tuple[str, ...] = ()
     share: float = 0.0
-    certainty: float = np.inf
+    certainty: float = np.nan
     objection: str = ''
     without: RankedSet | None = None
     in_model: Mapping[str, float] = field(default_factory=dict)
     course: Course | None = None
     moments: Mapping[str, Estimate] = field(default_factory=dict)
+
+    @property
+    def is_only_refuted(self) -> bool:
+        """Whether a machine may have it, and only held-out data object."""
+        return self.objection.startswith('held-out')
 
     @property
     def when(self) -> str:
@@ -197,27 +203,6 @@ class RankedEffect:
         """Return the keys of the interface."""
         return {'name': self.name, 'drives': listed(self.drives), 'evidence': self.evidence,
                 'error_after': self.error_after}
-
-
-@dataclass(frozen=True)
-class WithinModelError:
-    """What was found and may be no more than the lack of fit of adopted effects.
-
-    Parameters
-    ----------
-    name : str
-        Of an effect, or `unknown, VARIABLE`.
-    drives : tuple of str or None
-    rms : float
-        Of its force on the drive where it is largest [N].
-    of : tuple of str
-        Whose lack of fit it may be.
-    """
-
-    name: str
-    drives: Drives
-    rms: float
-    of: tuple[str, ...]
 
 
 def listed(drives: Drives) -> list[str] | None:

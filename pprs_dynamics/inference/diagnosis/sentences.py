@@ -17,7 +17,6 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
     RankedEffect,
     RankedSet,
     RivalEffect,
-    WithinModelError,
 )
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, GivenFiles, next_step
 from pprs_dynamics.inference.diagnosis.quantities import (
@@ -120,7 +119,7 @@ class Sentences:
         In the order of those given to `word_diagnosis`.
     unexplained : tuple of Finding
         In the order of `unexplained_groups`.
-    suspects, within_model_error, barred, calibrated, warnings : tuple of str
+    suspects, barred, calibrated, warnings : tuple of str
     following, command : str
         What to do next, in words and for a shell.
     reference : tuple of str
@@ -132,7 +131,6 @@ class Sentences:
     rivals: tuple[Finding, ...]
     unexplained: tuple[Finding, ...]
     suspects: tuple[str, ...]
-    within_model_error: tuple[str, ...]
     barred: tuple[str, ...]
     calibrated: tuple[str, ...]
     warnings: tuple[str, ...]
@@ -161,8 +159,6 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
         tuple(Finding(*describe_unexplained(group, bool(diagnosis.effects)))
               for group in unexplained_groups(diagnosis)),
         tuple(_suspect(diagnosis, suspect) for suspect in diagnosis.suspects),
-        tuple(_within_model_error(diagnosis, absorbed)
-              for absorbed in diagnosis.within_model_error),
         tuple(f'{_set(diagnosis, ranked)} is excluded: {ranked.barred}. It '
               f'{_cost(ranked)}' for ranked in diagnosis.barred),
         tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated),
@@ -228,13 +224,9 @@ def _cost(ranked: RankedSet) -> str:
 def runner_up(diagnosis: Diagnosis) -> str:
     """Return how the second best set differs from the best, and its costs; '' for none.
 
-    By what is told: what is within the model error of others was never named as missing.
+    Sets with other effects in place of the reported ones come before sets with more effects.
     """
-    within = {absorbed.name for absorbed in diagnosis.within_model_error} - {
-        effect.name for effect in diagnosis.effects}
-    untold = within & {name for fitted in diagnosis.sets[:1] for name, _ in fitted.names}
-    sets = [(fitted, {pair for pair in fitted.names if pair[0] not in untold})
-            for fitted in diagnosis.sets]
+    sets = [(fitted, set(fitted.names)) for fitted in diagnosis.sets]
     # What could stand instead says more than what could join.
     differing = [(one, names) for one, names in sets[1:] if names != sets[0][1]]
     following = next((pair for pair in differing if sets[0][1] - pair[1]),
@@ -287,15 +279,15 @@ def _headline(diagnosis: Diagnosis) -> str:
                     for drive, slip in diagnosis.stick_slip.items()]
         return (f'Stick-slip on {listed(sticking)}. No missing effect can be identified in such a '
                 'motion.')
+    left = root_mean_square(diagnosis.remaining)
     fall = '' if not held else (
         f' With {"it" if len(held) == 1 else "them"} the error '
-        f'{change(diagnosis.effects[0].error_before, held[-1].error_after, unit)}')
+        f'{change(root_mean_square(diagnosis.residuals.error), left, unit)}')
     noise = in_unit(diagnosis.noise_floor, unit)
     if diagnosis.little:
         little = word_little(diagnosis.little, ' with the reported effects' if held else '')
         return (f'{little[:1].upper()}{little[1:]}. No effect of the catalogue explains the rest.')
     if not held and not diagnosis.depends_on and diagnosis.unconfirmed:
-        left = root_mean_square(diagnosis.remaining)
         above = (f' The error, {in_unit(left, unit)}, is more than the noise, {noise}.'
                  if left > AT_NOISE * diagnosis.noise_floor else '')
         return f'No effect is supported by held-out data.{above}'
@@ -322,7 +314,7 @@ def _headline(diagnosis: Diagnosis) -> str:
         return (f'No effect is missing: the error is the noise, {noise} rms. Effects much weaker '
                 'than the noise cannot be seen.')
     level = (f'. {unseen}' if unseen else ', which is the noise.'
-             if held[-1].error_after <= AT_NOISE * diagnosis.noise_floor
+             if left <= AT_NOISE * diagnosis.noise_floor
              else f'; the noise is {noise}.')
     which = ' (the data do not separate these)' if any(
         _rivals(diagnosis, effect) for effect in held) else ''
@@ -464,7 +456,8 @@ def _why(diagnosis: Diagnosis, effect: FoundEffect, is_first: bool) -> str:
     held_out += change(effect.held_out_before, effect.held_out_after, unit)
     if not fresh and is_first:
         held_out += '; another motion with --validate is stronger evidence'
-    return (f'It removes {percent(effect.share)} of the error, each drive in units of its noise. '
+    return (f'Its force alone removes {percent(effect.share)} of the error, each drive in units of '
+            'its noise. '
             f'With it the error {change(effect.error_before, effect.error_after, unit)}. '
             f'{held_out}. Evidence {effect.evidence:.0f} (threshold 0).'
             + ('' if effect.without is None else
@@ -520,12 +513,6 @@ def _suspect(diagnosis: Diagnosis, ranked: RankedEffect) -> str:
     return (f'{with_drives(ranked.name, ranked.drives, diagnosis.residuals.drives)}: possible, '
             f'but slow noise explains the data as well (evidence {ranked.evidence:.0f}, threshold '
             '0); repeat the recording')
-
-
-def _within_model_error(diagnosis: Diagnosis, absorbed: WithinModelError) -> str:
-    return (f'{with_drives(absorbed.name, absorbed.drives, diagnosis.residuals.drives)}, '
-            f'{in_unit(absorbed.rms, diagnosis.residuals.unit)} rms: not reported, because it is '
-            f'smaller than the uncertainty of the form of {listed(absorbed.of)}')
 
 
 def _rounded(after: float, before: float) -> float:

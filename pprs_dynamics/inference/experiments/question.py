@@ -42,7 +42,7 @@ from pprs_dynamics.inference.search.candidates import (
 )
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.ranking import Ranking, Rival, select
+from pprs_dynamics.inference.search.table import ModelTable, Rival, Row, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.treatment import BLOCK_DURATION
 from pprs_dynamics.physics.effects.catalogue import catalogue
@@ -133,35 +133,34 @@ class Question:
 def question_of(model: ForceModel, recordings: Sequence[Recording],
                 progress: Callable[[float], None], decisions: Decisions = DECISIONS) -> Question:
     """Return what recordings leave open; errors as `diagnose`."""
-    ranking = select(model, recordings, decisions, progress)
-    return question_after(ranking, ranking.rivals(decisions.rival_margin))
+    table = tabulate(model, recordings, decisions, progress)
+    return question_after(table, table.rivals(decisions.rival_margin))
 
 
-def question_after(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
-    """Return what a ranking does not decide.
+def question_after(table: ModelTable, rivals: Sequence[Rival]) -> Question:
+    """Return what a table does not decide.
 
     Parameters
     ----------
-    ranking : Ranking
+    table : ModelTable
     rivals : sequence of Rival
         The best first.
     """
-    adopted = ranking.reported
+    adopted = table.reported
     if rivals:
-        return _separation(ranking, rivals)
-    search = ranking.last
+        return _separation(table, rivals)
+    search = table.last
     if adopted.effects:
         return _estimation(search, adopted)
     return _excitation(search, adopted)
 
 
-def _separation(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
+def _separation(table: ModelTable, rivals: Sequence[Rival]) -> Question:
     """Return how to separate sets: each is fitted to the data that each other one predicts."""
-    sets = _told_apart(ranking, rivals)
+    sets = _told_apart(table, rivals)
     # The last search, or the first where one of the sets is linear around its point.
-    fits = (ranking.last if all(ranking.fits_of(fitted) is ranking.last for fitted in sets)
-            else ranking.first)
-    placed = [fits.evaluate(fitted.candidates) for fitted in sets]
+    fits = (table.last if all(row.fitted.is_nonlinear for row in sets) else table.first)
+    placed = [fits.evaluate(row.fitted.candidates) for row in sets]
     terms = _Terms()
     parts = [terms.of_set(fitted) for fitted in placed]
     # A set that is refitted to what another one predicts may also be on that one's drives.
@@ -189,15 +188,15 @@ def _separation(ranking: Ranking, rivals: Sequence[Rival]) -> Question:
                   subjects)
 
 
-def _told_apart(ranking: Ranking, rivals: Sequence[Rival]) -> list[CandidateSet]:
+def _told_apart(table: ModelTable, rivals: Sequence[Rival]) -> list[Row]:
     """Return the reported set and, of each further pair of effects, the best set with it."""
     pairs: set[tuple[str, str]] = set()
-    sets = [ranking.reported]
+    sets = [table.best]
     for rival in rivals:
         new = set(product(rival.missing, rival.instead))
         if not new <= pairs:
             pairs |= new
-            sets.append(rival.fitted)
+            sets.append(rival.row)
     return sets
 
 

@@ -90,6 +90,12 @@ class Fit:
         """Whether it is the reading by names and units."""
         return not self.reading.kind and self.time_unit == 1 and bool(np.all(self.scales == 1))
 
+    @property
+    def is_other_unit(self) -> bool:
+        """Whether only efforts differ, by a unit that is no prefix."""
+        return (not self.reading.kind and self.time_unit == 1
+                and not np.any(np.isin(self.scales, OF_ONE)))
+
 
 def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False) -> Recording:
     """Return a recording with its mistakes among its findings.
@@ -124,6 +130,8 @@ def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]
                 if (excerpt := excerpt_of(recording, unit, STRETCHES)) is not None}
     search = Search(model, excerpts)
     best = search.best()
+    if best is not None and best.is_other_unit:
+        best = None  # `find_scales` compares the factors themselves
     contents = effort_contents(model, recording, excerpts.get(1.0))
     mistakes: list[Defect] = [] if best is None else list(_of_fit(model, best))
     if best is not None and (rival := search.rival(best)) is not None:

@@ -38,7 +38,7 @@ SAMPLES = 12.0
 # Residual, as a share of the effort's squared swing, below which fits are equal.
 CLOSEST = 2e-4
 # Standard deviation of a model's inertia and gravity, relative, and what it can cost at most.
-MASSES, MASSES_MOST = 0.35, 6.0
+MASSES, MASSES_MOST = 0.35, 7.0
 # Standard deviation of a constant effort, as a share of the effort.
 CONSTANT = 0.3
 # Times the rigid body's forces, beyond which friction is unlikely, and what it can cost at most.
@@ -46,7 +46,7 @@ FRICTION, FRICTION_MOST = 3.0, 9.0
 # Prior costs of mistakes [nats].
 COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'position_offset': 8.0,
         'reversed_time': 8.0, 'time_unit': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0}
-FEW = 3.0  # more, of positions of some drives in another unit than those of the others
+FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
 OUTSIDE, FAR_OUTSIDE = 4.0, 8.0  # of positions beyond a stroke, and far beyond it
 BEYOND, FAR = 2.0, 10.0  # multiples of the ends of a stroke, or of the speed limit
@@ -204,7 +204,8 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits]) -> Iterator[R
     for names, turns in ((LENGTHS, False), (ANGLES, True)):
         alike = tuple(k for k in every if units[k].turns == turns)
         for unit, name in names.items():
-            for group in _groups(drives, alike):
+            # Encoders of a robot's turning joints count alike; its rails may not.
+            for group in _groups(drives, alike)[:1 if turns else None]:
                 scale = np.diag(_scaled(count, group, unit))
                 cost = COST['position_unit'] + (0.0 if len(group) == len(alike) else FEW)
                 what = f'the {_position(drives, group)} like {name}'

@@ -25,7 +25,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE, catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.force_model import ForceModel
 
-PlacedNames = frozenset[str]  # of a set's effects; of bodies and joint friction with their place
+RowKey = frozenset[tuple[str, str]]  # names with their place, and kinds of courses
 COURSE_TIMES = 200  # beginnings that are tried, evenly over the recordings
 SINCE, DURING, DRIFT = 'since', 'during', 'drift'  # kinds of courses
 
@@ -305,10 +305,17 @@ class CandidateSet:
         """Those of the catalogue."""
         return tuple(c for c in self.candidates if isinstance(c, EffectCandidate))
 
+    @cached_property
+    def row_key(self) -> RowKey:
+        """Names of the candidates, whatever their drives and shapes."""
+        return frozenset((candidate.placed_name, candidate.course.kind if candidate.course else '')
+                         if isinstance(candidate, EffectCandidate) else (candidate.name, '')
+                         for candidate in self.candidates)
+
     @property
-    def placed_names(self) -> PlacedNames:
-        """Those of its effects."""
-        return frozenset(candidate.placed_name for candidate in self.effects)
+    def is_dated(self) -> bool:
+        """Whether one of its effects begins, ends or grows within the recordings."""
+        return any(candidate.course is not None for candidate in self.effects)
 
     @property
     def is_nonlinear(self) -> bool:
@@ -412,7 +419,7 @@ class PriorCosts:
     def of_course(self, course: Course) -> float:
         """Return the prior cost of a change within the recordings: that there is one, and when."""
         times = {SINCE: 1, DURING: 2, DRIFT: 0}[course.kind]
-        return 2 * times * log(COURSE_TIMES) - 2 * log(self.decisions.effect_odds)
+        return 2 * times * log(COURSE_TIMES) - 2 * log(self.decisions.onset_odds)
 
     def of_width(self, tried: int) -> float:
         """Return the prior cost of a width of reversal other than the model's, on a drive."""

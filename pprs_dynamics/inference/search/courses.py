@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.inference.regression.design import LEAST_MOVING
-from pprs_dynamics.inference.search.absorbed import beyond_discrepancy
 from pprs_dynamics.inference.search.candidates import (
     COURSE_TIMES,
     DRIFT,
@@ -26,7 +25,11 @@ from pprs_dynamics.inference.search.candidates import (
     Course,
     EffectCandidate,
 )
-from pprs_dynamics.inference.search.fitted_sets import Candidates, FittedSets
+from pprs_dynamics.inference.search.fitted_sets import (
+    LEAST_IMPROVEMENT,
+    Candidates,
+    FittedSets,
+)
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 
 # Stretches that are tried: so many parts of the recordings, each of so many of them long.
@@ -47,66 +50,71 @@ class _Offer:
     drives: frozenset[int]
 
     def is_worth_a_fit(self, fits: FittedSets) -> bool:
-        """Return whether it may pay for itself, beyond the margin of rivals."""
+        """Return whether its gain is more than its prior cost."""
         course = self.candidate.course
-        return course is not None and (
-            self.gain > fits.prior_costs.of_course(course) + fits.decisions.rival_margin)
+        return course is not None and self.gain > fits.prior_costs.of_course(course)
 
 
-def with_courses(fits: FittedSets, kept: CandidateSet, others: Iterable[CandidateSet],
-                 below: float = np.inf) -> tuple[FittedSets, CandidateSet]:
-    """Return the best set in which effects may begin, end or grow, with what it is a set of.
-
-    The same fits and set where nothing changes in time.
+def fit_courses(fits: FittedSets, reported: CandidateSet, alone: Sequence[CandidateSet],
+                first: FittedSets | None = None) -> None:
+    """Fit sets in which effects begin, end or grow, where the score test of onsets passes.
 
     Parameters
     ----------
     fits : FittedSets
-    kept : CandidateSet
-        Of constant forms.
-    others : iterable of CandidateSet
-        Of one effect each, that may be the right one with a step in time.
-    below : float
-        What some other set costs, which the first effect that changes has to be better than.
+        To which the sets are added.
+    reported : CandidateSet
+        Of these, without onsets.
+    alone : sequence of CandidateSet
+        Of one effect each, that may be the right one with an onset.
+    first : FittedSets, optional
+        Around the input model, where the reported set is nonlinear: the search is repeated there,
+        since a nonlinear constant effect may imitate an onset around its own model.
     """
-    constant = [(kept, candidate) for candidate in kept.effects if _is_new(candidate)]
-    alone = [(other, other.effects[0]) for other in others if _is_new(other.effects[0])]
-    drives = changing_drives(fits, kept, others)
+    if not _changing_drives(fits, reported, alone):
+        return
+    _fit(fits, reported, alone)
+    if first is not None:
+        _fit(first, first.evaluate(tuple(
+            candidate for candidate in reported.effects if not candidate.effect.nonlinear)), alone)
+
+
+def _fit(fits: FittedSets, kept: CandidateSet, others: Sequence[CandidateSet]) -> None:
+    """Fit sets with onsets from a set without, as long as the cost falls."""
+    drives = _changing_drives(fits, kept, others)
     if not drives:
-        return fits, kept
-    # Sets of their own: those of the search are of constant forms, and so are its rivals.
-    dated = FittedSets(fits.design, fits.decisions, fits.regression.error_scale)
-    best = dated.evaluate(kept.candidates)
-    alternatives = [(other, candidate)
-                    for other, candidate in (*alone, *_alone_on_drives(fits, drives))
-                    if _is_new(candidate)]
+        return
+    constant = [(kept, candidate) for candidate in kept.effects if _is_new(candidate)]
+    best = kept
+    alternatives = [(other, candidate) for other, candidate in (
+        *((other, other.effects[0]) for other in others), *_alone_on_drives(fits, drives))
+        if _is_new(candidate)]
     likely: list[EffectCandidate] = []
     for _ in range(MOST_COURSES):
         held = [(best, candidate) for candidate in best.effects
                 if not candidate.course and _is_new(candidate)]
-        # Patterns of no catalogue imitate what changes: offers are beside effects alone.
-        plain = dated.at_noise_of(best, best.effects) if best.unknowns else best
-        offers = sorted(
-            _offers(dated, _bases(dated, plain), [*held, *alternatives], _courses(dated)),
-            key=lambda offer: -offer.gain)
-        found, offered = best, _best_of_each(offers)
+        # Patterns of no catalogue imitate onsets: offers are beside effects alone.
+        plain = fits.at_noise_of(best, best.effects) if best.unknowns else best
+        offered = _best_of_each(sorted(
+            _offers(fits, _bases(fits, plain), [*held, *alternatives], _courses(fits)),
+            key=lambda offer: -offer.gain))
         likely += [offer.candidate for offer in offered]
+        found = best
         for offer in offered:
             for rest in _rests(best, offer.candidate):
                 # Its shape was that of an effect that is there all the time.
-                tried = dated.pruned(dated.refined(dated.evaluate((*rest, offer.candidate))))
+                tried = fits.pruned(fits.refined(fits.evaluate((*rest, offer.candidate))))
                 found = min(found, tried, key=lambda fitted: fitted.cost)
-        if not found.cost < min(best.cost, below) - fits.decisions.rival_margin:
+        if not found.cost < best.cost - LEAST_IMPROVEMENT:
             break
-        best = _refined(dated, found)
-    best = _simplest(dated, best, {candidate.effect: candidate for candidate in (
-        *(candidate for _, candidate in constant), *likely)}.values())
-    best, _ = beyond_discrepancy(dated, best)
-    return (dated, best) if any(candidate.course for candidate in best.effects) else (fits, kept)
+        best = _refined(fits, found)
+    if best is not kept:
+        _simplest(fits, best, {candidate.effect: candidate for candidate in (
+            *(candidate for _, candidate in constant), *likely)}.values())
 
 
-def changing_drives(fits: FittedSets, kept: CandidateSet, others: Iterable[CandidateSet],
-                    ) -> set[int]:
+def _changing_drives(fits: FittedSets, kept: CandidateSet, others: Iterable[CandidateSet],
+                     ) -> set[int]:
     """Return drives on which something may begin, end or grow, or a pattern is left."""
     constant = [(kept, candidate) for candidate in kept.effects if _is_new(candidate)]
     alone = [(other, other.effects[0]) for other in others if _is_new(other.effects[0])]

@@ -39,11 +39,15 @@ class Decisions:
     unknown_odds: float = _number(
         0.01, '1', 'prior odds of a form that is in no catalogue, against one that is',
         'a free curve imitates effects; it has to be much better to be believed')
+    onset_odds: float = _number(
+        7e-4, '1', 'prior odds that an effect begins, ends or grows within the recordings',
+        'odds of 150 to 1 against it beside those of one more effect: many times and kinds of '
+        'change are tried')
     form_share: float = _number(
         0.15, '1', 'share of the force of an idealised effect that its lack of fit may leave',
         'forms of friction and springs in the literature differ by 5 to 15 %')
     own_form_share: float = _number(
-        0.02, '1', "the same for the model's own friction",
+        0.02, '1', "the same for the input model's own friction, beside a further candidate",
         'load-dependent friction is computed from frictionless loads, 1 to 2 % off')
     exact_share: float = _number(
         0.02, '1', 'share of an idealised effect that its lack of fit may put into an exact one',
@@ -51,6 +55,12 @@ class Decisions:
     left_ratio: float = _number(
         1.5, '1', 'error that a drive may keep over its noise, beside what forms of effects leave',
         'what stands out of the noise to the eye has to be told')
+    most_left: float = _number(
+        5.0, '1', 'residual of a drive over its noise, above which the verdict is unknown',
+        'no form of an effect is off by so much')
+    error_rise: float = _number(
+        0.01, '1', 'relative rise of the error over its noise, up to which it does not rise',
+        'reversals and slow noise are fitted but not part of the model')
     rival_margin: float = _number(
         10.0, 'deviance', 'how near a set must come to the best to be told as its rival',
         'odds of 150 to 1')
@@ -67,8 +77,8 @@ class Decisions:
         1.5, '1', 'ratio of variances in a range and elsewhere that is told as scatter',
         'less does not show in a plot')
     one_load: float = _number(
-        0.05, '1', 'share of a friction by load that friction which no load changes leaves, up to '
-        'which both are told as one',
+        0.05, '1', 'share by which friction by load may differ from friction that does not follow '
+        'it, up to which a warning asks for another load',
         'dry friction varies by as much along a guide')
     stick_slip: float = _number(
         0.2, '1', 'share of the time in stick-slip, from which no other effect is claimed',

@@ -9,6 +9,9 @@ not yet a model of that drive, and no noise accounts for the rest.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import numpy as np
 
 from pprs_dynamics.arrays import Array
@@ -52,7 +55,9 @@ def explained_shares(residuals: Residuals, left: Array | None = None) -> dict[st
 
 
 def little_explained(model: ForceModel, residuals: Residuals, left: Array | None = None,
-                     decisions: Decisions = DECISIONS) -> dict[str, float]:
+                     decisions: Decisions = DECISIONS,
+                     noise: Mapping[str, float] = MappingProxyType({}),
+                     ) -> dict[str, float]:
     """Return the drives of whose effort a model explains little, with the shares; least first.
 
     Of drives that move, and whose effort is more than white noise: where a drive stands, static
@@ -66,11 +71,22 @@ def little_explained(model: ForceModel, residuals: Residuals, left: Array | None
     left : (M, D) array, optional
         See `explained_shares`.
     decisions : Decisions, optional
+    noise : mapping of str to float, optional
+        Rms of the noise of the drives, as far as it is known [N]: no model explains it.
     """
-    little = {name: share for name, share in explained_shares(residuals, left).items()
-              if share < decisions.explained and _can_be_explained(
-                  model, residuals, residuals.drives.index(name), decisions)}
+    little = {}
+    for name, share in explained_shares(residuals, left).items():
+        d = residuals.drives.index(name)
+        most = _beyond_noise(residuals.measured[:, d], noise.get(name, 0.0))
+        if share < decisions.explained * most and _can_be_explained(
+                model, residuals, d, decisions):
+            little[name] = share
     return dict(sorted(little.items(), key=lambda one: one[1]))
+
+
+def _beyond_noise(effort: Array, noise: float) -> float:
+    """Return the share of the variance of an effort (M,) that is not noise of an rms [N]."""
+    return max(1 - noise ** 2 / max(float(np.nanvar(effort)), 1e-300), 0.0)
 
 
 def _can_be_explained(model: ForceModel, residuals: Residuals, d: int,

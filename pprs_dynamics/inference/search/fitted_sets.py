@@ -9,7 +9,6 @@ from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
 from itertools import chain
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
@@ -32,7 +31,7 @@ from pprs_dynamics.inference.search.components import Components
 from pprs_dynamics.inference.search.constraints import Constraints
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
-from pprs_dynamics.inference.search.model_discrepancy import discrepancy_ratio
+from pprs_dynamics.inference.search.form_error import FormErrors
 
 SHAPE_ROUNDS = 4  # of Gauss-Newton steps in the shapes
 NEAR = 1e-3  # [m], within which a body is where its columns are
@@ -58,8 +57,6 @@ class FittedSets:
     ----------
     stepped : callable
         Called for each set that is fitted and each drive that is scanned: work is done.
-    settled : dict
-        By key of a set, what `relinearisation.settled` has found for it.
     """
 
     def __init__(self, design: Design, decisions: Decisions,
@@ -71,7 +68,7 @@ class FittedSets:
             open_forces={} if design.carried is None else design.carried.open_forces)
         self.prior_costs = PriorCosts.of(self.regression, decisions, design.given)
         self.components = Components(design, self.regression, self.prior_costs)
-        self.settled: dict[Hashable, Any] = {}
+        self.form_errors = FormErrors(design, self.regression, decisions)
         self.constraints = Constraints(design)
         self._evaluated: dict[Hashable, CandidateSet] = {}
         self._nuisance: dict[Hashable, tuple[Block, ...]] = {}
@@ -159,15 +156,13 @@ class FittedSets:
         return CostTerms(fit=left, coefficients=fit.deviance - left)
 
     def _barred(self, fitted: CandidateSet) -> str:
-        """Return why a set may not be: a pattern that is none.
+        """Return why a set is inadmissible; '' where it is admissible.
 
-        A pattern has to be more than the lack of fit of the effects beside it.
+        A candidate that is no more than the form error of others makes it so.
         """
-        for candidate in fitted.unknowns:
-            ratio, names = discrepancy_ratio(self.design, self.regression, self.decisions, fitted,
-                                             candidate)
-            if ratio < 1:
-                return f'the pattern is within the model error of {", ".join(names)}'
+        for candidate in fitted.candidates:
+            if names := self.form_errors.hide(fitted, candidate):
+                return f'{candidate.name} may be the form error of {", ".join(names)}'
         return ''
 
     def _nuisance_blocks(self, candidates: Candidates, fit: JointFit) -> Nuisance:

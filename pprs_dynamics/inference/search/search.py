@@ -151,6 +151,11 @@ class Search:
         """Return sets with one candidate more, or on more drives, from the best few sets."""
         found: list[Candidates] = []
         ranked = sorted(self.fits.sets, key=lambda fitted: fitted.cost)
+        if with_patterns:
+            # Beside an effect that imitates them patterns may be within its form error.
+            base = next(fitted for fitted in ranked if not fitted.effects)
+            found += [(*base.candidates, pattern)
+                      for pattern in best_patterns(self.patterns, base.fit, REPLACEMENTS)]
         for rank, base in enumerate(ranked[:BEAM]):
             count = PROPOSALS if rank == 0 else 2
             found += self.scan.proposals(base, count)
@@ -214,17 +219,6 @@ class Search:
             for other in self.fits.components.variants(component):
                 if other.names != component.names:
                     yield with_instead(candidate, component, other)
-
-    def replaced(self, fitted: CandidateSet, is_allowed: Callable[[CandidateSet], bool],
-                 ) -> CandidateSet:
-        """Return the best of a set and those in which something else stands for one or two."""
-        before = len(self.fits.sets)
-        self._fit(self._replacements(fitted))
-        better = [other for other in self.fits.sets[before:]
-                  if other.cost < fitted.total - LEAST_IMPROVEMENT]
-        return next((fitted for fitted in sorted(better, key=lambda fitted: fitted.cost)
-                     if is_allowed(fitted)),
-                    fitted)
 
     def _replacements(self, best: CandidateSet) -> Iterator[Candidates]:
         """Yield sets in which something else stands for candidates, or for one on a drive.

@@ -1,0 +1,361 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The table of models: one row for every choice of effects that was fitted, with its cost.
+
+The answer of a diagnosis is the row of least cost. Evidence, rivals and suspects are queries.
+Costs of rows within a margin of the least are those of exact forces. Costs of other rows are those
+of linear forces, around the input model or around the model of the last search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.regression.carried_over import CarriedOver
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.search.candidates import (
+    DURING,
+    Candidate,
+    CandidateSet,
+    EffectCandidate,
+    RowKey,
+)
+from pprs_dynamics.inference.search.cost_terms import CostTerms
+from pprs_dynamics.inference.search.courses import fit_courses
+from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.inference.search.fitted_model import (
+    exact_forces,
+    fitted_model,
+    linear_prediction,
+    squared,
+)
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.inference.search.neighbours import of_same_names
+from pprs_dynamics.inference.search.relinearisation import has_nonlinear, linearised
+from pprs_dynamics.inference.search.search import Search, patterns_of
+from pprs_dynamics.inference.search.unknown import DrivePatterns
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.model.force_model import ForceModel
+
+SAME = 1e-6  # share of a column's square outside a span, up to which it is inside
+MOST_STEPS = 6  # of relinearisation of one row
+MOST_EXACT = 8  # rows of one search that get exact costs
+LEAST_CHANGE = 2.0  # of a cost, for which a row is computed anew
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """A choice of effects, at its best.
+
+    Parameters
+    ----------
+    fits : FittedSets
+        With the columns of the fit.
+    fitted : CandidateSet
+    linearisation : float or None
+        Whitened square by which exact forces differ from the linear fit; None: not computed.
+    """
+
+    fits: FittedSets = field(repr=False)
+    fitted: CandidateSet
+    linearisation: float | None = None
+
+    @classmethod
+    def exact(cls, fits: FittedSets, fitted: CandidateSet) -> Row:
+        """Return a set around its own model, with the cost of exact forces."""
+        around, moved = fits, fitted
+        try:
+            for _ in range(MOST_STEPS):
+                around, moved = linearised(around, moved, alone=True)
+                before, moved = moved, of_same_names(around, moved)
+                if moved is before:
+                    break
+            exact = exact_forces(around.design, fitted_model(around, moved))
+        except PprsError:
+            return cls(fits, replace(fitted, barred='no model can have its values'), 0.0)
+        return cls(around, moved, squared(around, moved, exact - linear_prediction(around, moved)))
+
+    @property
+    def terms(self) -> CostTerms:
+        """Terms of the cost; they add up to it."""
+        return self.fitted.terms + CostTerms(linearisation=self.linearisation or 0.0)
+
+    @cached_property
+    def cost(self) -> float:
+        """The cost, infinite for an inadmissible row."""
+        return self.fitted.cost + (self.linearisation or 0.0)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the cost is that of exact forces, as far as there are any."""
+        return self.linearisation is not None or self.fitted.is_dated
+
+    @property
+    def effects(self) -> tuple[EffectCandidate, ...]:
+        """Effects of the catalogue that the row claims, without what passes."""
+        return tuple(candidate for candidate in self.fitted.effects
+                     if candidate.course is None or candidate.course.kind != DURING)
+
+    @property
+    def patterns(self) -> tuple[Candidate, ...]:
+        """Candidates that are no effect of the machine: patterns, and what passes."""
+        mine = self.effects
+        return tuple(candidate for candidate in self.fitted.candidates if candidate not in mine)
+
+    @property
+    def placed_names(self) -> frozenset[str]:
+        """Names of the effects, with their link or joint where they are on one."""
+        return frozenset(candidate.placed_name for candidate in self.effects)
+
+    def has(self, candidate: EffectCandidate) -> bool:
+        """Return whether the row claims an effect, on whatever drives and in whatever shape."""
+        return candidate.placed_name in self.placed_names
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A row that claims other effects than the reported row at nearly the same cost.
+
+    Parameters
+    ----------
+    row : Row
+    missing, instead : tuple of str
+        Names of reported effects that it lacks, and names that it has in their place. A reported
+        effect on another link or joint is `NAME:PLACE`.
+    """
+
+    row: Row
+    missing: tuple[str, ...]
+    instead: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ModelTable:
+    """All choices of effects that were fitted, the cheapest first.
+
+    Parameters
+    ----------
+    first, last : FittedSets
+        Around the input model, and around the model of the last search.
+    patterns : tuple of DrivePatterns
+        Patterns of no catalogue around the last.
+    exact : mapping of RowKey to Row
+        Rows with exact costs, in place of the linear rows of these names.
+    """
+
+    first: FittedSets = field(repr=False)
+    last: FittedSets = field(repr=False)
+    patterns: tuple[DrivePatterns, ...] = field(default=(), repr=False)
+    exact: Mapping[RowKey, Row] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """One row for each choice of effects, the cheapest first.
+
+        Sets with a nonlinear effect are those of the last search, others those of the first.
+        """
+        found = dict(self.exact)
+        for fits in dict.fromkeys((self.last, self.first)):
+            for fitted in sorted(fits.sets, key=lambda fitted: fitted.cost):
+                if fitted.is_admissible and (self.first is self.last
+                                             or fitted.is_nonlinear is (fits is self.last)):
+                    found.setdefault(fitted.row_key, Row(fits, fitted))
+        by_cost = sorted(found.values(), key=lambda row: row.cost)
+        return tuple({row.fitted.row_key: row for row in reversed(by_cost)}.values())[::-1]
+
+    @property
+    def best(self) -> Row:
+        """The row of least cost, which is reported."""
+        return self.rows[0]
+
+    @property
+    def nothing(self) -> Row:
+        """The row without any effect or pattern."""
+        return next(row for row in self.rows if not row.fitted.candidates)
+
+    @cached_property
+    def reported(self) -> CandidateSet:
+        """The reported set in the last search, for what compares sets there."""
+        return self.last.evaluate(self.best.fitted.candidates)
+
+    def without(self, candidate: EffectCandidate) -> Row:
+        """Return the cheapest row that lacks an effect."""
+        return next(row for row in self.rows if not row.has(candidate))
+
+    def evidence(self, candidate: EffectCandidate) -> float:
+        """Return by how much the cheapest row without an effect costs more than the least."""
+        return self.without(candidate).cost - self.best.cost
+
+    def barred(self, margin: float) -> tuple[CandidateSet, ...]:
+        """Return inadmissible sets that would cost less than a margin above the least."""
+        found = [fitted for fits in dict.fromkeys((self.last, self.first)) for fitted in fits.sets
+                 if fitted.barred and fitted.total < self.best.cost + margin]
+        return tuple(sorted(found, key=lambda fitted: fitted.total))
+
+    @property
+    def alone(self) -> dict[str, CandidateSet]:
+        """The cheapest set of each effect as the only one, around the input model, by name."""
+        found: dict[str, CandidateSet] = {}
+        for fitted in sorted(self.first.sets, key=lambda fitted: fitted.cost):
+            if len(fitted.candidates) == len(fitted.effects) == 1 and (
+                    fitted.is_admissible and not fitted.is_dated):
+                found.setdefault(fitted.effects[0].name, fitted)
+        return found
+
+    def near(self, margin: float) -> list[tuple[float, CandidateSet]]:
+        """Return other sets of the last search, and what each costs above the reported set."""
+        return sorted(((fitted.cost - self.reported.cost, fitted) for fitted in self.last.sets
+                       if fitted is not self.reported
+                       and fitted.cost < self.reported.cost + margin), key=lambda pair: pair[0])
+
+    def rivals(self, margin: float) -> list[Rival]:
+        """Return the rows within a margin of the least that claim other effects."""
+        mine = {candidate.placed_name: candidate.name for candidate in self.best.effects}
+        rivals = []
+        for row in self.rows[1:]:
+            if row.cost > self.best.cost + margin:
+                break
+            theirs = {candidate.placed_name: candidate.name for candidate in row.effects}
+            missing = sorted(name for place, name in mine.items() if place not in theirs)
+            instead = sorted(place if name in mine.values() else name
+                             for place, name in theirs.items() if place not in mine)
+            if missing and instead and not self._is_freer(row, missing, instead):
+                rivals.append(Rival(row, tuple(missing), tuple(instead)))
+        return rivals
+
+    def _is_freer(self, row: Row, missing: Sequence[str], instead: Sequence[str]) -> bool:
+        """Return whether friction of a row contains all that is missing, with more coefficients.
+
+        Asymmetric friction contains viscous friction: the same claim with more freedom.
+        """
+        best = self.best.fitted
+        for component in (component for c in best.effects if c.name in missing
+                          for component in c.components):
+            theirs = [row.fitted.blocks[other].rows[component.drive] for c in row.effects
+                      if c.name in instead and c.effect.is_friction for other in c.components
+                      if component.drive is not None and other.drive == component.drive]
+            if component.drive is None or not component.effect.is_friction or not theirs:
+                return False
+            mine = best.blocks[component].rows[component.drive]
+            columns = np.concatenate(theirs)
+            if len(columns) <= len(mine):
+                return False
+            outside = mine - np.linalg.lstsq(columns.T, mine.T, rcond=None)[0].T @ columns
+            if np.sum(outside ** 2) > SAME * np.sum(mine ** 2):
+                return False
+        return True
+
+    def suspects(self, margin: float) -> list[tuple[EffectCandidate, Row]]:
+        """Return effects that, as one more, cost less than a margin above the least."""
+        mine = {candidate.key for candidate in self.best.fitted.candidates}
+        found: dict[str, tuple[EffectCandidate, Row]] = {}
+        for row in self.rows[1:]:
+            more = [c for c in row.effects if c.placed_name not in self.best.placed_names]
+            if row.cost < self.best.cost + margin and len(more) == 1 and (
+                    len(row.fitted.candidates) == len(mine) + 1
+                    and self.best.placed_names < row.placed_names):
+                found.setdefault(more[0].name, (more[0], row))
+        return list(found.values())
+
+
+def tabulate(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
+             progress: Callable[[float], None] | None = None,
+             carry_over: Callable[[Design], CarriedOver] | None = None) -> ModelTable:
+    """Return the table of all choices of effects that a search fits to recordings.
+
+    Parameters
+    ----------
+    model : ForceModel
+    recordings : sequence of Recording
+    decisions : Decisions
+    progress : callable, optional
+        Called with the share of the work that is done.
+    carry_over : callable, optional
+        Returns what a reference run knows of the recordings.
+
+    Raises
+    ------
+    PprsError
+        As `measure_residuals`.
+    """
+    report = progress or (lambda share: None)
+    design = Design.of(model, recordings, lambda share: report(0.25 * share))
+    design = design.beside(carry_over and carry_over(design))
+    first = FittedSets(design, decisions)
+    search = Search(first, patterns_of(first), lambda share: report(0.25 + 0.35 * share))
+    search.run(until_nonlinear=True)
+    exact = _with_exact_costs(search, first, {})
+    best = min(exact.values(), key=lambda row: row.cost)
+    if not search.is_ended or best.fitted.is_nonlinear or abs(
+            first.evaluate(best.fitted.candidates).total - best.fitted.total) > LEAST_CHANGE:
+        point = best.fits.design.point
+        patterns = search.patterns
+        search.release()
+        fits = first if point is None else FittedSets(
+            design.around(point), decisions, first.regression.error_scale)
+        search = Search(fits, [pattern.around(fits.regression) for pattern in patterns],
+                        lambda share: report(0.6 + 0.3 * share))
+        search.run(best.fitted.candidates)
+        exact = _with_exact_costs(search, first, exact)
+    table = _with_exact_best(ModelTable(first, search.fits, search.patterns, exact))
+    fit_courses(table.last, table.reported, list(table.alone.values()),
+                None if first is search.fits else first)
+    report(1.0)
+    return _with_exact_best(table)
+
+
+def input_model_alone(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
+                      progress: Callable[[float], None] | None = None) -> ModelTable:
+    """Return the table of the row without any effect; errors as `measure_residuals`."""
+    fits = FittedSets(Design.of(model, recordings, progress), decisions)
+    fits.evaluate(())
+    return ModelTable(fits, fits)
+
+
+def _with_exact_costs(search: Search, first: FittedSets, known: dict[RowKey, Row],
+                      ) -> dict[RowKey, Row]:
+    """Return the exact rows, with those that may be the best of a search."""
+    fits, exact = search.fits, dict(known)
+    for fitted in _shortlist(fits):
+        row = exact.get(fitted.row_key)
+        if row is None or fitted.cost < row.cost - LEAST_CHANGE:
+            new = (Row.exact(fits, fitted) if fitted.is_nonlinear
+                   else Row.exact(first, first.evaluate(fitted.candidates)))
+            exact[fitted.row_key] = new if row is None else min(row, new, key=lambda row: row.cost)
+    return exact
+
+
+def _with_exact_best(table: ModelTable) -> ModelTable:
+    """Return a table in which the rows that may be the best have exact costs."""
+    margin, table = table.last.decisions.rival_margin, replace(table)
+    for _ in range(MOST_EXACT):
+        row = next((row for row in table.rows if not row.is_exact
+                    and row.cost < table.best.cost + margin), None)
+        if row is None:
+            break
+        table = replace(table, exact={**table.exact,
+                                      row.fitted.row_key: Row.exact(row.fits, row.fitted)})
+    return table
+
+
+def _shortlist(fits: FittedSets) -> Iterable[CandidateSet]:
+    """Return the cheapest set of each choice of effects that may be the best by exact costs.
+
+    Those within the margin of rivals. Any nonlinear one where the cheapest set is nonlinear and
+    the columns are not around its model.
+    """
+    best, near = fits.best, dict[RowKey, CandidateSet]()
+    is_far = not has_nonlinear(fits, best)
+    for fitted in sorted(fits.sets, key=lambda fitted: fitted.cost):
+        if fitted.cost <= best.cost + fits.decisions.rival_margin or (
+                is_far and fitted.is_nonlinear and fitted.is_admissible):
+            near.setdefault(fitted.row_key, fitted)
+    return list(near.values())[:MOST_EXACT]
+
+

@@ -1,0 +1,176 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The table of models on a single axis: the answer is its cheapest row, and a query on it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pprs_dynamics import MechanismModel
+from pprs_dynamics.inference.diagnosis.diagnose import diagnose
+from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
+from pprs_dynamics.inference.regression.design import Design
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
+from pprs_dynamics.inference.residuals.residuals import rms
+from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
+from pprs_dynamics.inference.search.decisions import DECISIONS
+from pprs_dynamics.inference.search.fitted_sets import FittedSets
+from pprs_dynamics.inference.search.table import ModelTable
+from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.robot_block import AXIS
+
+TIME = np.arange(0.0, 8.0, 0.005)
+VALUES = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0,
+          'friction.reversal_velocity': 0.001}
+HIDDEN = {
+    'nothing': {},
+    'spring': {'drive_spring': {'stiffness': 60.0, 'position': 0.02}},
+    'friction': {'coulomb_friction': {'force': 3.0}},
+    'delay': {'time_delay': {'delay': 0.02}},
+    'two': {'drive_inertia': {'mass': 3.0}, 'viscous_friction': {'coefficient': 20.0}}}
+
+
+def axis(hidden: dict[str, dict[str, float]]) -> MechanismModel:
+    """Return an axis with effects."""
+    values = {f'effects.{name}.{AXIS}.{key}': value for name, block in hidden.items()
+              for key, value in block.items()}
+    model = build_model({**VALUES, 'effects.active': list(hidden), **values})
+    assert isinstance(model, MechanismModel)
+    return model
+
+
+def record(hidden: dict[str, dict[str, float]], seed: int = 1, noise: float = 0.3,
+           since: float = 0.0) -> Recording:
+    """Return a recording of an axis with effects that are there from a time on [s]."""
+    rng = np.random.default_rng(seed)
+    omega = 2 * np.pi * np.array([0.21, 0.57, 1.13])[:, None]
+    phase = omega * TIME + rng.uniform(0, 2 * np.pi, (3, 1))
+    size = np.array([0.08, 0.04, 0.015])[:, None]
+    motion = JointMotion(*(rows.sum(0)[:, None] for rows in (
+        size * np.sin(phase), size * omega * np.cos(phase), -size * omega ** 2 * np.sin(phase))),
+        TIME)
+    before, after = (model.measured(model.drive_forces(motion)).total
+                     for model in (axis({}), axis(hidden)))
+    force = np.where(TIME[:, None] < since, before, after)
+    return Recording.from_arrays('run', TIME, motion.position, motion.velocity,
+                                 force + noise * rng.normal(size=force.shape), (AXIS,))
+
+
+def table_of(found: Diagnosis) -> ModelTable:
+    assert found.selection is not None
+    return found.selection
+
+
+@pytest.fixture(scope='module', params=HIDDEN)
+def found(request: pytest.FixtureRequest) -> Diagnosis:
+    return diagnose(axis({}), [record(HIDDEN[request.param])])
+
+
+def test_the_reported_set_is_the_row_of_least_cost(found: Diagnosis) -> None:
+    table = table_of(found)
+    assert table.best.cost == min(row.cost for row in table.rows)
+    assert {effect.name for effect in (*found.effects, *found.unconfirmed)} == {
+        candidate.name for candidate in table.best.effects}
+    assert {name for name, _ in found.sets[0].names} == {
+        candidate.name for candidate in table.best.fitted.candidates}
+
+
+def test_evidence_is_a_difference_of_two_rows(found: Diagnosis) -> None:
+    table = table_of(found)
+    for effect in found.effects:
+        without = min(row.cost for row in table.rows
+                      if effect.name not in {candidate.name for candidate in row.effects})
+        assert effect.evidence == pytest.approx(without - table.best.cost)
+        assert effect.evidence > 0
+
+
+def test_the_verdict_is_a_function_of_the_table_and_the_residual(found: Diagnosis) -> None:
+    open_ends = found.depends_on or found.above_noise or found.unconfirmed or found.little
+    near = table_of(found).rivals(found.decisions.rival_margin)
+    expected = ('unknown' if open_ends else 'ambiguous' if near else
+                'effect' if found.effects else 'adequate')
+    assert found.verdict == expected
+    for rival in near:
+        assert rival.row.cost <= table_of(found).best.cost + found.decisions.rival_margin
+
+
+def test_costs_near_the_least_are_exact_and_their_terms_add_up(found: Diagnosis) -> None:
+    table = table_of(found)
+    for row in table.rows:
+        assert row.terms.total == pytest.approx(row.cost)
+        assert row.is_exact or row.cost > table.best.cost + found.decisions.rival_margin
+    assert [row.cost for row in table.rows] == sorted(row.cost for row in table.rows)
+
+
+def test_an_effect_lowers_the_error_and_its_own_force_does(found: Diagnosis) -> None:
+    for effect in found.effects:
+        assert effect.error_after < effect.error_before
+        assert effect.held_out_after < effect.held_out_before
+        assert effect.certainty > 2
+        force = np.sqrt(np.nanmean(np.square(effect.force)))
+        assert effect.error_before <= effect.error_after + force + 1e-9
+    assert [effect.share for effect in found.effects] == sorted(
+        (effect.share for effect in found.effects), reverse=True)
+
+
+def test_costs_do_not_depend_on_the_order_of_recordings_or_of_fits() -> None:
+    runs = [record(HIDDEN['two'], seed) for seed in (1, 2)]
+    design = [Design.of(axis({}), order) for order in (runs, runs[::-1])]
+    candidates = tuple(EffectCandidate.of([Component.of(CATALOGUE[name], 0, {}, CATALOGUE[
+        name].variants[0])]) for name in HIDDEN['two'])
+    forth, back = (FittedSets(one, DECISIONS) for one in design)
+    costs = [forth.evaluate(candidates).cost, back.evaluate(candidates[::-1]).cost]
+    assert costs[0] == pytest.approx(costs[1], abs=1e-3)
+    back.evaluate(candidates[:1])
+    again = FittedSets(design[1], DECISIONS)
+    again.evaluate(candidates[1:])
+    assert again.evaluate(candidates).cost == pytest.approx(costs[1], abs=1e-6)
+
+
+def test_an_effect_that_raises_the_error_of_held_out_recordings_is_unknown() -> None:
+    found = diagnose(axis({}), [record(HIDDEN['friction'])], [record({}, 2)])
+    assert found.verdict == 'unknown'
+    assert found.effects == ()
+    (refuted,) = found.unconfirmed
+    assert refuted.name == 'coulomb_friction'
+    assert refuted.held_out_after > refuted.held_out_before
+    assert refuted.certainty < -2
+
+
+@pytest.mark.parametrize('is_there', [True, False])
+def test_held_out_recordings_count_for_effects_that_begin(is_there: bool) -> None:
+    begun = record(HIDDEN['friction'], since=4.0)
+    other = record(HIDDEN['friction'] if is_there else {}, 2)
+    found = diagnose(axis({}), [begun], [other])
+    (effect,) = found.effects if is_there else found.unconfirmed
+    assert found.verdict == ('effect' if is_there else 'unknown')
+    assert effect.course is not None
+    assert effect.course.begin == pytest.approx(4.0, abs=0.1)
+    before = rms(measure_residuals(axis({}), [other])[0])
+    assert (effect.held_out_after < before) is is_there
+    assert effect.held_out_before == pytest.approx(before, rel=0.05)
+
+
+def test_an_onset_is_a_row_beside_the_constant_effect() -> None:
+    table = table_of(diagnose(axis({}), [record(HIDDEN['friction'], since=4.0)]))
+    assert table.best.fitted.is_dated
+    constant = next(row for row in table.rows
+                    if row.effects and not row.fitted.is_dated)
+    assert constant.cost > table.best.cost + DECISIONS.rival_margin
+
+
+def test_a_residual_of_five_times_the_noise_is_never_an_effect() -> None:
+    """A spring whose force bends by a sixth of itself, far above the noise."""
+    run = record({'drive_spring': {'stiffness': 3000.0, 'position': 0.0}}, noise=0.3)
+    q = run.position
+    bent = replace(run, effort=run.effort + 3000.0 * 0.25 * np.abs(q) * q / np.abs(q).max())
+    found = diagnose(axis({}), [bent])
+    ratio = float(np.nanstd(found.remaining)) / found.noise_floors[AXIS]
+    assert ratio < 5 or found.verdict == 'unknown'
