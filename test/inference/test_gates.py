@@ -228,6 +228,11 @@ def test_a_rival_that_explains_as_much_is_not_objected_to() -> None:
     refused, = others('drive_spring', found, evidence=2.0)
     assert refused == ('coulomb_friction on lift_2 explains these recordings better: evidence '
                        '120.4 against 2')
+    # Of several reported effects the first is the best.
+    weak = replace(found_effect('viscous_friction'), evidence=10.0)
+    two = made_up_diagnosis(effects=(found_effect('coulomb_friction'), weak))
+    refused, = others('drive_spring', two, evidence=50.0)
+    assert 'coulomb_friction on lift_2 explains these recordings better' in refused
     structure = made_up_diagnosis(effects=(found_effect('payload_mass', None),))
     refused, = others('drive_spring', structure)
     assert refused.startswith('payload_mass explains these recordings better')

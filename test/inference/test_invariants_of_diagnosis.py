@@ -14,6 +14,7 @@ import pytest
 from planar_arm import planar_arm
 
 from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics.inference.adoption.loop import adopt_all
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
@@ -155,3 +156,11 @@ def test_twice_the_data_never_removes_an_effect_and_makes_its_size_surer(name: s
                       for key, each in one.parameters.items()} for found in (once, twice))
     for key in before.keys() & after.keys():
         assert after[key] < before[key], key
+
+
+@pytest.mark.parametrize('name', ['viscous_friction', 'drive_spring', 'time_delay'])
+def test_with_all_that_is_reported_in_the_model_nothing_is_missing(name: str) -> None:
+    walk = adopt_all(axis_model(), [recorded(name, 1)], [recorded(name, 2)])
+    assert walk.ended == 'adequate'
+    assert name in walk.model.values['effects.active']
+    assert answer(diagnose(walk.model, [recorded(name, 3)])) == ('adequate', [])
