@@ -46,7 +46,7 @@ from benchmarks.naming.run import enter_all, make_all, score_all
 from benchmarks.naming.scoring import FIGURES, Rate, Scored, figures, judge
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.simulation.injected_effects import IN_CATALOGUE
-from pprs_dynamics.simulation.joint_forms import NAMES
+from pprs_dynamics.simulation.mechanism_run import NAMES
 
 pytestmark = pytest.mark.slow
 

@@ -1,9 +1,9 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Physics that is in a simulated arm and not in its model, in forms of its own.
+"""Injected forces on the drives of a mechanism: equations, and how their parameters are drawn.
 
-Sizes are drawn in units of each joint's largest effort and speed, to fit arms of any size.
+Sizes are drawn in units of each joint's largest effort and speed, to fit robots of any size.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.simulation.injected_effect import InjectedEffectError
 from pprs_dynamics.simulation.temperatures import REFERENCE, thinner
 
 CROSSED = 0.02  # of a joint's top speed or load, within which a clearance is crossed
@@ -61,8 +60,7 @@ class JointMoment:
     @property
     def sign(self) -> Array:
         """Direction v / sqrt(v^2 + w^2): another way to turn over than the model's tanh."""
-        width = STEEPNESS * self.speed
-        return self.velocity / np.sqrt(self.velocity ** 2 + width ** 2)
+        return turned_over(self.velocity, self.speed)
 
     @property
     def driving(self) -> Array:
@@ -91,6 +89,11 @@ class JointForm:
     draw: Callable[[np.random.Generator, JointMoment], dict[str, float]]
     force: Callable[[Mapping[str, float], JointMoment], Array]
     needs_turn: float = 0.0
+
+
+def turned_over(velocity: Array, largest: float) -> Array:
+    """Return the direction v / sqrt(v^2 + w^2), w a share of the largest speed."""
+    return velocity / np.hypot(velocity, STEEPNESS * largest)
 
 
 def _share(low: float, high: float) -> Callable[[np.random.Generator], float]:
@@ -207,19 +210,6 @@ FORMS: dict[str, JointForm] = {
             np.abs(m.acceleration).max())},
         lambda p, m: p['mass'] * m.acceleration),
 }
-# Of the arm as a whole: the payload's size as a share of the arm's mass, and so on.
-OF_ARM = ('payload_mass', 'link_mass', 'base_tilt', 'external_wrench', 'effort_gain', 'time_delay',
-          'effort_filter', 'homing_error', 'lost_motion', 'eccentric_encoder', 'joint_friction',
-          'coupled_drives', 'current_gain', 'elastic_joint')
-NAMES = (*FORMS, *OF_ARM)
-
-
-def require_known(names: tuple[str, ...]) -> None:
-    """Raise InjectedEffectError for a name that no hidden effect of an arm has."""
-    for name in names:
-        if name not in NAMES:
-            raise InjectedEffectError(f'{name} is no hidden effect of such a robot, must be one of '
-                                    f'{", ".join(NAMES)}')
 
 
 def draw_form(name: str, random: np.random.Generator, moment: JointMoment, scale: float,

@@ -10,7 +10,7 @@ MuJoCo reads the description itself. Its masses, inertias, gravity and couplings
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from pprs_dynamics.physics.mechanism.description import (
 )
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.mjcf import readable_spec
+from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
@@ -34,7 +35,6 @@ from pprs_dynamics.physics.model.robot_block import described_gravity
 from pprs_dynamics.simulation.engine_loops import ClosedMotion, EngineLoops, cross
 from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState
-from pprs_dynamics.simulation.joint_forms import tilted, truth
 
 CARRIER = '_added_to_'  # body of what is added to a joint
 LEAST = 1e-12  # [kg, kg m^2], of bodies that another's inertia contains
@@ -66,10 +66,12 @@ class MechanismEngine:
         structure = self.structure = robot.structure
         path = Path(structure.description.path)
         is_mjcf = bool(model.values.get('robot.mjcf'))
-        links = structure.description.links
-        refused = {} if is_mjcf else {name: parameters for name, parameters in links.items()
-                                      if structure.links[name][0] and not _is_body(parameters)}
-        if is_mjcf:
+        reads_urdf = model.is_described and not is_mjcf
+        refused = {name: parameters for name, parameters in structure.description.links.items()
+                   if reads_urdf and structure.links[name][0] and not _is_body(parameters)}
+        if not model.is_described:
+            spec = _single_axis(mujoco, structure)
+        elif is_mjcf:
             spec = readable_spec(mujoco, str(path))
         else:
             spec = mujoco.MjSpec.from_string(_bare(path, refused))
@@ -177,30 +179,6 @@ class MechanismEngine:
         self._carry(row, body_at(mass, tuple(centre), np.zeros((3, 3))))
         at = self.structure.links[link][1].inverse.of_point(centre)
         self.robot = self.robot.with_body(link, body_at(mass, tuple(at), np.zeros((3, 3))))
-
-    def hide_payload(self, random: np.random.Generator, scale: float, ahead: float,
-                     ) -> dict[str, Any]:
-        """Hang a point on the tool, so far along its z axis [m], and return what it is."""
-        mass = scale * float(random.uniform(0.05, 0.12)) * float(self.described.masses.sum())
-        self.add_payload(mass, np.array([0.0, 0.0, ahead]))
-        return truth('payload_mass', None, {'mass': mass}, (
-            f'a point {100 * ahead:g} cm before the tool' if ahead else
-            'a point at the tool\'s origin'))
-
-    def hide_link_mass(self, random: np.random.Generator, scale: float, links: Sequence[int],
-                       ) -> dict[str, Any]:
-        """Make one of some bodies heavier, and return what was done."""
-        body = int(random.choice(links))
-        mass = scale * float(random.uniform(0.1, 0.3)) * float(self.described.masses[body])
-        self.add_to_link(body, mass)
-        return truth('link_mass', None, {f'{self.described.body_names[body]}.mass': mass},
-                     'a point at its centre')
-
-    def hide_tilt(self, random: np.random.Generator, scale: float) -> dict[str, Any]:
-        """Let the base lean, and return how."""
-        angle = scale * float(random.uniform(0.01, 0.03))
-        self.gravity = tilted(self.gravity, angle)
-        return truth('base_tilt', None, {'x': angle, 'y': 0.0}, 'about x')
 
     def inverse(self, position: Array, velocity: Array, acceleration: Array,
                 ) -> tuple[Array, Array, Array]:
@@ -330,6 +308,15 @@ class MechanismEngine:
         self.engine.mj_applyFT(self.model, self.data, self.root.R.T @ self.wrench[:3],
                                self.root.R.T @ self.wrench[3:], at, body, efforts)
         return efforts
+
+
+def _single_axis(mujoco: Any, structure: Structure) -> Any:
+    """Return a carriage on a slide; its mass follows from the model's."""
+    spec, (joint,) = mujoco.MjSpec(), structure.description.joints.values()
+    carriage = spec.worldbody.add_body(name=joint.child)
+    carriage.mass, carriage.inertia, carriage.explicitinertial = LEAST, [LEAST] * 3, True
+    carriage.add_joint(name=joint.name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=joint.axis)
+    return spec
 
 
 def _is_body(parameters: Array) -> bool:

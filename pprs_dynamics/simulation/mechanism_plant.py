@@ -30,7 +30,13 @@ from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.injected_effect import InjectedEffectError
 from pprs_dynamics.simulation.joint_forms import FORMS, JointMoment, draw_form, truth
 from pprs_dynamics.simulation.mechanism_engine import SLOWEST, MechanismEngine
-from pprs_dynamics.simulation.mechanism_run import draw_motion, one_able_joint
+from pprs_dynamics.simulation.mechanism_run import (
+    draw_motion,
+    inject_link_mass,
+    inject_payload,
+    inject_tilt,
+    one_able_joint,
+)
 from pprs_dynamics.simulation.plant import UnsolvedError
 from pprs_dynamics.simulation.temperatures import Climate
 
@@ -125,14 +131,17 @@ class MechanismPlant:
               scale: float) -> dict[str, Any]:
         model = self.model
         if name == 'payload_mass':
-            return self.engine.hide_payload(random, scale, 0.0)
+            return truth(name, *inject_payload(
+                self.engine, scale * float(random.uniform(0.05, 0.12)), 0.0))
         if name == 'link_mass':
             links = [j for j in range(len(model.robot.bodies)) if j != model.robot.carrier]
             if not links:
                 raise InjectedEffectError('link_mass needs a link beside that of the tool')
-            return self.engine.hide_link_mass(random, scale, links)
+            return truth(name, *inject_link_mass(
+                self.engine, int(random.choice(links)), scale * float(random.uniform(0.1, 0.3))))
         if name == 'base_tilt':
-            return self.engine.hide_tilt(random, scale)
+            return truth(name, *inject_tilt(
+                self.engine, scale * float(random.uniform(0.01, 0.03))))
         j = one_able_joint(name, model, motion, random)
         assert motion.time is not None
         moment = JointMoment.along(motion, j, efforts[:, j], self.largest[j],

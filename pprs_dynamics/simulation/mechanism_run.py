@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,12 +27,12 @@ from pprs_dynamics.simulation.joint_forms import (
     CROSSED,
     FORMS,
     SIZE,
-    STEEPNESS,
     JointMoment,
     ahead,
     draw_form,
-    require_known,
+    tilted,
     truth,
+    turned_over,
 )
 from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
 from pprs_dynamics.simulation.sensors import ButterworthFilter, EffortFilter
@@ -102,18 +103,106 @@ def draw_motion(model: MechanismModel, duration: float, seed: int, rate: float =
     raise InjectedEffectError('no motion about home stays within the workspace')
 
 
-def simulate_mechanism(model: MechanismModel, names: Sequence[str], seed: int, scale: float = 1.0,
-                 noise: float | None = None, duration: float = 40.0, path_seed: int = 0,
-                 progress: Callable[[float], None] | None = None, thermometers: bool = False,
-                 link_encoders: bool = False) -> MechanismRun:
-    """Return a recording of an arm with hidden effects.
+class Injected(NamedTuple):
+    """The truth about an injected effect: its drives, or None; its parameters; its equation."""
+
+    drives: list[str] | None
+    parameters: dict[str, Any]
+    form: str
+
+
+class Injection:
+    """A mechanism along a motion while effects are injected into it.
 
     Parameters
     ----------
     model : MechanismModel
-        Its added effects are part of the model, not of the arm.
+    read : JointMotion
+        Motion that the encoders measure.
+    random : numpy.random.Generator
+        Of the sizes of effects.
+    scale : float
+        Multiplies these.
+    climate : numpy.random.Generator
+        Of temperatures.
+
+    Attributes
+    ----------
+    motion : JointMotion
+        Of the joints.
+    rigid : (N, D) array
+        Efforts without friction and before bodies are injected.
+    bodies : (N, D) array
+        The same with injected bodies.
+    windup, lead, shift : (N, D) or (D,) arrays
+        By which encoders lead their links: under load, in a clearance, at the zero.
+    efforts, temperature : (N, D) arrays
+    largest : (D,) array
+        Largest efforts.
+    passive : dict of str to (N,) array
+        Efforts against injected friction of passive joints.
+    truths : list of dict
+        What was injected.
+    """
+
+    def __init__(self, model: MechanismModel, read: JointMotion, random: np.random.Generator,
+                 scale: float, climate: np.random.Generator) -> None:
+        assert read.time is not None
+        self.model, self.random, self.scale, self.climate = model, random, scale, climate
+        self.engine, self.motion, self.time = MechanismEngine(model), read, read.time
+        self.windup, self.lead = np.zeros_like(read.position), np.zeros_like(read.position)
+        self.shift = np.zeros(len(model.drives))
+        self.passive: dict[str, Array] = {}
+        self.truths: list[dict[str, Any]] = []
+
+    def size(self, low: float, high: float) -> float:
+        """Return a random size, times the scale."""
+        return self.scale * float(self.random.uniform(low, high))
+
+    def joint_behind_first(self) -> int:
+        """Return a random joint, not the first where there are others."""
+        count = len(self.model.drives)
+        return int(self.random.integers(min(1, count - 1), count))
+
+    def shift_unit(self, joint: int) -> float:
+        """Return the unit of a joint's zero errors and clearances [m/rad or 1]."""
+        slides_in_loop = self.model.robot.structure.loops and not self.model.units[joint].turns
+        return SHIFT_OF_SLIDE if slides_in_loop else 1.0
+
+    def start_bodies(self) -> None:
+        """Compute the efforts before bodies are injected."""
+        self.rigid = self.engine.torques(self.motion)
+
+    def start_gears(self) -> None:
+        """Compute the efforts with injected bodies."""
+        self.bodies = (self.engine.torques(self.motion, self.passive) if self.truths else
+                       self.rigid)
+
+    def start_efforts(self) -> None:
+        """Compute the drives' efforts with the friction of the model, and temperatures."""
+        wound = np.gradient(self.windup, self.time, axis=0)
+        self.efforts = self.bodies + _own_friction(self.model, self.engine, replace(
+            self.motion, velocity=self.motion.velocity + wound,
+            acceleration=self.motion.acceleration + np.gradient(wound, self.time, axis=0)))
+        self.largest = np.abs(self.efforts).max(axis=0)
+        self.temperature = Climate.draw(self.climate, len(self.largest)).along(
+            self.time, self.motion.velocity)
+
+
+def simulate_mechanism(
+    model: MechanismModel, names: Sequence[str], seed: int, scale: float = 1.0,
+    noise: float | None = None, duration: float = 40.0, path_seed: int = 0,
+    progress: Callable[[float], None] | None = None, thermometers: bool = False,
+    link_encoders: bool = False,
+) -> MechanismRun:
+    """Return a recording of a mechanism with injected effects.
+
+    Parameters
+    ----------
+    model : MechanismModel
+        Its added effects are part of the model, not of the simulated robot.
     names : sequence of str
-        Of `joint_forms.NAMES`, or 'random'.
+        Of `NAMES`, or 'random'.
     seed : int
         Of effects and noise.
     scale : float
@@ -126,158 +215,53 @@ def simulate_mechanism(model: MechanismModel, names: Sequence[str], seed: int, s
         Of the motion.
     progress : callable, optional
     thermometers, link_encoders : bool
-        Whether they take part where no effect needs them.
+        Whether they are recorded where no effect needs them.
 
     Raises
     ------
     InjectedEffectError
-        For another name.
+        For another name, or a robot that cannot have an effect.
     """
     random = np.random.default_rng(seed)
-    motion = read = draw_motion(model, duration, path_seed)
-    choices = sorted((*(name for name in FORMS if able_joints(name, model, motion)),
-                      'payload_mass'))
-    chosen = tuple(str(random.choice(choices)) if name == 'random' else name for name in names)
-    require_known(chosen)
-    engine = MechanismEngine(model)
-    if progress is not None:
-        progress(0.1)
-    hidden: list[dict[str, Any]] = []
-    if 'eccentric_encoder' in chosen:
-        motion, drawn = _behind_encoder(model, read, random, scale)
-        hidden.append(drawn)
-    plain = engine.torques(motion)
-    if 'payload_mass' in chosen:
-        hidden.append(engine.hide_payload(random, scale, 0.05))
-    if 'link_mass' in chosen:
-        links = links_that_weigh(model)
-        if not links:
-            raise InjectedEffectError('link_mass needs a link between the first and the tool')
-        hidden.append(engine.hide_link_mass(random, scale, links))
-    passive = {}
-    if 'joint_friction' in chosen:
-        name, effort, parameters = _hidden_joint(model, engine, motion, plain, random, scale)
-        passive[name] = effort
-        hidden.append(truth('joint_friction', None, {
-            f'{name}.{key}': value for key, value in parameters.items()},
-                            'T w / sqrt(w^2 + w_0^2)'))
-    if 'base_tilt' in chosen:
-        hidden.append(engine.hide_tilt(random, scale))
-    largest = np.abs(plain + _own_friction(model, engine, motion)).max(axis=0)
-    if 'external_wrench' in chosen:
-        engine.wrench[2] = scale * 0.05 * float(largest.max())
-        hidden.append(truth('external_wrench', None, {'force_z': float(engine.wrench[2])},
-                            'at the tool'))
-    bodies = engine.torques(motion, passive) if hidden else plain
-    windup = np.zeros_like(bodies)
-    if 'elastic_joint' in chosen:
-        windup, drawn = _wind_up(model, motion, bodies, random, scale)
-        hidden.append(drawn)
-    lead = np.zeros_like(motion.position)
-    if 'lost_motion' in chosen:
-        by_load, lead, drawn = _lost_motion(model, motion, bodies, random, scale)
-        hidden.append(drawn)
-        if by_load:  # the motor goes on as before, and the link falls behind it
-            bodies = engine.torques(replace(motion, position=motion.position - lead), passive)
-            lead = np.zeros_like(lead)
-    if progress is not None:
-        progress(0.8)
-    assert motion.time is not None
-    wound = np.gradient(windup, motion.time, axis=0)
-    efforts = bodies + _own_friction(model, engine, replace(
-        motion, velocity=motion.velocity + wound,
-        acceleration=motion.acceleration + np.gradient(wound, motion.time, axis=0)))
-    largest = np.abs(efforts).max(axis=0)
-    # Random numbers of its own, so that what else is drawn does not depend on the weather.
-    temperature = Climate.draw(np.random.default_rng((seed, CLIMATE)), len(largest)).along(
-        motion.time, motion.velocity)
+    read = draw_motion(model, duration, path_seed)
+    choices = sorted((*(name for name in FORMS if able_joints(name, model, read)), 'payload_mass'))
+    chosen = [str(random.choice(choices)) if name == 'random' else name for name in names]
     for name in chosen:
-        if name in FORMS:
-            hidden.append(_add(name, model, motion, bodies, largest, efforts, random,
-                               scale, temperature))
-    if 'coupled_drives' in chosen:
-        hidden.append(_hide_motor_friction(model, motion, largest, efforts, random, scale))
-    if 'effort_gain' in chosen:
-        joint = int(random.integers(len(model.drives)))
-        gain = scale * float(random.uniform(0.04, 0.1))
-        efforts[:, joint] *= 1 + gain
-        hidden.append(truth('effort_gain', [model.drives[joint]], {'gain': gain}, '1 + gain'))
-    if 'current_gain' in chosen:
-        hidden.append(_hide_current_gain(model, motion, temperature, efforts, random, scale))
-    if 'time_delay' in chosen:
-        assert motion.time is not None
-        delay = scale * float(random.uniform(0.008, 0.03))
-        efforts = np.stack([np.interp(motion.time - delay, motion.time, column)
-                            for column in efforts.T], axis=1)
-        hidden.append(truth('time_delay', list(model.drives), {'delay': delay}, 'all efforts late'))
-    if 'effort_filter' in chosen:
-        assert motion.time is not None
-        time_constant = scale * float(random.uniform(0.01, 0.04))
-        every = np.full(len(largest), time_constant)
-        efforts = ButterworthFilter(every, float(np.median(np.diff(motion.time)))).samples(efforts)
-        hidden.append(truth('effort_filter', list(model.drives), {'time_constant': time_constant},
-                            EffortFilter.form))
-    shift = np.zeros(len(largest))
-    if 'homing_error' in chosen:
-        joint = int(random.integers(1, len(model.drives)))
-        slides_in_loop = model.robot.structure.loops and not model.units[joint].turns
-        unit = SHIFT_OF_SLIDE if slides_in_loop else 1.0
-        shift[joint] = scale * unit * float(random.uniform(0.01, 0.03))
-        hidden.append(truth('homing_error', [model.drives[joint]], {
-            model.drives[joint]: {'zero': float(shift[joint])}}, 'positions shifted'))
-    sigma = np.full(len(largest), noise) if noise is not None else 0.005 * largest
-    beside = lead + shift
-    measured = efforts + noise_like(random, efforts.shape) * sigma
+        if name not in NAMES:
+            raise InjectedEffectError(f'{name} is no injected effect of such a robot, must be one '
+                                      f'of {", ".join(NAMES)}')
+    # Generators of their own, so that no other draw depends on temperatures and second encoders.
+    run = Injection(model, read, random, scale, np.random.default_rng((seed, CLIMATE)))
+    for share, (start, effects) in enumerate(STAGES, 1):
+        start(run)
+        # Forces of drives are drawn in the order in which they were named.
+        for name in ([name for name in chosen if name in FORMS] if effects is FORCES else
+                     [name for name in effects if name in chosen]):
+            run.truths.append(truth(name, *effects[name](run)))
+        if progress is not None:
+            progress(share / len(STAGES))
+    sigma = np.full(len(run.largest), noise) if noise is not None else 0.005 * run.largest
+    beside = run.lead + run.shift
+    measured = run.efforts + noise_like(random, run.efforts.shape) * sigma
     channels = {}
     if thermometers or {*chosen} & {'friction_temperature', 'current_gain'}:
-        channels['temperature'] = read_thermometers(motion.time, temperature)
+        channels['temperature'] = read_thermometers(run.time, run.temperature)
     if link_encoders or 'elastic_joint' in chosen:
-        second = np.random.default_rng((seed, SECOND))  # not mounted at quite the same angle
+        second = np.random.default_rng((seed, SECOND))  # mounted at another angle
         channels['link_position'] = (
-            motion.position + beside + second.normal(0, MOUNTED, len(largest))
+            run.motion.position + beside + second.normal(0, MOUNTED, len(run.shift))
             + ENCODER * second.uniform(-0.5, 0.5, beside.shape))
-    position = read.position + beside + windup + ENCODER * random.uniform(
+    position = read.position + beside + run.windup + ENCODER * random.uniform(
         -0.5, 0.5, beside.shape)
-    return MechanismRun(motion, position, measured, tuple(hidden), channels)
+    return MechanismRun(run.motion, position, measured, tuple(run.truths), channels)
 
 
-def _wind_up(model: MechanismModel, motion: JointMotion, loads: Array, random: np.random.Generator,
-             scale: float) -> tuple[Array, dict[str, Any]]:
-    """Return by how much a motor leads its link because of its load, (N, D), and how.
-
-    A harmonic drive that stiffens, w + (w / w_1)^2 w = tau / k, and creeps: a share of it comes
-    late, by a relaxation (a standard linear solid). It is in a joint that turns, where there is
-    one behind the first: a slide that carries no weight would not feel it.
-    """
-    later = range(1, len(model.drives))
-    joint = int(random.choice([j for j in later if model.units[j].turns] or later))
-    slides_in_loop = model.robot.structure.loops and not model.units[joint].turns
-    largest = float(np.abs(loads[:, joint]).max())
-    span = scale * float(random.uniform(0.02, 0.05)) * (SHIFT_OF_SLIDE if slides_in_loop else 1.0)
-    late, time = float(random.uniform(0.05, 0.2)), float(random.uniform(0.02, 0.1))
-    assert motion.time is not None
-    step = float(np.median(np.diff(motion.time)))
-    load = loads[:, joint] / largest
-    kept, crept = np.exp(-step / time), load.copy()
-    for k in range(1, len(load)):
-        crept[k] = kept * crept[k - 1] + (1 - kept) * load[k]
-    felt = (1 - late) * load + late * crept
-    # The real root of x + x^3 / 4 = felt, x = w / span.
-    x = 4 / np.sqrt(3) * np.sinh(np.arcsinh(0.75 * np.sqrt(3) * felt) / 3)
-    windup = np.zeros_like(loads)
-    windup[:, joint] = span * x
-    return windup, truth(
-        'elastic_joint', [model.drives[joint]], {model.drives[joint]: {
-            'compliance': span / largest, 'loss': late * time}},
-        'tau / tau_0 = x + x^3 / 4, x = w / w_0, a share of it late by a relaxation')
+# ------------------------------------------------------------------------------ encoders, bodies
 
 
-def _behind_encoder(model: MechanismModel, read: JointMotion, random: np.random.Generator,
-                    scale: float) -> tuple[JointMotion, dict[str, Any]]:
-    """Return the motion of an arm with one eccentric encoder, and the truth about it.
-
-    Its control follows what the encoders say.
-    """
+def _eccentric_encoder(run: Injection) -> Injected:
+    """Inject an eccentric encoder, which the robot's control follows."""
+    model, read, random = run.model, run.motion, run.random
     able = [j for j, unit in enumerate(model.units) if unit.turns or model.gear_ratios[j] > 1]
     if not able:
         raise InjectedEffectError('eccentric_encoder needs a joint that turns, or the gear_ratio '
@@ -287,7 +271,7 @@ def _behind_encoder(model: MechanismModel, read: JointMotion, random: np.random.
     # On the motor, or on the joint behind its gear.
     if ratio == 1 or (model.units[j].turns and random.random() < 0.5):
         ratio = 1.0
-    beside = scale * float(random.uniform(*(ON_JOINT if ratio == 1 else ON_MOTOR)))
+    beside = run.size(*(ON_JOINT if ratio == 1 else ON_MOTOR))
     phase = float(random.uniform(-np.pi, np.pi))
 
     def behind(q: Array) -> Array:
@@ -304,94 +288,234 @@ def _behind_encoder(model: MechanismModel, read: JointMotion, random: np.random.
     position[:, j], velocity[:, j] = at, slope * v
     acceleration[:, j] = (slope * read.acceleration[:, j]
                           + (after - 2 * at + before) / step ** 2 * v ** 2)
-    moved = replace(read, position=position, velocity=velocity, acceleration=acceleration)
-    return moved, truth('eccentric_encoder', [model.drives[j]], {model.drives[j]: {
+    run.motion = replace(read, position=position, velocity=velocity, acceleration=acceleration)
+    return Injected([model.drives[j]], {model.drives[j]: {
         'amplitude': beside / ratio, 'phase': phase, 'pitch': 2 * np.pi / ratio}},
         'q - atan(e sin(x) / (1 + e cos(x))) / n, x = n q + phi, behind what is read as q')
 
 
-def _lost_motion(model: MechanismModel, motion: JointMotion, loads: Array,
-                 random: np.random.Generator, scale: float) -> tuple[bool, Array, dict[str, Any]]:
-    """Return whether loads drive a clearance, by how much its encoder leads (N, D), and how.
-
-    They do on half of the joints of which the load changes sign.
-    """
-    joint = int(random.integers(1, len(model.drives)))
-    slides_in_loop = model.robot.structure.loops and not model.units[joint].turns
-    span = scale * float(random.uniform(0.01, 0.03)) * (SHIFT_OF_SLIDE if slides_in_loop else 1.0)
-    load = loads[:, joint]
-    by_load = bool(load.min() < -CROSSED * load.max() < 0) and bool(random.integers(2))
-    driver = load if by_load else motion.velocity[:, joint]
-    lead = np.zeros_like(loads)
-    lead[:, joint] = ahead(span, driver, float(np.abs(driver).max()))
-    return by_load, lead, truth(
-        'lost_motion', [model.drives[joint]],
-        {model.drives[joint]: {'backlash' if by_load else 'play': span}},
-        'b / 2 x / sqrt(x^2 + (0.02 x_max)^2), x the load or the speed')
+def _payload_mass(run: Injection) -> Injected:
+    return inject_payload(run.engine, run.size(0.05, 0.12), 0.05)
 
 
-def _hidden_joint(model: MechanismModel, engine: MechanismEngine, motion: JointMotion, plain: Array,
-                  random: np.random.Generator, scale: float,
-                  ) -> tuple[str, Array, dict[str, float]]:
-    """Return dry friction of a passive joint: its name, efforts against it (N,), and size."""
-    structure = model.robot.structure
+def _link_mass(run: Injection) -> Injected:
+    links = links_that_weigh(run.model)
+    if not links:
+        raise InjectedEffectError('link_mass needs a link between the first and the tool')
+    return inject_link_mass(run.engine, int(run.random.choice(links)), run.size(0.1, 0.3))
+
+
+def _joint_friction(run: Injection) -> Injected:
+    """Inject dry friction of a passive joint."""
+    structure = run.model.robot.structure
     joints = [name for name, (row, _) in friction_rows(structure).items()
               if row >= 0 and name not in structure.drives]
     if not joints:
         raise InjectedEffectError('joint_friction needs a passive joint')
-    name = str(random.choice(joints))
-    closed, dof = engine.closed(motion), engine.state.dof(name)
+    name = str(run.random.choice(joints))
+    closed, dof = run.engine.closed(run.motion), run.engine.state.dof(name)
     rate, felt = closed.velocity[:, dof], np.abs(closed.rates[:, dof]).max(axis=0)
-    # As large on the drive that feels it most as a hidden force on a drive is.
+    # As large on the drive that feels it most as an injected force on a drive is.
     d = int(np.argmax(felt))
-    torque = scale * SIZE(random) * float(np.abs(plain[:, d]).max()) / float(felt[d])
-    width = STEEPNESS * float(np.abs(rate).max())
-    return name, torque * rate / np.sqrt(rate ** 2 + width ** 2), {'torque': torque}
+    torque = run.scale * SIZE(run.random) * float(np.abs(run.rigid[:, d]).max()) / float(felt[d])
+    run.passive[name] = torque * turned_over(rate, float(np.abs(rate).max()))
+    return Injected(None, {f'{name}.torque': torque}, 'T w / sqrt(w^2 + w_0^2)')
 
 
-def _hide_motor_friction(model: MechanismModel, motion: JointMotion, largest: Array, efforts: Array,
-                         random: np.random.Generator, scale: float) -> dict[str, Any]:
-    """Let a motor rub that moves several joints, and return how."""
-    motors = model.robot.motors
+def _base_tilt(run: Injection) -> Injected:
+    _require_tool(run.model, 'base_tilt')
+    return inject_tilt(run.engine, run.size(0.01, 0.03))
+
+
+def _external_wrench(run: Injection) -> Injected:
+    _require_tool(run.model, 'external_wrench')
+    friction = _own_friction(run.model, run.engine, run.motion)
+    run.engine.wrench[2] = run.scale * 0.05 * float(np.abs(run.rigid + friction).max())
+    return Injected(None, {'force_z': float(run.engine.wrench[2])}, 'at the tool')
+
+
+def _require_tool(model: MechanismModel, name: str) -> None:
+    """Raise InjectedEffectError for an axis, which a force across it does not move."""
+    if not model.is_described:
+        raise InjectedEffectError(f'{name} does not act along a single axis: choose effort_offset')
+
+
+def inject_payload(engine: MechanismEngine, share: float, ahead: float) -> Injected:
+    """Hang a point of a share of the robot's mass on the tool, along its z axis [m]."""
+    mass = share * float(engine.described.masses.sum())
+    engine.add_payload(mass, np.array([0.0, 0.0, ahead]))
+    return Injected(None, {'mass': mass}, f'a point {100 * ahead:g} cm before the tool'
+                    if ahead else "a point at the tool's origin")
+
+
+def inject_link_mass(engine: MechanismEngine, body: int, share: float) -> Injected:
+    """Make a body heavier by a share of its mass."""
+    mass = share * float(engine.described.masses[body])
+    engine.add_to_link(body, mass)
+    return Injected(None, {f'{engine.described.body_names[body]}.mass': mass},
+                    'a point at its centre')
+
+
+def inject_tilt(engine: MechanismEngine, angle: float) -> Injected:
+    """Tilt the base about its x axis [rad]."""
+    engine.gravity = tilted(engine.gravity, angle)
+    return Injected(None, {'x': angle, 'y': 0.0}, 'about x')
+
+
+# ----------------------------------------------------------------------------------------- gears
+
+
+def _elastic_joint(run: Injection) -> Injected:
+    """Inject a gear that winds up under load.
+
+    A harmonic drive that stiffens, w + (w / w_1)^2 w = tau / k, and creeps: a share of it comes
+    late, by a relaxation (a standard linear solid). It is in a joint that turns, where there is
+    one behind the first: a slide that carries no weight would not feel it.
+    """
+    model, random = run.model, run.random
+    later = range(min(1, len(model.drives) - 1), len(model.drives))
+    joint = int(random.choice([j for j in later if model.units[j].turns] or later))
+    largest = float(np.abs(run.bodies[:, joint]).max())
+    span = run.size(0.02, 0.05) * run.shift_unit(joint)
+    late, time = float(random.uniform(0.05, 0.2)), float(random.uniform(0.02, 0.1))
+    load = run.bodies[:, joint] / largest
+    kept, crept = np.exp(-float(np.median(np.diff(run.time))) / time), load.copy()
+    for k in range(1, len(load)):
+        crept[k] = kept * crept[k - 1] + (1 - kept) * load[k]
+    felt = (1 - late) * load + late * crept
+    # The real root of x + x^3 / 4 = felt, x = w / span.
+    x = 4 / np.sqrt(3) * np.sinh(np.arcsinh(0.75 * np.sqrt(3) * felt) / 3)
+    run.windup[:, joint] = span * x
+    return Injected([model.drives[joint]], {model.drives[joint]: {
+        'compliance': span / largest, 'loss': late * time}},
+        'tau / tau_0 = x + x^3 / 4, x = w / w_0, a share of it late by a relaxation')
+
+
+def _lost_motion(run: Injection) -> Injected:
+    """Inject a clearance, crossed by the load on half of the joints whose load changes sign."""
+    joint = run.joint_behind_first()
+    span = run.size(0.01, 0.03) * run.shift_unit(joint)
+    load = run.bodies[:, joint]
+    # The link falls behind in its position alone, on which no force of an axis depends.
+    by_load = bool(run.model.is_described and load.min() < -CROSSED * load.max() < 0
+                   and run.random.integers(2))
+    driver = load if by_load else run.motion.velocity[:, joint]
+    lead = np.zeros_like(run.bodies)
+    lead[:, joint] = ahead(span, driver, float(np.abs(driver).max()))
+    if by_load:  # the motor moves as before, and the link falls behind it
+        run.bodies = run.engine.torques(replace(
+            run.motion, position=run.motion.position - lead), run.passive)
+    else:
+        run.lead = lead
+    name = run.model.drives[joint]
+    return Injected([name], {name: {'backlash' if by_load else 'play': span}},
+                    'b / 2 x / sqrt(x^2 + (0.02 x_max)^2), x the load or the speed')
+
+
+# --------------------------------------------------------------------------- drives, amplifiers
+
+
+def _force(name: str, run: Injection) -> Injected:
+    """Inject a force on one drive, or on all."""
+    model, random, form = run.model, run.random, FORMS[name]
+    everywhere = bool(random.random() < 0.25)
+    chosen = (able_joints(name, model, run.motion) if everywhere else
+              [one_able_joint(name, model, run.motion, random)])
+    parameters = {}
+    for j in chosen:
+        moment = JointMoment.along(run.motion, j, run.bodies[:, j], run.largest[j],
+                                   model.gear_ratios[j], run.temperature)
+        drawn = parameters[model.drives[j]] = draw_form(name, random, moment, run.scale)
+        run.efforts[:, j] += form.force(drawn, moment)
+    return Injected([model.drives[j] for j in chosen], parameters, form.form)
+
+
+def _coupled_drives(run: Injection) -> Injected:
+    """Inject friction of a motor that moves several joints."""
+    motors = run.model.robot.motors
     if not motors:
         raise InjectedEffectError('coupled_drives needs a motor that moves several joints: write '
-                                'friction: {motors: {MOTOR: {JOINT: 1.0, OTHER: 1.0}}}')
-    name = str(random.choice(sorted(motors)))
+                                  'friction: {motors: {MOTOR: {JOINT: 1.0, OTHER: 1.0}}}')
+    name = str(run.random.choice(sorted(motors)))
     row = np.array(motors[name])
-    speed = motion.velocity @ row
+    speed = run.motion.velocity @ row
     top = float(np.abs(speed).max())
-    # As large on the joint that feels it most as a hidden force on a drive is.
-    felt = float(np.min(largest[row != 0] / np.abs(row[row != 0])))
-    dry, viscous = (scale * SIZE(random) * felt for _ in range(2))
-    friction = (dry * speed / np.hypot(speed, STEEPNESS * top)
-                + viscous * 2 * np.arcsinh(speed / (2 * top)))
-    efforts += np.outer(friction, row)
-    return truth('coupled_drives', None, {
-        f'{name}.coulomb': dry, f'{name}.viscous': viscous / top},
-        "A' (F v / sqrt(v^2 + w^2) + c v_1 asinh(v / v_1)), v the speed of the motor")
+    # As large on the joint that feels it most as an injected force on a drive is.
+    felt = float(np.min(run.largest[row != 0] / np.abs(row[row != 0])))
+    dry, viscous = (run.scale * SIZE(run.random) * felt for _ in range(2))
+    friction = dry * turned_over(speed, top) + viscous * 2 * np.arcsinh(speed / (2 * top))
+    run.efforts += np.outer(friction, row)
+    return Injected(None, {f'{name}.coulomb': dry, f'{name}.viscous': viscous / top},
+                    "A' (F v / sqrt(v^2 + w^2) + c v_1 asinh(v / v_1)), v the speed of the motor")
 
 
-def _hide_current_gain(model: MechanismModel, motion: JointMotion, temperature: Array,
-                       efforts: Array, random: np.random.Generator, scale: float) -> dict[str, Any]:
-    """Let a motor's torque per current go with its temperature or its angle, and return how."""
+def _effort_gain(run: Injection) -> Injected:
+    joint = int(run.random.integers(len(run.model.drives)))
+    gain = run.size(0.04, 0.1)
+    run.efforts[:, joint] *= 1 + gain
+    return Injected([run.model.drives[joint]], {'gain': gain}, '1 + gain')
+
+
+def _current_gain(run: Injection) -> Injected:
+    """Inject a torque constant that changes with the motor's temperature or angle."""
+    model, random = run.model, run.random
     j = int(random.integers(len(model.drives)))
     ratio = model.gear_ratios[j]
     if ratio > 1 and random.random() < 0.5:
-        height, waves = scale * float(random.uniform(0.03, 0.08)), int(random.integers(1, 7))
+        height, waves = run.size(0.03, 0.08), int(random.integers(1, 7))
         phase = float(random.uniform(-np.pi, np.pi))
-        turn = waves * ratio * motion.position[:, j] + phase
+        turn = waves * ratio * run.motion.position[:, j] + phase
         constant = 1 + height * (np.sin(turn) + 0.2 * np.sin(3 * turn))
         parameters = {'ripple': height, 'phase': phase, 'pitch': 2 * np.pi / (waves * ratio)}
         form = 'F / (1 + a (sin(x) + sin(3 x) / 5)), x = 2 pi q / p + phi'
     else:
-        weaker = scale * float(random.uniform(0.0015, 0.003))
+        weaker = run.size(0.0015, 0.003)
         reference = float(random.uniform(*REFERENCE))
-        warmer = temperature[:, j] - reference
+        warmer = run.temperature[:, j] - reference
         constant = 1 - weaker * warmer * (1 + warmer / 300)
         parameters = {'temperature': weaker, 'reference': reference}
         form = 'F / (1 - kappa (T - T_0) (1 + (T - T_0) / 300 K))'
-    efforts[:, j] /= constant
-    return truth('current_gain', [model.drives[j]], {model.drives[j]: parameters}, form)
+    run.efforts[:, j] /= constant
+    return Injected([model.drives[j]], {model.drives[j]: parameters}, form)
+
+
+def _time_delay(run: Injection) -> Injected:
+    delay = run.size(0.008, 0.03)
+    run.efforts = np.stack([np.interp(run.time - delay, run.time, column)
+                            for column in run.efforts.T], axis=1)
+    return Injected(list(run.model.drives), {'delay': delay}, 'all efforts late')
+
+
+def _effort_filter(run: Injection) -> Injected:
+    time_constant = run.size(0.01, 0.04)
+    run.efforts = ButterworthFilter(np.full(len(run.largest), time_constant), float(
+        np.median(np.diff(run.time)))).samples(run.efforts)
+    return Injected(list(run.model.drives), {'time_constant': time_constant}, EffortFilter.form)
+
+
+def _homing_error(run: Injection) -> Injected:
+    joint = run.joint_behind_first()
+    run.shift[joint] = run.size(0.01, 0.03) * run.shift_unit(joint)
+    name = run.model.drives[joint]
+    return Injected([name], {name: {'zero': float(run.shift[joint])}}, 'positions shifted')
+
+
+Effects = Mapping[str, Callable[[Injection], Injected]]
+FORCES: Effects = {name: partial(_force, name) for name in FORMS}
+# What is computed before, and the effects that it does not contain yet.
+STAGES: tuple[tuple[Callable[[Injection], None], Effects], ...] = (
+    (lambda run: None, {'eccentric_encoder': _eccentric_encoder}),
+    (Injection.start_bodies, {
+        'payload_mass': _payload_mass, 'link_mass': _link_mass, 'joint_friction': _joint_friction,
+        'base_tilt': _base_tilt, 'external_wrench': _external_wrench}),
+    (Injection.start_gears, {'elastic_joint': _elastic_joint, 'lost_motion': _lost_motion}),
+    (Injection.start_efforts, FORCES),
+    (lambda run: None, {
+        'coupled_drives': _coupled_drives, 'effort_gain': _effort_gain,
+        'current_gain': _current_gain, 'time_delay': _time_delay, 'effort_filter': _effort_filter,
+        'homing_error': _homing_error}))
+NAMES = tuple(sorted((name for _, effects in STAGES for name in effects),
+                     key=lambda name: name not in FORMS))
 
 
 def _own_friction(model: MechanismModel, engine: MechanismEngine, motion: JointMotion) -> Array:
@@ -432,24 +556,6 @@ def one_able_joint(name: str, model: MechanismModel, motion: JointMotion,
         raise InjectedEffectError(f'{name} needs a joint that turns by '
                                 f'{FORMS[name].needs_turn:g} rad')
     return able[int(random.integers(len(able)))]
-
-
-def _add(name: str, model: MechanismModel, motion: JointMotion, load: Array, largest: Array,
-         efforts: Array, random: np.random.Generator, scale: float, temperature: Array,
-         ) -> dict[str, Any]:
-    """Add a hidden force on one joint, or on all, and return what it is."""
-    form, drives = FORMS[name], model.drives
-    everywhere = bool(random.random() < 0.25)
-    one = one_able_joint(name, model, motion, random) if not everywhere else None
-    chosen = able_joints(name, model, motion) if one is None else [one]
-    parameters = {}
-    for j in chosen:
-        moment = JointMoment.along(motion, j, load[:, j], largest[j], model.gear_ratios[j],
-                                   temperature)
-        drawn = draw_form(name, random, moment, scale)
-        efforts[:, j] += form.force(drawn, moment)
-        parameters[drives[j]] = drawn
-    return truth(name, [drives[j] for j in chosen], parameters, form.form)
 
 
 def noise_like(random: np.random.Generator, shape: tuple[int, ...]) -> Array:

@@ -66,7 +66,6 @@ MISTAKES = {
     'simulate --output x.csv --path-seed -1': 'argument --path-seed: ',
     'simulate --output x.csv --seed 1.5': "'1.5' must be a whole number",
     'simulate --output x.csv --duration inf': "'inf' must lie between",
-    'simulate --output x.csv --model axis.yaml': 'single axis',
     'survey run.csv --output x --effects no_such_effect': 'no_such_effect',
     'survey run.csv --output x --manifest y.csv': '--manifest',
     'survey run.csv --output x --workers 0': '--workers',

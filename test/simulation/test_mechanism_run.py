@@ -23,9 +23,9 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.simulation.injected_effect import InjectedEffectError
-from pprs_dynamics.simulation.joint_forms import FORMS, NAMES
+from pprs_dynamics.simulation.joint_forms import FORMS
 from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
-from pprs_dynamics.simulation.mechanism_run import draw_motion, simulate_mechanism
+from pprs_dynamics.simulation.mechanism_run import NAMES, draw_motion, simulate_mechanism
 
 
 @pytest.fixture(scope='module')
@@ -141,6 +141,33 @@ def test_every_hidden_effect_shows(
                      'elastic_joint'})
 
 
+AXIS = MechanismModel.load('config/single_axis.yaml')
+NOT_ON_AN_AXIS = ('counterbalance', 'link_mass', 'base_tilt', 'external_wrench',
+                  'eccentric_encoder', 'joint_friction', 'coupled_drives')
+
+
+def test_a_simulated_axis_moves_its_mass_against_the_friction_of_its_file() -> None:
+    run = simulate_mechanism(AXIS, (), 0, noise=0.0, duration=8.0)
+    values, v = AXIS.values, run.motion.velocity
+    width = values['friction.reversal_velocity']
+    assert run.effort == pytest.approx(
+        values['axis.mass'] * run.motion.acceleration + values['axis.viscous'] * v
+        + values['axis.coulomb'] * np.tanh(v / width) + values['axis.offset'], abs=1e-8)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_effects_are_injected_into_an_axis_or_refused(name: str) -> None:
+    if name in NOT_ON_AN_AXIS:
+        with pytest.raises(InjectedEffectError, match=name):
+            simulate_mechanism(AXIS, (name,), 4, duration=8.0)
+        return
+    plain, run = (simulate_mechanism(AXIS, names, 4, noise=0.0, duration=8.0)
+                  for names in ((), (name,)))
+    assert run.effects[0]['name'] == name
+    assert (np.abs(run.effort - plain.effort).max() > 0.1
+            or np.abs(run.position - plain.position).max() > 1e-3)
+
+
 def test_motors_without_a_map_rub_nowhere(model: MechanismModel) -> None:
     with pytest.raises(InjectedEffectError, match=r'friction: \{motors:'):
         simulate_mechanism(model, ('coupled_drives',), 4, duration=10.0)
@@ -182,7 +209,7 @@ def test_the_command_writes_recording_and_truth(tmp_path: Path,
     assert json.loads(truth.read_text())['effects'][0]['parameters']['mass'] > 0
     assert main(['simulate', '--model', path, '--output', output + '2.csv', '--effect',
                  'tool_drag']) == 2
-    assert 'no hidden effect of such a robot' in capsys.readouterr().err
+    assert 'no injected effect of such a robot' in capsys.readouterr().err
 
 
 def test_statements_have_the_units_of_joints(model: MechanismModel, tmp_path: Path,

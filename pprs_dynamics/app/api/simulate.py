@@ -127,18 +127,18 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     scale : float
         Multiplies the strength of the effects.
     motion : PlatformMotion, optional
-        At 500 Hz; a random one from rest to rest by default. Of an arm always that.
+        Of a 3-PPRS at 500 Hz; by default, and of other robots always, a random one.
     duration : float
         Of the random motion [s].
     path_seed : int
         Of the random motion.
     noise : float, optional
-        Standard deviation of the efforts [N]; 0.08, and of an arm half a percent of the largest
-        [N m, N].
+        Standard deviation of the efforts [N m, N]: by default 0.08 N of a 3-PPRS, and half a
+        percent of the largest of other robots.
     feedforward : {'friction', 'rigid_body', 'none'}
         What the 3-PPRS is driven with.
     thermometers, link_encoders : bool
-        Whether those of an arm are recorded, even where no effect needs them.
+        Whether those of other robots are recorded where no effect needs them.
     progress : callable, optional
         Called with what is being done and the share of it that is done.
 
@@ -156,18 +156,17 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     found = model if isinstance(model, ForceModel) else load_model(find_file(model))
     names = [effects] if isinstance(effects, str) else list(effects)
     share_done = stage(progress, 'simulating')
-    if isinstance(found, MechanismModel) and found.is_described:
-        from pprs_dynamics.simulation.mechanism_run import RATE as ARM_RATE
+    if isinstance(found, MechanismModel):
+        from pprs_dynamics.simulation.mechanism_run import RATE as MECHANISM_RATE
         from pprs_dynamics.simulation.mechanism_run import simulate_mechanism
 
-        arm = simulate_mechanism(found, names, seed, scale, noise, duration, path_seed, share_done,
-                           thermometers, link_encoders)
-        assert arm.motion.time is not None
-        recording = Recording.from_arrays('simulated', arm.motion.time, arm.position, None,
-                                          arm.effort, found.drives, arm.channels)
-        return SimulationResult(found, recording, arm.effects, (), arm.motion, ARM_RATE, seed)
-    if not isinstance(found, DriveModel):
-        raise MotionError('model', f'it is of {found.title}', 'be of a 3-PPRS or an arm', 'shape')
+        run = simulate_mechanism(found, names, seed, scale, noise, duration, path_seed, share_done,
+                                 thermometers, link_encoders)
+        assert run.motion.time is not None
+        recording = Recording.from_arrays('simulated', run.motion.time, run.position, None,
+                                          run.effort, found.drives, run.channels)
+        return SimulationResult(found, recording, run.effects, (), run.motion, MECHANISM_RATE, seed)
+    assert isinstance(found, DriveModel)
     if feedforward not in FEEDFORWARDS:
         raise MotionError('feedforward', repr(feedforward),
                           f'be one of {", ".join(FEEDFORWARDS)}', 'shape')
@@ -182,14 +181,14 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     forces = found.drive_forces(motion)
     found.limits.check_strokes(forces.mechanism.position)
     effort = {'friction': forces.total, 'rigid_body': forces.parts['rigid_body'], 'none': None}
-    run = simulate_robot(
+    driven = simulate_robot(
         found.values, DriveReference(forces.mechanism.position, forces.mechanism.velocity,
                                      effort[feedforward]),
         draw_effects(names, np.random.default_rng(seed), scale), seed=seed, rate=RATE,
         truth=False, control=ControlSettings(gravity_compensation=feedforward == 'none'),
         sensors=SensorSettings.with_effort_noise(NOISE if noise is None else noise),
         progress=share_done)
-    recording = Recording.from_arrays('simulated', run.time, run.position, run.velocity, run.effort,
-                                      channels=run.channels)
-    return SimulationResult(found, recording, tuple(run.effects), tuple(run.notes), motion, RATE,
-                            seed)
+    recording = Recording.from_arrays('simulated', driven.time, driven.position, driven.velocity,
+                                      driven.effort, channels=driven.channels)
+    return SimulationResult(found, recording, tuple(driven.effects), tuple(driven.notes),
+                            motion, RATE, seed)

@@ -22,7 +22,7 @@ from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.simulation.injected_effects import INJECTED_EFFECTS, RANDOM
-from pprs_dynamics.simulation.joint_forms import NAMES as ARM_EFFECTS
+from pprs_dynamics.simulation.mechanism_run import NAMES as ARM_EFFECTS
 
 LONGEST = 3600.0  # [s], of an excitation: minutes of simulation, and hundreds of megabytes
 
@@ -37,8 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--effect', metavar='NAME', action='append', default=[],
                         choices=(*dict.fromkeys((*INJECTED_EFFECTS, *ARM_EFFECTS)), RANDOM),
                         help='physics that the model does not know of, drawn from the seed; may '
-                        f'be repeated: random, {", ".join(INJECTED_EFFECTS)}; of an arm or a '
-                        f'robot with loops {", ".join(ARM_EFFECTS)}')
+                        f'be repeated: random, {", ".join(INJECTED_EFFECTS)}; of other '
+                        f'robots {", ".join(ARM_EFFECTS)}')
     parser.add_argument('--seed', type=seed, default=0, help='of noise and effects (default 0)')
     parser.add_argument('--path', default='excitation',
                         help='helix, excitation, or a CSV of poses (default excitation)')
@@ -46,8 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='of an excitation [s] (default 40)')
     parser.add_argument('--path-seed', type=seed, default=0, help='of an excitation (default 0)')
     parser.add_argument('--noise', type=number(0.0, 1e3, 'N'),
-                        help=f'of the efforts, standard deviation [N] (default {NOISE:g}; of an '
-                        'arm [N m, N] half a percent of the largest)')
+                        help=f'of the efforts, standard deviation [N] (default {NOISE:g}; of other '
+                        'robots [N m, N] half a percent of the largest)')
 
 
 def run(options: argparse.Namespace) -> int:
