@@ -166,7 +166,7 @@ def test_a_drive_that_keeps_more_than_its_noise_is_named_beside_what_was_found()
     assert words.headline.startswith(
         'An error remains that no effect of the catalogue explains: the error of slide_3 is 2.1 '
         'times its noise. In addition, the model lacks coulomb_friction')
-    assert words.headline.endswith('; with it the error falls from 0.25 N to 0.0803 N.')
+    assert words.headline.endswith('; with it the error falls from 0.25 N to 0.0804 N.')
     assert words.following.startswith('Confirm it on the machine')
 
 

@@ -27,7 +27,6 @@ from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.tree_equations import DETERMINANT, Data
 from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.three_pprs import state as three_pprs_state
 
 SAMPLES = 30
 ROBOTS = {'hexapod': robots.hexapod, 'delta': robots.delta, 'five_bar': robots.five_bar,
@@ -201,14 +200,6 @@ def paths(seeds: int = 3) -> list:
     return [HelicalPath(), *(Excitation(duration=10.0, seed=seed) for seed in range(seeds))]
 
 
-@pytest.fixture
-def frictionless_loads(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out what friction in joints adds to their loads: the tables do not compute it."""
-    monkeypatch.setattr(three_pprs_state, 'LOAD_ROUNDS', 0)
-    monkeypatch.setattr(DriveModel, '_one_pass', None)
-
-
-@pytest.mark.usefixtures('frictionless_loads')
 @pytest.mark.parametrize('which', range(4))
 def test_the_3_pprs_with_loops_is_its_closed_form(tmp_path: Path, which: int) -> None:
     """On its paths, and on states scattered about them: rigid body and passive friction."""
@@ -222,7 +213,6 @@ def test_the_3_pprs_with_loops_is_its_closed_form(tmp_path: Path, which: int) ->
         assert found.parts[part] == pytest.approx(forces.parts[part], abs=1e-10), part
 
 
-@pytest.mark.usefixtures('frictionless_loads')
 def test_the_3_pprs_with_loops_is_its_closed_form_in_1000_random_states(tmp_path: Path) -> None:
     """Rigid body, friction of the drives with the load of their guides, and of passive joints."""
     paper, model = three_pprs(tmp_path, drives=True)
@@ -235,7 +225,6 @@ def test_the_3_pprs_with_loops_is_its_closed_form_in_1000_random_states(tmp_path
     assert min(np.abs(part).max() for part in (active, passive)) > 1
 
 
-@pytest.mark.usefixtures('frictionless_loads')
 def test_a_wrench_on_the_platform_loads_every_joint_as_in_the_closed_form(tmp_path: Path) -> None:
     """580 N on the platform: friction of drives and passive joints follows what they carry."""
     wrench = {f'effects.external_wrench.{name}': value for name, value in zip(
@@ -274,7 +263,6 @@ OF_BOTH = {
     'tool_drag': ({'coefficient': 7.0, 'rotational': 0.05},) * 2}
 
 
-@pytest.mark.usefixtures('frictionless_loads')
 @pytest.mark.parametrize('name', OF_BOTH)
 def test_an_effect_is_the_same_in_both_kernels(tmp_path: Path, name: str) -> None:
     """Its own force, and what loads that it adds bring of friction in joints and guides."""

@@ -72,24 +72,9 @@ def motion() -> DrivenMotion:
 def test_with_nothing_hidden_the_drives_need_what_the_model_says(change: dict[str, object]) -> None:
     model = build_model({**MODEL.values, **change})
     motion, forces = excited(model, 0.4)
-    found = PrescribedPlant(model.values, motion,
-                            PlantSettings(actual_loads=True)).efforts().total
+    found = PrescribedPlant(model.values, motion).efforts().total
     # A slide without mass has 1e-9 kg in the engine.
     assert np.abs(found - forces).max() < 1e-8
-
-
-def test_friction_of_an_effect_loads_the_joints_as_in_the_engine() -> None:
-    """More friction in the ball joints, as numbers of the model and as an effect beside it."""
-    wanted = {'friction.spherical.viscous': 0.5, 'friction.spherical.coulomb': 0.2}
-    sticky = build_model({**MODEL.values, **wanted})
-    motion, forces = excited(sticky, 0.4)
-    found = PrescribedPlant(sticky.values, motion, PlantSettings(actual_loads=True)).efforts()
-    assert np.abs(found.total - forces).max() < 1e-4  # after three rounds
-    more = {key.replace('friction.', 'effects.joint_friction.'): value - MODEL.values[key]
-            for key, value in wanted.items()}
-    added = build_model({**MODEL.values, 'effects.active': ['joint_friction'], **more})
-    _, same = excited(added, 0.4)
-    np.testing.assert_allclose(same, forces, rtol=0, atol=1e-9)
 
 
 def run_plant(effects: list[InjectedEffect], actual_loads: bool = False) -> SimulatedRun:

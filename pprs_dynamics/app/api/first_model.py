@@ -222,8 +222,8 @@ def _corrections(model: Model, path: Path, corrected: set[str],
     sure = [each for each in readings if each.scales and each.kind in SURE_KINDS - corrected]
     corrected.update(each.kind for each in sure)
     unsure = [each for each in readings if each not in sure] if not sure else []
-    questions = [f'{each.what}: if so, write {line}' for each in unsure
-                 if (line := each.line or columns_line([each]))]
+    questions = [each.what + (f': if so, write {line}' if line else '') for each in unsure
+                 for line in [each.line or columns_line([each])]]
     return (tuple(scale for each in sure for scale in each.scales),
             [each.what for each in sure], questions)
 

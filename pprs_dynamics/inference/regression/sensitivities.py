@@ -21,11 +21,7 @@ from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect, Parameter
-from pprs_dynamics.physics.effects.structure_effect import (
-    BodyEffect,
-    PassiveJointEffect,
-    StructureEffect,
-)
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.force_model import (
     ACTIVE_FRICTION,
@@ -330,12 +326,6 @@ class Sensitivities:
             step = coefficient.scale
             moved: Any = effect.at({**values, coefficient.name:
                                     values.get(coefficient.name, 0.0) + step})
-            if isinstance(moved, PassiveJointEffect):
-                more: Any = effect.at({coefficient.name: step})
-                rubbing = more.rubbing(state)
-                change = self.sensed((more.force(rubbing) + self._efforts(self.model, rubbing)
-                                      - reference) / step, state)
-                return change, change
             if not isinstance(moved, BodyEffect):
                 before = effect.at(values) if present is None else present
                 change = self.sensed((moved.force(state) - before.force(state)) / step, state)

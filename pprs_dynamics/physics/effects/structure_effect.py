@@ -81,10 +81,6 @@ def with_bodies(robot: Any, effects: Iterable[object]) -> Any:
 class PassiveJointEffect(StructureEffect):
     """Friction in the passive joints: a force on top of the rigid body's."""
 
-    def rubbing(self, state: Any) -> Any:
-        """Return the state whose joints carry this friction as well; by default as it is."""
-        return state
-
     @abstractmethod
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the effect's drive forces [N, N m], (N, D)."""

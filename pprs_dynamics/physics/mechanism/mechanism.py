@@ -506,10 +506,6 @@ class MechanismState(JointMotion):
         return self.robot.structure.evaluation.friction(self.links.rows, self._load_rows,
                                                         friction)
 
-    def with_friction(self, friction: JointFriction) -> MechanismState:
-        """Return the state as it is: what friction in its joints adds to loads is not computed."""
-        return self
-
     def with_smoothing(self, reversal: Reversal) -> MechanismState:
         """Return the state with a sgn of other widths; all else is computed once for both."""
         state = replace(self, reversal=reversal, known=self.links)

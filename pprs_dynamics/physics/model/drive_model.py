@@ -16,7 +16,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import PLATFORM, Effect
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.effects_block import added_effects
@@ -134,8 +134,6 @@ class DriveModel(ForceModel):
         with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
             return solve_mechanism(
                 self.robot, motion, reversal=self.reversal, printed=self.equations == 'printed',
-                friction=tuple(effect.joints for effect in self.effects
-                               if isinstance(effect, WholeMechanismFriction)),
                 minimum_sine=self.limits.rod_sine, condition_limit=self.limits.condition_number)
 
     def at_drives(self, state: ThreePprsState) -> ThreePprsState:
@@ -163,11 +161,10 @@ class DriveModel(ForceModel):
 
     @cached_property
     def _one_pass(self) -> OnePass | None:
-        """The paper's model in one pass, where no effect changes its bodies or loads."""
+        """The paper's model in one pass, where no effect changes the bodies that it is of."""
         match self.effects:
             case (ActiveFriction() as active, WholeMechanismFriction() as passive, *added):
-                if not any(isinstance(effect, BodyEffect | PassiveJointEffect)
-                           for effect in added):
+                if not any(isinstance(effect, BodyEffect) for effect in added):
                     return OnePass(self.robot, active, passive, self.limits, self.reversal,
                                    self.equations == 'printed')
         return None

@@ -27,7 +27,7 @@ from pprs_dynamics.errors import EffectError, MotionError
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
-from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.keys import EFFORT_UNITS, FILES, Key, title_of
@@ -472,9 +472,6 @@ class ForceModel(ABC):
                     loaded = effect.apply(mechanism)
                     parts[effect.name] = loaded.rigid_force - mechanism.rigid_force
                     mechanism = loaded
-            for effect in effects:
-                if isinstance(effect, PassiveJointEffect):
-                    mechanism = effect.rubbing(mechanism)
             for effect in effects:
                 if not effect.is_measurement and not isinstance(effect, BodyEffect):
                     parts[effect.name] = effect.force(mechanism, state.memories[effect.name])

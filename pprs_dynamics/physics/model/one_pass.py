@@ -45,10 +45,8 @@ from pprs_dynamics.physics.three_pprs.joint_rates import turnover
 from pprs_dynamics.physics.three_pprs.kernel_parameters import Joints, RobotParameters
 from pprs_dynamics.physics.three_pprs.passive_friction import WholeMechanismFriction
 from pprs_dynamics.physics.three_pprs.passive_joints import (
-    LOAD_ROUNDS,
     JointResistance,
     friction_forces,
-    friction_loads,
     joint_resistances,
 )
 from pprs_dynamics.physics.three_pprs.rigid_body import ThreeForces, body_forces
@@ -136,8 +134,7 @@ class OnePass:
         kinematics = MechanismKinematics(self._robot.geometry, motion, *self._bounds)
         if len(table) > FORCES:
             kinematics.__dict__['drive_motion'] = tuple(table[FORCES:])
-        return ThreePprsState(self._robot, motion, kinematics, self._reversal, self._printed,
-                              friction=(self.parameters.named.joints,))
+        return ThreePprsState(self._robot, motion, kinematics, self._reversal, self._printed)
 
 
 def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, parts: Any) -> Any:
@@ -152,18 +149,12 @@ def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, parts: Any) -> 
     zero = 0.0 * rods[0].cos_u
     nothing = Vector(zero, zero, zero)
     bodies = body_forces(p.robot, m, rods, inverse, Wrench(nothing, nothing), nothing, p.printed)
-    # Friction loads the joints, and the loads rub: the printed equations leave that out.
-    loaded = bodies
-    for _ in range(LOAD_ROUNDS):
-        load, hinges = friction_loads(geometry, rods, _joint_resistances(p, rods, loaded),
-                                      1.0 - p.printed)
-        loaded = body_forces(p.robot, m, rods, inverse, load, hinges, p.printed)
-    k = _joint_resistances(p, rods, loaded)
+    k = _joint_resistances(p, rods, bodies)
     passive = friction_forces(geometry, rods, inverse, k, p.printed_friction)
     for i in range(CHAINS):
-        c, f, by = rods[i], bodies[i], loaded[i]
-        _write_forces(i, p, parts, s, f.slide, c.slide_velocity, by.slide_load, passive.slides[i])
-        _write_forces(CHAINS + i, p, parts, s, f.lift, c.lift_velocity, by.lift_load,
+        c, f = rods[i], bodies[i]
+        _write_forces(i, p, parts, s, f.slide, c.slide_velocity, f.slide_load, passive.slides[i])
+        _write_forces(CHAINS + i, p, parts, s, f.lift, c.lift_velocity, f.lift_load,
                       passive.lifts[i])
     bound = condition_bound(inverse, rows, rods, p.platform_radius)
     return are_within_reach(rods, p.minimum_sine) & (bound <= p.bound)

@@ -12,7 +12,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
 from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
-from pprs_dynamics.physics.mechanism.vectors import Vector, in_base, plus, times
+from pprs_dynamics.physics.mechanism.vectors import in_base, plus, times
 from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
 from pprs_dynamics.physics.three_pprs.closure import (
     DriveValues,
@@ -76,35 +76,6 @@ def chain_resistances(
     return Wrench(times(about_u, rod.force), plus(times(about_u, rod.moment), about_platform))
 
 
-LOAD_ROUNDS = 3  # of loads that follow friction, and friction the loads: each is 2 % of the last
-
-
-def friction_loads(
-    geometry: GeometryParameters, rods: ThreeChains, k: Any, share: Value,
-) -> tuple[Wrench, Any]:
-    """Return a share of the platform's wrench and the moments in the hinges by friction.
-
-    The chains carry them beside what bodies and gravity need, which loads the joints.
-    """
-    a, b, c = _platform_moments(geometry, rods, k, share)
-    zero = 0.0 * rods[0].cos_u
-    return Wrench(Vector(zero, zero, zero), plus(a, plus(b, c))), _hinge_moments(rods, k, share)
-
-
-@each_chain
-def _platform_moments(
-    i: int, geometry: GeometryParameters, rods: ThreeChains, k: Any, share: Value,
-) -> Vector:
-    against = relative_rate(rods[i].u_dot, rods[i].omega)
-    return times(-share * k[i].spherical, in_base(geometry.chains[i], against))
-
-
-@each_chain
-def _hinge_moments(i: int, rods: ThreeChains, k: Any, share: Value) -> Any:
-    c = rods[i]
-    return share * (k[i].revolute * c.u_dot + k[i].spherical * (c.u_dot - c.omega.n))
-
-
 def friction_forces(
     geometry: GeometryParameters, rods: ThreeChains, inverse: Inverse, k: Any, printed: Any,
 ) -> DriveValues:
@@ -146,26 +117,6 @@ def transfer_kernel(
 @each_chain
 def _read_resistances(i: int, resistances: Any, s: Sample) -> JointResistance:
     return JointResistance(resistances[s, i], resistances[s, CHAINS + i])
-
-
-def load_kernel(
-    p: GeometryParameters, s: Sample, chains: Array, resistances: Array, loads: Array,
-) -> Any:
-    """Fill a table of `friction_loads`: the platform's wrench and the moments in the hinges."""
-    wrench, hinges = friction_loads(p, read_chains(chains, s), _read_resistances(resistances, s),
-                                    1.0)
-    loads[s, 0], loads[s, 1], loads[s, 2] = wrench.force.x, wrench.force.y, wrench.force.z
-    loads[s, 3], loads[s, 4], loads[s, 5] = wrench.moment.x, wrench.moment.y, wrench.moment.z
-    for i in range(CHAINS):
-        loads[s, 6 + i] = hinges[i]
-    return True
-
-
-def load_table(geometry: KernelParameters[GeometryParameters], chains: Array, k: Array) -> Array:
-    """Return `friction_loads` for tables of chains and of k_r and k_s, (N, 9) [N, N m]."""
-    loads = np.empty((len(k), 9))
-    evaluate(load_kernel, geometry, chains, k, loads)
-    return loads
 
 
 def resistance_kernel(

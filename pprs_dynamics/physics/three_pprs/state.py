@@ -22,12 +22,7 @@ from pprs_dynamics.physics.three_pprs.inverse_kinematics import ChainKinematics,
 from pprs_dynamics.physics.three_pprs.jacobians import Jacobians, inverse_table
 from pprs_dynamics.physics.three_pprs.joint_rates import turnover_table
 from pprs_dynamics.physics.three_pprs.kernel_parameters import REVOLUTE, Joints
-from pprs_dynamics.physics.three_pprs.passive_joints import (
-    LOAD_ROUNDS,
-    load_table,
-    resistance_table,
-    transferred,
-)
+from pprs_dynamics.physics.three_pprs.passive_joints import resistance_table, transferred
 from pprs_dynamics.physics.three_pprs.rigid_body import RigidBody, solve_bodies
 from pprs_dynamics.physics.three_pprs.robot import Geometry, Robot
 
@@ -107,7 +102,6 @@ class ThreePprsState:
     reversal: Reversal
     printed: bool = False
     load: StructureLoad | None = None
-    friction: tuple[Joints, ...] = ()
 
     @property
     def drives(self) -> tuple[str, ...]:
@@ -129,26 +123,6 @@ class ThreePprsState:
         """Frictionless drive forces and reactions."""
         return solve_bodies(self.robot, self.motion, self.kinematics.chain_table,
                             self.kinematics.inverse_table, self.printed, self.load)
-
-    @cached_property
-    def carried(self) -> RigidBody:
-        """Reactions and guide loads with the friction of the passive joints.
-
-        Friction loads the joints and guides, and loads rub: a fixed point, which the printed
-        equations leave out.
-        """
-        found = self.rigid_body
-        if self.printed or not self.friction:
-            return found
-        for _ in range(LOAD_ROUNDS):
-            k = sum(self._resistances(joints, found) for joints in self.friction)
-            loads = load_table(self.robot.geometry.kernel_parameters, self.kinematics.chain_table,
-                               np.asarray(k))
-            load = StructureLoad(loads[:, :6], {REVOLUTE: loads[:, 6:]})
-            found = solve_bodies(self.robot, self.motion, self.kinematics.chain_table,
-                                 self.kinematics.inverse_table, self.printed,
-                                 load if self.load is None else self.load + load)
-        return replace(found, force=self.rigid_body.force)
 
     @property
     def rigid_force(self) -> Array:
@@ -183,7 +157,7 @@ class ThreePprsState:
     @property
     def friction_load(self) -> Array:
         """Normal forces on the drives' guides [N]."""
-        return self.carried.guide_load
+        return self.rigid_body.guide_load
 
     @property
     def transmitted(self) -> Array:
@@ -242,18 +216,9 @@ class ThreePprsState:
         return angle
 
     def resistances(self, joints: Joints) -> Array:
-        """Return k_ri and k_si at the reactions, (N, 6) [N m s/rad], Eq. (9)."""
-        return self._resistances(joints, self.carried)
-
-    def _resistances(self, joints: Joints, bodies: RigidBody) -> Array:
-        return resistance_table(joints, bodies.reaction_table,
+        """Return k_ri and k_si at the frictionless reactions, (N, 6) [N m s/rad], Eq. (9)."""
+        return resistance_table(joints, self.rigid_body.reaction_table,
                                 self.kinematics.turnover(self.reversal.rate))
-
-    def with_friction(self, joints: Joints) -> ThreePprsState:
-        """Return the state with more friction in the passive joints, which loads all joints."""
-        state = replace(self, friction=(*self.friction, joints))
-        vars(state)['rigid_body'] = self.rigid_body
-        return state
 
     def against_friction(self, joints: Joints, printed: bool = False) -> Array:
         """Return the drive forces against friction of passive joints, (N, 6) [N].
@@ -284,7 +249,6 @@ class ThreePprsState:
 def solve_mechanism(
     robot: Robot, motion: PlatformMotion, *, reversal: Reversal | None = None,
     printed: bool = False, minimum_sine: float = 1e-6, condition_limit: float = np.inf,
-    friction: tuple[Joints, ...] = (),
 ) -> ThreePprsState:
     """Return the state of the mechanism for a platform motion.
 
@@ -294,7 +258,6 @@ def solve_mechanism(
         See `solve_inverse_kinematics` and `inverse_table`.
     """
     kinematics = MechanismKinematics(robot.geometry, motion, minimum_sine, condition_limit)
-    state = ThreePprsState(robot, motion, kinematics, reversal or Reversal(), printed,
-                           friction=friction)
+    state = ThreePprsState(robot, motion, kinematics, reversal or Reversal(), printed)
     _ = kinematics.inverse_table
     return state

@@ -69,18 +69,11 @@ class JointFrictionEffect(PassiveJointEffect):
 
     def force(self, state: Any, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
-        force: Array = state.against_friction(self._table(state))
-        return force
-
-    def rubbing(self, state: Any) -> Any:
-        """Return the state whose joints carry this friction as well."""
-        return state.with_friction(self._table(state))
-
-    def _table(self, state: Any) -> Any:
         blocks: dict[str, dict[str, float]] = self.to_file()
         for name, block in blocks.items():
             block['radius'] = self.radii[name]
-        return state.robot.friction_table(blocks, state.reversal)
+        force: Array = state.against_friction(state.robot.friction_table(blocks, state.reversal))
+        return force
 
 
 @cache
