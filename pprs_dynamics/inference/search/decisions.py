@@ -22,7 +22,7 @@ def _number(value: float, unit: str, decides: str, reason: str) -> float:
 
 @dataclass(frozen=True)
 class Decisions:
-    """What is chosen rather than computed; `docs/decisions.md` prints this table."""
+    """Numbers that are chosen rather than computed."""
 
     effect_odds: float = _number(
         0.1, '1', 'prior odds that one more effect is missing, or a width of reversal another',
