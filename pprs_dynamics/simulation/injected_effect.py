@@ -28,6 +28,18 @@ if TYPE_CHECKING:
 PASSIVE_JOINTS = ('revolute', 'spherical')  # of a 3-PPRS: C_i and A_i
 
 
+def algebraic_sign(velocity: Array, width: Array | float) -> Array:
+    """Return v / sqrt(v^2 + w^2): another switch of direction than the tanh of the model."""
+    sign: Array = velocity / np.sqrt(velocity * velocity + width * width)
+    return sign
+
+
+def eyring(velocity: Array, thinning_velocity: Array | float) -> Array:
+    """Return v_1 asinh(v / v_1): speed as felt in grease that thins with the shear rate."""
+    felt: Array = thinning_velocity * np.arcsinh(velocity / thinning_velocity)
+    return felt
+
+
 class InjectedEffectError(PprsError, ValueError):
     """A hidden effect that does not exist, or parameters that it has not got."""
 

@@ -20,6 +20,8 @@ from pprs_dynamics.simulation.injected_effect import (
     Range,
     SteepDriveForce,
     StructureForce,
+    algebraic_sign,
+    eyring,
 )
 from pprs_dynamics.simulation.temperatures import (
     REFERENCE,
@@ -36,17 +38,12 @@ USUAL_SPEED = 0.08  # [m/s], at which drives get as warm as their climate says
 WIDTH = Range('m/s', 0.0005, 0.002, 'log', neutral=1.0)
 
 
-def algebraic_sign(velocity: Array, width: Array) -> Array:
-    """Return v / sqrt(v^2 + w^2): another way to turn over than the tanh of the model."""
-    return velocity / np.sqrt(velocity * velocity + width * width)
-
-
 @DriveForce.by_law('c v_1 asinh(v / v_1)',
                    coefficient=Range('N s/m', 3.0, 10.0, 'log', scales=True),
                    thinning_velocity=Range('m/s', 0.2, 0.6, 'log', neutral=1.0))
 def viscous_friction(m: DriveMoment, coefficient: Array, thinning_velocity: Array) -> Array:
     """Grease that thins with the shear rate (Eyring)."""
-    return coefficient * thinning_velocity * np.arcsinh(m.velocity / thinning_velocity)
+    return coefficient * eyring(m.velocity, thinning_velocity)
 
 
 @SteepDriveForce.by_law('F v / sqrt(v^2 + w^2)',
@@ -193,9 +190,8 @@ class FrictionTemperature(DriveForce):
 
     def force(self, moment: DriveMoment) -> Array:
         """Return c (eta(T) / eta(T_0) - 1) v_1 asinh(v / v_1)."""
-        v_1 = self.values['thinning_velocity']
         viscous = self.values['coefficient'] * thinner(self.temperature, self.values['reference'])
-        return viscous * v_1 * np.arcsinh(moment.velocity / v_1)
+        return viscous * eyring(moment.velocity, self.values['thinning_velocity'])
 
     def advance(self, moment: DriveMoment, duration: float) -> None:
         """Warm by work, cool towards the hall."""

@@ -16,6 +16,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.simulation.injected_effect import algebraic_sign, eyring
 from pprs_dynamics.simulation.temperatures import REFERENCE, thinner
 
 CROSSED = 0.02  # of a joint's top speed or load, within which a clearance is crossed
@@ -60,7 +61,7 @@ class JointMoment:
     @property
     def sign(self) -> Array:
         """Direction v / sqrt(v^2 + w^2): another way to turn over than the model's tanh."""
-        return turned_over(self.velocity, self.speed)
+        return algebraic_sign(self.velocity, STEEPNESS * self.speed)
 
     @property
     def driving(self) -> Array:
@@ -89,11 +90,6 @@ class JointForm:
     draw: Callable[[np.random.Generator, JointMoment], dict[str, float]]
     force: Callable[[Mapping[str, float], JointMoment], Array]
     needs_turn: float = 0.0
-
-
-def turned_over(velocity: Array, largest: float) -> Array:
-    """Return the direction v / sqrt(v^2 + w^2), w a share of the largest speed."""
-    return velocity / np.hypot(velocity, STEEPNESS * largest)
 
 
 def _share(low: float, high: float) -> Callable[[np.random.Generator], float]:
@@ -134,8 +130,7 @@ FORMS: dict[str, JointForm] = {
         'c v_1 asinh(v / v_1)',
         lambda rng, m: {'coefficient': SIZE(rng) * m.effort / m.speed,
                         'thinning_velocity': 2 * m.speed},
-        lambda p, m: p['coefficient'] * p['thinning_velocity'] * np.arcsinh(
-            m.velocity / p['thinning_velocity'])),
+        lambda p, m: p['coefficient'] * eyring(m.velocity, p['thinning_velocity'])),
     'coulomb_friction': JointForm(
         'F v / sqrt(v^2 + w^2)',
         lambda rng, m: {'force': SIZE(rng) * m.effort}, lambda p, m: p['force'] * m.sign),
@@ -177,7 +172,7 @@ FORMS: dict[str, JointForm] = {
                         'reference': float(rng.uniform(*REFERENCE)),
                         'thinning_velocity': 2 * m.speed},
         lambda p, m: p['coefficient'] * thinner(m.temperature, p['reference'])
-        * p['thinning_velocity'] * np.arcsinh(m.velocity / p['thinning_velocity'])),
+        * eyring(m.velocity, p['thinning_velocity'])),
     'effort_offset': JointForm(
         'constant', lambda rng, m: {'force': SIZE(rng) * m.effort},
         lambda p, m: np.full_like(m.time, p['force'])),

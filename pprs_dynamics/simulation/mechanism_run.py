@@ -22,17 +22,17 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.simulation.injected_effect import InjectedEffectError
+from pprs_dynamics.simulation.injected_effect import InjectedEffectError, algebraic_sign, eyring
 from pprs_dynamics.simulation.joint_forms import (
     CROSSED,
     FORMS,
     SIZE,
+    STEEPNESS,
     JointMoment,
     ahead,
     draw_form,
     tilted,
     truth,
-    turned_over,
 )
 from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
 from pprs_dynamics.simulation.sensors import ButterworthFilter, EffortFilter
@@ -318,7 +318,7 @@ def _joint_friction(run: Injection) -> Injected:
     # As large on the drive that feels it most as an injected force on a drive is.
     d = int(np.argmax(felt))
     torque = run.scale * SIZE(run.random) * float(np.abs(run.rigid[:, d]).max()) / float(felt[d])
-    run.passive[name] = torque * turned_over(rate, float(np.abs(rate).max()))
+    run.passive[name] = torque * algebraic_sign(rate, STEEPNESS * float(np.abs(rate).max()))
     return Injected(None, {f'{name}.torque': torque}, 'T w / sqrt(w^2 + w_0^2)')
 
 
@@ -443,7 +443,8 @@ def _coupled_drives(run: Injection) -> Injected:
     # As large on the joint that feels it most as an injected force on a drive is.
     felt = float(np.min(run.largest[row != 0] / np.abs(row[row != 0])))
     dry, viscous = (run.scale * SIZE(run.random) * felt for _ in range(2))
-    friction = dry * turned_over(speed, top) + viscous * 2 * np.arcsinh(speed / (2 * top))
+    friction = (dry * algebraic_sign(speed, STEEPNESS * top)
+                + viscous * eyring(speed, 2 * top) / top)
     run.efforts += np.outer(friction, row)
     return Injected(None, {f'{name}.coulomb': dry, f'{name}.viscous': viscous / top},
                     "A' (F v / sqrt(v^2 + w^2) + c v_1 asinh(v / v_1)), v the speed of the motor")
