@@ -281,7 +281,7 @@ def case(row: str, *effects: str, seed: int = 3, snr: float = 1.0, noise: float 
 
 
 @pytest.mark.parametrize('name', [
-    'hysteresis', 'force_ripple', 'joint_friction',
+    'force_ripple', 'joint_friction', pytest.param('hysteresis', marks=pytest.mark.slow),
     pytest.param('time_delay', marks=pytest.mark.slow),
     pytest.param('payload_offset', marks=pytest.mark.slow)])
 def test_a_hidden_effect_is_named(name: str) -> None:
@@ -344,7 +344,9 @@ def test_wide_reversals_are_widths_and_no_further_friction() -> None:
     assert told['friction.reversal_velocities[2]'] == model.reversal.velocity == 0.001
 
 
-@pytest.mark.parametrize('noise', [0.0, 0.98, 0.999, '1/f'])
+@pytest.mark.parametrize('noise', [
+    0.98, '1/f', pytest.param(0.0, marks=pytest.mark.slow),
+    pytest.param(0.999, marks=pytest.mark.slow)])
 def test_nothing_is_claimed_where_nothing_is_missing(noise: float | str) -> None:
     found, _ = case('nothing', noise=noise)
     assert found.verdict == 'adequate'
