@@ -158,10 +158,7 @@ def test_twice_the_data_never_removes_an_effect_and_makes_its_size_surer(name: s
         assert after[key] < before[key], key
 
 
-@pytest.mark.parametrize('name', [
-    'viscous_friction', 'drive_spring', pytest.param('time_delay', marks=pytest.mark.xfail(
-        strict=True, reason='a model with a delay is compared at the first samples of a recording,'
-        ' whose past is unknown: what is left there is reported'))])
+@pytest.mark.parametrize('name', ['viscous_friction', 'drive_spring', 'time_delay'])
 def test_with_all_that_is_reported_in_the_model_nothing_is_missing(name: str) -> None:
     walk = adopt_all(axis_model(), [recorded(name, 1)], [recorded(name, 2)])
     assert walk.ended == 'adequate'

@@ -31,7 +31,7 @@ class TimeDelay(MeasurementEffect):
     """The recorder's effort is not of the recorder's positions' time."""
 
     name: ClassVar[str] = 'time_delay'
-    assumed_at_start: ClassVar[str] = 'the effort was what it is at the first sample'
+    assumed_at_start: ClassVar[str] = 'the effort changed before the first sample as after it'
     nonlinear: ClassVar[bool] = True
     idealised: ClassVar[bool] = False
     shows_at_reversals: ClassVar[bool] = True
@@ -69,7 +69,7 @@ class TimeDelay(MeasurementEffect):
 
     def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
                memory: Any = None) -> Array:
-        """Return F(t - d) by straight lines between samples; the first sample before it."""
+        """Return F(t - d) by straight lines between samples and beyond them."""
         if time is None:
             return effort
         late = effort.copy()
@@ -88,8 +88,8 @@ def shifted(time: Array, values: Array, delay: float) -> Array:
     """Return values(t - delay), (N,); beyond the ends the first and the last slope go on."""
     wanted = time - delay
     result: Array = np.interp(wanted, time, values)
-    if len(time) > 1 and delay < 0:
-        after = wanted > time[-1]
-        slope = (values[-1] - values[-2]) / (time[-1] - time[-2])
-        result[after] = values[-1] + slope * (wanted[after] - time[-1])
+    if len(time) > 1:
+        for end, inner, beyond in ((0, 1, wanted < time[0]), (-1, -2, wanted > time[-1])):
+            slope = (values[end] - values[inner]) / (time[end] - time[inner])
+            result[beyond] = values[end] + slope * (wanted[beyond] - time[end])
     return result
