@@ -135,11 +135,12 @@ def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]
     contents = effort_contents(model, recording, excerpts.get(1.0))
     mistakes: list[Defect] = [] if best is None else list(_of_fit(model, best))
     if best is not None and (rival := search.rival(best)) is not None:
-        lines = [columns_line([*_of_fit(model, fit)], model.recorded.columns is not None)
-                 for fit in (best, rival)]
+        both = [[*_of_fit(model, fit)] for fit in (best, rival)]
+        lines = [columns_line(each, model.recorded.columns is not None) for each in both]
         mistakes = [OtherReading.of(
-            'ambiguous', model.drives, range(len(model.drives)), f'{best.reading.what}, or '
-            f'{rival.reading.what}', ' or '.join(lines))]
+            'ambiguous', model.drives, range(len(model.drives)), ', or '.join(
+                ' and '.join(mistake.what for mistake in each) for each in both),
+            ' or '.join(lines))]
     kinds = {mistake.kind for mistake in mistakes}
     if not mistakes:
         mistakes += find_scales(model, contents)
@@ -203,9 +204,14 @@ class Search:
             found) else found
 
     def rival(self, best: Fit) -> Fit | None:
-        """Return another reading of positions that is nearly as likely as the best one."""
+        """Return another reading of positions that is nearly as likely as the best one.
+
+        Inertia alone cannot separate positions in another unit from efforts in another.
+        """
+        units = ('', 'position_unit')
         others = [fit for fit in self.fits if best.score - fit.score < SURE and not fit.is_plain
-                  and fit.reading.kind == best.reading.kind == 'position_unit'
+                  and fit.reading.kind in units and best.reading.kind in units
+                  and fit.time_unit == best.time_unit == 1
                   and not np.allclose(fit.reading.position, best.reading.position)]
         return max(others, key=lambda fit: fit.score, default=None)
 
