@@ -337,7 +337,8 @@ def test_six_joints_are_no_slides_and_lifts() -> None:
     joints = tuple(f'joint_{k}' for k in range(1, 7))
     found = list(readings(joints, (DriveUnits(True),) * 6))
     assert not any(word in one.what for one in found for word in ('slide', 'lift', 'metres'))
-    assert {one.kind for one in found} == {'reversed_time', 'position_unit', 'position_sign'}
+    assert {one.kind for one in found} == {'reversed_time', 'position_unit', 'position_sign',
+                                           'drive_order'}
 
 
 @pytest.mark.parametrize(('effect', 'parameter', 'turning', 'pushing'), [
