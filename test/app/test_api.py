@@ -201,12 +201,10 @@ def test_what_is_no_model_and_no_recording_is_refused_in_a_sentence(
 
 def test_a_missing_library_is_named(compared: ComparisonResult,
                                     monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, 'pandas', None)
     monkeypatch.setitem(sys.modules, 'matplotlib.figure', None)
     for module in ('box', 'console', 'markup', 'table'):
         monkeypatch.setitem(sys.modules, f'rich.{module}', None)
-    for show, library in ((compared.table, 'pandas'), (compared.plot, 'matplotlib'),
-                          (compared.view, 'rich')):
+    for show, library in ((compared.plot, 'matplotlib'), (compared.view, 'rich')):
         with pytest.raises(pprs_dynamics.MissingLibraryError, match=library):
             show()
 

@@ -87,8 +87,8 @@ def test_the_json_has_the_keys_that_others_rely_on(result: dict[str, Any]) -> No
     promised = {'verdict', 'effects', 'indistinguishable', 'candidates', 'depends_on', 'suspects'}
     added = {'above_noise', 'barred', 'calibrated', 'detectable', 'effort_looks_like', 'explained',
              'explained_after', 'held_out_on', 'little_explained', 'noise_floor',
-             'noise_floors', 'reference', 'changed_since', 'sets', 'stick_slip', 'unconfirmed',
-             'warnings'}
+             'noise_floors', 'reference', 'refit', 'changed_since', 'sets', 'stick_slip',
+             'unconfirmed', 'warnings'}
     assert set(result) == promised | added
     for effect in result['effects']:
         assert set(effect) == {'name', 'drives', 'alike', 'parameters', 'error_before',

@@ -509,7 +509,7 @@ def test_a_session_says_since_when(tmp_path: Path) -> None:
     session = Session.open([later], tmp_path / 'arm.yaml', reference=[healthy])
     said = session.to_dict()['reference']
     assert said['recordings'] == ['healthy.csv']
-    assert 'a fault that was there in the reference cannot be seen' in said['text']
+    assert 'a fault that was already in the reference cannot be seen' in said['text']
     assert said['explained']['turn'] > 0.9
     assert session.diagnose().result(120).verdict == 'effect'
     called_for = [one['name'] for one in session.to_dict()['effects'] if one['is_called_for']]

@@ -5,7 +5,6 @@ import {test} from 'node:test';
 
 import {cut, withGaps} from '../../pprs_dynamics/app/browser/curves.mjs';
 import {fromSlider, ordered, pays, toSlider} from '../../pprs_dynamics/app/browser/effects.mjs';
-import {commandOf, traceOf} from '../../pprs_dynamics/app/browser/fleet.mjs';
 import {rms, sentence} from '../../pprs_dynamics/app/browser/live.mjs';
 import {adoptionSaid} from '../../pprs_dynamics/app/browser/panels.mjs';
 import {heat} from '../../pprs_dynamics/app/browser/robot.mjs';
@@ -84,24 +83,4 @@ test('colours and places', () => {
   assert.equal(heat(2), 'rgb(178,24,43)');
   assert.equal(placeOf({time: [1, 2.345], drive: null}), '1.00 to 2.35 s on all drives');
   assert.equal(placeOf({x: 'time', drive: 'lift_1'}), 'a region of lift_1');
-});
-
-test('a trend has its change, its limit and what stands beside it', () => {
-  const trend = {t: [0, 1], y: [1, 2], s: [0.1, 0.1], f: [1, 1], r: [0, 1], unit: 'N', text: 'grows',
-                 limit: 5};
-  const fleet = {beside: 'temperature', recordings: [['a', 'a', 0, 20], ['b', 'b', 1, 30]],
-                 colours: ['1', '2', '3']};
-  const {data, layout} = traceOf(trend, 'force', fleet);
-  assert.deepEqual(data.map((one) => one.name), ['force', 'change', 'limit', 'temperature']);
-  assert.deepEqual(data[2].y, [5, 5]);
-  assert.deepEqual(data[3].y, [20, 30]);
-  assert.equal(data[0].x[1], '1970-01-02T00:00:00.000Z');
-  assert.equal(layout.yaxis.title.text, 'force [N]');
-  const quiet = traceOf({...trend, limit: null, text: ''}, 'force', {...fleet, beside: null});
-  assert.deepEqual(quiet.data.map((one) => one.name), ['force', 'median']);
-});
-
-test('a path is quoted for a shell', () => {
-  assert.equal(commandOf("/it's/a b.csv", ' --topic x'),
-               "pprs diagnose '/it'\\''s/a b.csv' --topic x --report recording.html");
 });

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 SHOWN = 15  # files
-TOLERANCE = 2.0  # of the budget, for slower machines than the one that it was chosen on
+TOLERANCE = 4.0  # of the budget: on busy or slower machines tests take more processor time
 KEY = 'processor_seconds'
 
 

@@ -23,7 +23,7 @@ RECORDING = (*FILES_OF_RECORDINGS, '')  # without an ending: a rosbag2 folder
 LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
-OUTPUTS = ('output', 'json', 'report', 'mcap')
+OUTPUTS = ('output', 'json', 'report', 'mcap', 'picture')
 INPUTS = ('model', 'recordings', 'validate', 'reference', 'beside', 'refit', 'file', 'manifest',
           'store', 'path')
 
