@@ -100,13 +100,12 @@ def test_an_arm_is_compared_and_set_in_its_own_window_names_and_units(
     assert load_model(model).values == real.values
     with ExitStack() as stack:
         stack.enter_context(node_process(
-            [executable('monitor'), '--ros-args', '--params-file', str(model), '-r', '__ns:=/left',
-             '-r', '__node:=watch'], ros_domain, tmp_path / 'monitor.log'))
+            [executable('monitor'), '--ros-args', '--params-file', str(model), '-r', '__ns:=/left'],
+            ros_domain, tmp_path / 'monitor.log'))
         replay = Replay(arm.record(more, arm.motion(20.0)), '/left/joint_states', 1)
         stack.callback(replay.close)
         bench = stack.enter_context(workbench(
-            '--live', '--model', model, '--namespace', '/left', '--monitor', 'watch',
-            '--feedforward', '/right/control', folder=tmp_path))
+            '--live', '--model', model, '--namespace', '/left', folder=tmp_path))
         bench.enter()
         assert bench.screen()['units']['turn']['effort'] == 'N m'
 
@@ -132,15 +131,15 @@ def test_an_arm_is_compared_and_set_in_its_own_window_names_and_units(
         bench.settled()
         assert bench.post('/api/live/set', confirmed='the other arm').status != 200
         machine = bench.get('/api/live/machine').json['machine']
-        assert machine.startswith('nodes /left/watch; robot serial arm made_up')
+        assert machine.startswith('nodes /left/monitor; robot serial arm made_up')
         assert bench.post('/api/live/set', confirmed=machine).json == {
-            'is_set': True, 'nodes': {'watch': ''}}
+            'is_set': True, 'nodes': {'monitor': ''}}
         found = awaited(lambda found: found['error'][0] and max(
             found['error'][0], found['monitor_error'][0]) < 0.5)
         # The way back: the error is there again.
         assert found['can_restore']
         assert bench.post('/api/live/restore', confirmed=machine).json == {
-            'is_set': True, 'nodes': {'watch': ''}}
+            'is_set': True, 'nodes': {'monitor': ''}}
         found = awaited(lambda found: found['monitor_error'] and min(
             found['error'][0] or 0.0, found['monitor_error'][0] or 0.0) > 0.5)
         assert not found['can_restore']
