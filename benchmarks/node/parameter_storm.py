@@ -96,7 +96,8 @@ def run(
     values, answers = default_parameters(), list[np.ndarray]()
     found = dict.fromkeys(('sets', 'accepted', 'answers', 'wrongly_accepted', 'wrongly_refused',
                            'refused_without_reason', 'wrong_answers'), 0)
-    with served(feedforward('command_timeout:=0.0', 'ramp_time:=0.0'), domain=domain) as (stream, process):
+    node = feedforward('command_timeout:=0.0', 'ramp_time:=0.0')
+    with served(node, domain=domain) as (stream, process):
         stream.listen(Float64MultiArray, 'commands', lambda answer: answers.append(
             np.array(deserialize_message(answer, Float64MultiArray).data)))
         caller = Node('storm', context=stream.context)
