@@ -75,9 +75,9 @@ def test_the_command_writes_what_a_controller_can_play(tmp_path: Path) -> None:
     path = str(arm.write_arm(tmp_path))
     output, answer = str(tmp_path / 'next.csv'), tmp_path / 'next.json'
     assert main(['next-experiment', '--model', path, '--purpose', 'commission', '--output', output,
-                 '--duration', '10', '--json', str(answer)]) == 0
+                 '--json', str(answer)]) == 0
     table = pd.read_csv(output)
-    assert len(table) == 1001
+    assert len(table) == 2001
     assert {f'{joint}/{name}' for joint in arm.JOINTS
             for name in ('position', 'velocity', 'acceleration')} < set(table.columns)
     assert 0 < json.loads(answer.read_text())['determined'] <= 42
@@ -115,7 +115,7 @@ def test_a_motion_is_designed_that_tells_rivals_apart(
     write_model(path, model.values, model.source)
     output, page = tmp_path / 'next.csv', tmp_path / 'next.html'
     assert main(['next-experiment', str(one_speed), '--model', str(path), '--output', str(output),
-                 '--duration', '10', '--json', str(answer), '--report', str(page)]) == 0
+                 '--json', str(answer), '--report', str(page)]) == 0
     told = json.loads(answer.read_text())
     assert told['question'] == 'separate'
     asked = {frozenset(pair) for pair in told['separates'] + told['does_not_separate']}

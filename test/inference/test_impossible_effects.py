@@ -151,21 +151,16 @@ def test_a_set_is_possible_where_a_machine_can_have_it(gain: float) -> None:
     assert is_possible(fits, found) == (1 + gain < DECISIONS.most_gain)
 
 
-def test_what_cannot_be_stands_for_nothing_that_is_left_out() -> None:
+def test_a_gain_that_no_drive_has_makes_the_answer_unknown() -> None:
     """The fourth joint of an iiwa, whose torques are 60 to 70 ms late and its masses guesses.
 
-    Three effects are within the model error of others. A gain of 1.6 would stand for them, and
-    voided the filter that was found with it.
+    A gain of 1.6 beside the filter that is there: nothing is claimed, and both are listed.
     """
     model, recording = shared_case('kuka_lag', 'j4.yaml', 'j4_1_half.csv.gz')
     found = diagnose(model, [recording])
-    assert found.verdict != 'effect'
-    assert all(not one.objection for one in found.unconfirmed)
-    (late,) = [one for one in found.effects if one.name in ('effort_filter', 'time_delay')]
-    ((_, lag),) = late.parameters.items()
-    assert 0.05 < lag.value < 0.08
-    # Nothing began while it set off, nor when it stood at the end.
-    assert all(one.course is None or 1.0 < one.course.begin < 27.0 for one in found.effects)
+    assert found.verdict == 'unknown'
+    assert not found.effects
+    assert {one.name for one in found.unconfirmed} & {'effort_filter', 'time_delay'}
     words, command = next_step(found, PLACEHOLDERS)
     assert words.startswith('The model has no friction yet')
     assert command.startswith('pprs fit')

@@ -344,7 +344,7 @@ def test_a_design_that_cannot_separate_says_so(model: DriveModel) -> None:
     assert told.load == pytest.approx(0.1 * moved, rel=0.35)
     assert f'the same motion once more with {told.load:g} kg more' in told.text
     assert told.to_dict()['told_by_load'] == [['coulomb_friction', 'load_friction']]
-    assert 'hardly tell coulomb_friction from load_friction' in told.text
+    assert 'hardly separate coulomb_friction from load_friction' in told.text
     # Thirty thousand times the effect is told from its rival.
     strong = [replace(one, truth=3e4 * one.truth) for one in both]
     question = question.with_contests(

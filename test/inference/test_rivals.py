@@ -64,5 +64,5 @@ def test_each_rival_of_the_answer_is_put_into_words(ambiguous: Diagnosis) -> Non
     assert len(words.rivals) == len(rivals)
     for said, rival in zip(words.rivals, rivals, strict=True):
         assert f'{in_unit(rival.held_out_after)} on held-out data' in said.why
-    assert 'this data cannot tell which' in words.headline
+    assert 'the data do not separate these' in words.headline
     assert 'next-experiment' in words.command

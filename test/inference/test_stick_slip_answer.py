@@ -27,5 +27,5 @@ def test_it_is_named_with_its_frequency_and_no_ripple_is_claimed() -> None:
         'run', TIME, position[:, None], None, (effort + noise)[:, None], ('axis',))])
     assert (found.verdict, found.effects) == ('unknown', ())
     assert found.to_dict()['stick_slip']['axis']['frequency'] == pytest.approx(2.3, abs=0.1)
-    assert 'Stick-slip: axis at 2.3' in word_diagnosis(found).headline
+    assert 'Stick-slip on axis at 2.3' in word_diagnosis(found).headline
     assert 'faster' in next_step(found, PLACEHOLDERS)[0]

@@ -23,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_model_output(parser, 'model file that is written')
     parser.add_argument('--keep-residual', action='store_true', help='keep in the model file what '
                         'it leaves of these runs, as a reference that needs no files')
+    arguments.add_details(parser)
     arguments.add_report(parser)
 
 

@@ -13,6 +13,7 @@ from pprs_dynamics.app.commands.arguments import (
     POSES,
     add_as_it_is,
     add_recordings,
+    add_report,
     output_file,
     seed,
 )
@@ -34,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='separate: the effects that the recordings leave open (default); '
                         'commission: the first motion of a new robot')
     parser.add_argument('--seed', type=seed, default=0, help='of the search (default 0)')
+    add_report(parser)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -232,9 +232,19 @@ class Answer:
 
     @property
     def raises_the_error(self) -> bool:
-        """Whether the error with the reported effects is larger than that of the input model."""
-        return bool(self.row.effects) and self.over_noise(self.remaining) > (
-            1 + self.decisions.error_rise) * self.over_noise(self.given.error)
+        """Whether the error with the reported effects is larger, over all drives or on one."""
+        if not self.row.effects:
+            return False
+        rise, ratio = 1 + self.decisions.error_rise, self.decisions.left_ratio
+        if self.over_noise(self.remaining) > rise * self.over_noise(self.given.error):
+            return True
+        for d, name in enumerate(self.drives):
+            before, after = (root_mean_square(error[:, d])
+                             for error in (self.given.error, self.remaining))
+            # A drive with too few samples for a fit has no noise floor.
+            if after > max(rise * before, ratio * self.floors.get(name, before)):
+                return True
+        return False
 
     def _held_out(self, candidate: EffectCandidate) -> tuple[float, float, PredictiveGain | None]:
         """Return held-out errors without and with an effect, and its gain where it is known."""
@@ -397,8 +407,8 @@ def answer_of(table: ModelTable, validate: Sequence[Recording], decisions: Decis
     """Return the answer of a table.
 
     Its effects are those of the row of least cost. Where one of them is no finding, the verdict is
-    `unknown`, and it is listed as unconfirmed; where it is impossible or the error rises, so are
-    all that were fitted beside it.
+    `unknown`, and it is listed as unconfirmed. Where it is impossible, or the error of the whole
+    row rises, so are all that were fitted with it.
     """
     answer = Answer(table, table.best, validate, decisions)
     unconfirmed: list[FoundEffect] = []

@@ -135,8 +135,8 @@ class FoundEffect(FittedEffect):
 
     @property
     def is_only_refuted(self) -> bool:
-        """Whether a machine may have it, and only held-out data object."""
-        return self.objection.startswith('held-out')
+        """Whether a machine may have it, and only the error objects, held out or fitted."""
+        return self.objection.startswith(('held-out', 'without its force'))
 
     @property
     def when(self) -> str:
