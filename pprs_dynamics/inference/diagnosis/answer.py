@@ -106,9 +106,12 @@ class Answer:
         self.remaining = self._remaining()
         if not row.fitted.is_dated:
             self._fit_widths()
+        # What a row leaves without an effect that was found no finding is no noise.
+        fits, fitted = (self.fits, self.fitted) if row is table.best else (
+            table.best.fits, table.best.fitted)
         self.noise: dict[str, NoiseSpectrum] = {
             self.drives[d]: spectrum
-            for d, spectrum in self.fits.regression.noise(self.fitted.fit).items()}
+            for d, spectrum in fits.regression.noise(fitted.fit).items()}
         known = noise_floors(table.last, best=table.reported.fit)
         # Where the noise is unknown, the residual of the reported set is an upper bound.
         self.floors = {self.drives[d]: known.get(self.drives[d], self.fits.regression.noise_floor(

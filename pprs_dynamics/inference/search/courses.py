@@ -299,16 +299,18 @@ def _simplest(fits: FittedSets, fitted: CandidateSet, effects: Iterable[EffectCa
         # What begins may end where nothing else begins.
         passing = [Course(DURING, begin, end) for begin in edges for end in ends
                    if end > begin] if effect.effect in dated else []
-        simpler += [fits.evaluate((*rest, _with_course(effect, course)))
+        # With its own noise one that is a block off costs as much as one that is far off.
+        simpler += [fits.at_noise_of(fitted, (*rest, _with_course(effect, course)))
                     for course in (*tried, *passing) for rest in dict.fromkeys(((), beside))]
     best: dict[tuple[str, str], CandidateSet] = {}
-    for other in sorted(simpler, key=lambda fitted: fitted.cost):
+    for other in sorted(simpler, key=lambda fitted: fitted.total):
         changing = next(effect for effect in other.effects if effect.course is not None)
         assert changing.course is not None
         best.setdefault((changing.name, changing.course.kind), other)
     # A change that is a hundredth of a second off costs more than patterns that make it good.
-    return _lasting(fits, min([fitted, *(fits.pruned(_refined(fits, offer))
-                                         for offer in list(best.values())[:2 * COURSE_TRIALS])],
+    offers = [fits.evaluate(_refined(fits, offer).candidates)
+              for offer in list(best.values())[:2 * COURSE_TRIALS]]
+    return _lasting(fits, min([fitted, *map(fits.pruned, offers)],
                               key=lambda fitted: fitted.cost))
 
 
