@@ -69,6 +69,7 @@ fuzz: $(VENV)/.test
 lint: $(VENV)/.test
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/python docs/prose.py --pages
 
 # -W: a warning is an error; all of them are shown first.
 docs: $(VENV)/.docs

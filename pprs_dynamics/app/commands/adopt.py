@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_reference(parser)
     arguments.add_model_output(parser, 'model file to write')
     parser.add_argument('--force', action='store_true',
-                        help='adopt it in spite of objections, which the ledger then holds')
+                        help='adopt it in spite of objections; the history records them')
     arguments.add_report(parser)
 
 

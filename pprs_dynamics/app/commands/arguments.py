@@ -47,8 +47,8 @@ def add_report(parser: argparse.ArgumentParser, what: str = 'write a page with a
 
 def add_topic(parser: argparse.ArgumentParser) -> None:
     """Declare --topic."""
-    parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, where a file '
-                        'holds several')
+    parser.add_argument('--topic', metavar='NAME', help='of sensor_msgs/JointState, if a file '
+                        'has several')
 
 
 def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> None:

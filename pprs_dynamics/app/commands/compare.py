@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_details(parser)
     parser.add_argument('--mcap', metavar='FILE.mcap', type=arguments.output_file('.mcap'),
                         help='write measured effort, model, parts and residual as joint states, '
-                        'with layouts for PlotJuggler and Foxglove beside it')
+                        'with layouts for PlotJuggler and Foxglove')
     parser.add_argument('--beside', metavar='FILE.yaml', help='another model file: its '
                         'errors on the same recordings')
     arguments.add_report(parser)

@@ -28,9 +28,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_details(parser)
     arguments.add_report(parser)
     parser.add_argument('--adopt-all', action='store_true',
-                        help='add what is found until nothing more can be told')
+                        help='adopt the reported effects until nothing is missing')
     parser.add_argument('--refit', metavar='RECORDING', nargs='*',
-                        help='then fit the base model again beside what was added, as pprs fit '
+                        help='then fit the base model again with the added effects, as pprs fit '
                         'does: to these recordings, or to those diagnosed')
     arguments.add_model_output(parser, 'model file that --adopt-all writes', required=False)
 

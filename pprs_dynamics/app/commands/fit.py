@@ -21,8 +21,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_as_it_is(parser)
     arguments.add_validation(parser)
     arguments.add_model_output(parser, 'model file that is written')
-    parser.add_argument('--keep-residual', action='store_true', help='keep in the model file what '
-                        'it leaves of these runs, as a reference that needs no files')
+    parser.add_argument('--keep-residual', action='store_true', help='store the residual of these '
+                        'runs in the model file, as a reference that needs no files')
     arguments.add_details(parser)
     arguments.add_report(parser)
 

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""`pprs info`: show what a recording holds, and what is wrong with it."""
+"""`pprs info`: show what a recording contains, and what is wrong with it."""
 
 from __future__ import annotations
 

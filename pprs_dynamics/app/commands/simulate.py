@@ -36,9 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='.mcap, .csv, or the name of a rosbag2 folder to make')
     parser.add_argument('--effect', metavar='NAME', action='append', default=[],
                         choices=(*dict.fromkeys((*INJECTED_EFFECTS, *ARM_EFFECTS)), RANDOM),
-                        help='physics that the model does not know of, drawn from the seed; may '
-                        f'be repeated: random, {", ".join(INJECTED_EFFECTS)}; of other '
-                        f'robots {", ".join(ARM_EFFECTS)}')
+                        help='an effect that the model does not know, drawn from the seed; may be '
+                        'repeated; random, or a name of docs/effects.md')
     parser.add_argument('--seed', type=seed, default=0, help='of noise and effects (default 0)')
     parser.add_argument('--path', default='excitation',
                         help='helix, excitation, or a CSV of poses (default excitation)')
