@@ -25,6 +25,7 @@ from pprs_dynamics.app.api.first_model import FirstModelError, first_model
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.readings.columns import GuessError
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.model_file import load_model
 
 JOINTS = ('shoulder_pan', 'shoulder_lift', 'elbow')
@@ -442,7 +443,12 @@ def test_the_command_writes_says_what_info_says_and_what_comes_next(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    without_header(tmp_path)
+    described = first_model(robot, (), tmp_path / 'described.yaml')
+    described.path.write_text(described.text)
+    ddq = -(Q - [0.3, -0.4, 0.1]) * WAVES**2
+    efforts = load_model(described.path).drive_forces(JointMotion(Q, DQ, ddq)).total
+    np.savetxt('run.csv', np.column_stack([TIME, Q, DQ, efforts + 2 * np.tanh(20 * DQ)]),
+               delimiter=',', fmt='%.17g')
     assert main(['init', 'arm.urdf', 'run.csv', '--json', 'x.json']) == 0
     said = ' '.join(capsys.readouterr().out.split())
     assert '800 of 800 samples' in said
