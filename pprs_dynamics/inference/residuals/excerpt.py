@@ -108,20 +108,3 @@ def forces_on(model: ForceModel, motion: DriveMotion, time: Array) -> Array | No
         except (PprsError, np.linalg.LinAlgError):
             return None
     return found if np.all(np.isfinite(found)) else None
-
-
-def forces_in_pieces(model: ForceModel, motion: DriveMotion, time: Array) -> Array:
-    """Return the model's forces wherever it has any, (N, D) [N]; NaN elsewhere."""
-    found = np.full_like(motion.position, np.nan)
-    for part in motion.segments:
-        for start in range(part.start, part.stop, PIECE):
-            rows = slice(start, min(start + PIECE, part.stop))
-            count = rows.stop - rows.start
-            piece = replace(motion, position=motion.position[rows],
-                            velocity=motion.velocity[rows],
-                            acceleration=motion.acceleration[rows], index=motion.index[rows],
-                            segments=(slice(0, count),))
-            forces = forces_on(model, piece, time[rows])
-            if forces is not None:
-                found[rows] = forces
-    return found
