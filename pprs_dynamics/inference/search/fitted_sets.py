@@ -243,7 +243,7 @@ class FittedSets:
             if moved is None:
                 return fitted
             after = self.evaluate(moved)
-            if after.cost > fitted.cost - LEAST_IMPROVEMENT:
+            if not after.cost < fitted.cost - LEAST_IMPROVEMENT:
                 return fitted
             fitted = after
         return fitted
