@@ -91,7 +91,7 @@ def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone, drives: set[int
                         for offer in _best_of_each(offers)
                         for rest in _rests(best, offer.candidate)), key=lambda one: one.total)
         found = min(map(fits.pruned, tried[:PRUNED]), key=lambda one: one.cost, default=best)
-        found = _refined(fits, found)
+        found = fits.refined(_refined(fits, found))
         if not found.cost < best.cost - LEAST_IMPROVEMENT:
             break
         best = found
