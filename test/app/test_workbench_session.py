@@ -461,9 +461,9 @@ def test_a_reference_stays_when_a_recording_goes(tmp_path: Path) -> None:
     healthy, run, other = (write_hidden(tmp_path / f'{seed}.csv', seed, hidden={
         'effects.active': ['coulomb_friction'], 'effects.coulomb_friction.lift_2.force': 0.2})
         for seed in (1, 2, 3))
-    alone = Session.of(Inputs.of('config/paper.yaml', run).since([healthy])).given_residual
+    alone = Session.of(Inputs.of('config/paper.yaml', run).since([healthy])).ticks.fits.before
     # What was there in the reference, too, is no error.
-    without = Session.open([run]).given_residual
+    without = Session.open([run]).ticks.fits.before
     assert root_mean_square(alone[:, 4]) < 0.8 * root_mean_square(without[:, 4])
     session = Session.of(Inputs.of('config/paper.yaml', [run, other]).since([healthy]))
     session.recordings.remove(str(other))
