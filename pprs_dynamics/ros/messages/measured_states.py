@@ -122,14 +122,14 @@ class MeasuredStates:
         if not len(due):
             return []
         self._due = self._due[len(due):]
-        position, effort = np.empty((2, len(due), len(self._joints)))
+        position, effort = np.zeros((2, len(due), len(self._joints)))
         for k, samples in enumerate(self._streams.values()):
             times, *values = zip(*samples, strict=True)
             position[:, k], effort[:, k] = (at_stamps(due, times, each) for each in values)
             older = sum(time < due[-1] for time in times)
             del samples[:max(older - STEPS, 0)]
         return [MeasuredState(int(due[row]), position[row], effort[row])
-                for row in np.flatnonzero(np.isfinite(position).all(axis=1))]
+                for row, is_known in enumerate(np.isfinite(position).all(axis=1)) if is_known]
 
 
 def _missing(message: JointState, joint: str) -> Rejection:
