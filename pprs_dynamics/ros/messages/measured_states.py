@@ -129,7 +129,7 @@ class MeasuredStates:
             older = sum(time < due[-1] for time in times)
             del samples[:max(older - STEPS, 0)]
         return [MeasuredState(int(due[row]), position[row], effort[row])
-                for row, is_known in enumerate(np.isfinite(position).all(axis=1)) if is_known]
+                for row in range(len(due)) if np.isfinite(position[row]).all()]
 
 
 def _missing(message: JointState, joint: str) -> Rejection:

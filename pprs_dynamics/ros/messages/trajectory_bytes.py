@@ -22,7 +22,6 @@ from pprs_dynamics.ros.messages.conversions import NANOSECONDS
 from pprs_dynamics.system.cdr import HEADER, LITTLE_ENDIAN, STAMP, WORD, Walk, aligned
 
 TWO_WORDS = struct.Struct('<2I')
-SECOND = np.int64(NANOSECONDS)
 
 
 class Points(NamedTuple):
@@ -75,7 +74,7 @@ class PointLayout:
         words += [(at + k, 0) for k in range(empty)]
         self._first, self._columns, self._time = counts[0], np.array(columns), at + empty
         places, lengths = np.array(words, '<u4').T
-        self._words, self._lengths = places.astype(np.intp), lengths.tobytes()
+        self._words, self._lengths = places.astype(int), lengths.tobytes()
 
     def read(self, data: bytes) -> Points | None:
         """Return the content of a message, or None where it has another layout."""
@@ -100,7 +99,8 @@ class PointLayout:
                 rows[1:, 0].tobytes() != WORD.pack(first) * (count - 1)):
             return None
         seconds, nanoseconds = STAMP.unpack_from(data, HEADER)
-        offsets = rows.view('<i4')[:, self._time] * SECOND + rows[:, self._time + 1]
+        offsets = (rows.view('<i4')[:, self._time].astype(np.int64) * NANOSECONDS
+                   + rows[:, self._time + 1])
         return Points(seconds * NANOSECONDS + nanoseconds, frame, names,
                       rows.take(self._columns, 1).view('<f8'), offsets)
 
