@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from functools import partial
 from typing import Any
@@ -69,8 +68,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
     """
 
     def __init__(self, **options: Any) -> None:
-        ManagedNode.__init__(
-            self, 'feedforward', allow_undeclared_parameters=True, **options)
+        super().__init__('feedforward', allow_undeclared_parameters=True, **options)
         self._log = ThrottledLog(self)
         self._publishers_made: list[Any] = []
         self._parts: dict[str, Any] = {}
@@ -97,7 +95,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._last_unchecked: ForceCommand | None = None  # when its margins were not due
         self._compute_time, self._lag = Durations(), Durations()
         self._counted = (0, 0, time.monotonic())
-        self._files = files_given(options.get('cli_args') or sys.argv)
+        self._files = files_given(self.arguments)
         self._status = StatusReporter(
             self, {'taken_from_paper': self._settings.taken_from_paper}, self._counters,
             hardware_of(self._settings.model), self._refresh)

@@ -98,7 +98,7 @@ class SimulatedRobotNode(ExplainsRefusals):
         self._log = ThrottledLog(self)
         of_joints = is_mechanism(overrides(self))
         node_values = declare_node_parameters(self, OF_JOINTS if of_joints else PARAMETERS)
-        declare_model(self)
+        declare_model(self, self.arguments)
         values = {name: value for name, value in current_values(self).items()
                   if name not in node_values}
         self._model = build_model(values)

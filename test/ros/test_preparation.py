@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import sys
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -24,38 +23,8 @@ from trajectory_msgs.msg import (
 )
 
 from pprs_dynamics import DriveModel, JointMotion, MechanismModel
-from pprs_dynamics.physics.mechanism import evaluation
-from pprs_dynamics.physics.mechanism.evaluation import compiling_here
 
 MOTION = random_motion(np.random.default_rng(8), 1)
-
-
-def test_other_threads_do_not_wait_for_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(evaluation, '_loops', {})
-    monkeypatch.setattr(evaluation, '_decided', True)
-    begun, go_on = threading.Event(), threading.Event()
-
-    def slow_compiler(kernel: object, named: object) -> object:
-        begun.set()
-        assert go_on.wait(30)
-        return lambda row, *tables: -1
-
-    monkeypatch.setattr(evaluation, '_compile', slow_compiler)
-
-    def compile_one() -> None:
-        with compiling_here():
-            DriveModel.load().drive_forces(MOTION)
-
-    thread = threading.Thread(target=compile_one, daemon=True)
-    thread.start()
-    assert begun.wait(30)
-    meanwhile = DriveModel.load().drive_forces(MOTION).total
-    assert not evaluation._loops
-    go_on.set()
-    thread.join(30)
-    monkeypatch.undo()
-    np.testing.assert_allclose(
-        meanwhile, DriveModel.load().drive_forces(MOTION).total, rtol=0, atol=EQUAL)
 
 
 @pytest.mark.nodes
