@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 
-from pprs_dynamics.inference.regression.design import LEANING, LEAST_MOVING, TURNED
+from pprs_dynamics.inference.regression.design import LEAST_MOVING, TURNED
 from pprs_dynamics.inference.regression.joint_fit import LEAST_SAMPLES
 from pprs_dynamics.inference.regression.normal_equations import BEYOND_TOLERANCE
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
@@ -165,8 +165,6 @@ FIXED = (
      'a tolerance is a limit: one number in a hundred lies beyond'),
     ('BEYOND_TOLERANCE', BEYOND_TOLERANCE, '1', "steepness of a number's prior beyond tolerance",
      'it may be passed by a fifth where much speaks for it, and not more'),
-    ('LEANING', LEANING, '1', "uncertainty of an effect's numbers, times, where another one joins",
-     'they were fitted without it; recordings decide, and where they tell nothing the file'),
     ('TURNED', TURNED, '1', "speed over the model's width of reversal, at which a drive moves",
      'friction has turned over to 96 %'),
     ('LEAST_MOVING', LEAST_MOVING, '1', 'share of the time in motion that friction needs, and of '
