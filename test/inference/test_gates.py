@@ -20,7 +20,7 @@ from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
 from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import Decisions
-from pprs_dynamics.inference.search.form_error import DIRECTIONS, FormErrors
+from pprs_dynamics.inference.search.form_error import FormErrors
 from pprs_dynamics.inference.search.held_out import BLOCKS, PredictiveGain, predictive_gain
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.model_file import build_model
@@ -169,7 +169,7 @@ class Rows:
         self.residuals = SimpleNamespace(parts=parts)
         self.drives = (0,)
         self.series = {0: SimpleNamespace(transform=lambda force: force,
-                                          spread=lambda weights: 1.0)}
+                                          sums=lambda values: values.sum(keepdims=True))}
 
     @staticmethod
     def weights(_: Any, __: int) -> np.ndarray:
@@ -203,7 +203,7 @@ def set_of(**columns: tuple[str, float, float]) -> Any:
                                if candidate is one])
 
 
-DECIDED = Decisions(form_share=0.1 * DIRECTIONS ** 0.5, exact_share=0.02)
+DECIDED = Decisions(form_share=0.1, exact_share=0.02)
 
 
 def share(found: Any, which: int, parts: dict[str, np.ndarray] | None = None,
