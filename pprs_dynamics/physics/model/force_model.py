@@ -288,8 +288,10 @@ class ForceModel(ABC):
 
     @cached_property
     def fingerprint(self) -> str:
-        """SHA-256 of the values in force, which changes with every parameter."""
-        values = dict(self.values)
+        """SHA-256 of the values in force: it changes with every parameter, not with the ledger."""
+        # A node has no ledger, and an empty list where a file says nothing.
+        values = {key: value for key, value in self.values.items()
+                  if value not in ([], ()) and not key.startswith('history.')}
         if self.content:  # the same wherever the files lie
             values.update({key: self.content for key in FILES if values.get(key)})
         text = json.dumps(values, sort_keys=True, default=str)
