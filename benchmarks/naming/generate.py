@@ -41,8 +41,7 @@ from pprs_dynamics.physics.model.model_writer import format_model
 from pprs_dynamics.simulation.export.exported_robot import export_robot
 from pprs_dynamics.simulation.export.expressed import express
 from pprs_dynamics.simulation.export.writers import written
-from pprs_dynamics.simulation.injected_effects import NOT_IN_CATALOGUE
-from pprs_dynamics.simulation.mechanism_run import simulate_mechanism
+from pprs_dynamics.simulation.injection import NOT_IN_CATALOGUE, simulate_mechanism
 from pprs_dynamics.simulation.sensors import EffortNoise
 
 DURATION = 40.0  # [s]

@@ -31,7 +31,7 @@ from pprs_dynamics.measurement.files.recording import Recording, read_recording,
 from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.physics.model.model_file import build_model, load_model
-from pprs_dynamics.simulation.injected_effects import INJECTED_EFFECTS, draw_effect
+from pprs_dynamics.simulation.injection import NOT_IN_CATALOGUE, Choice
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / 'docs'
@@ -159,15 +159,14 @@ def benchmark() -> Iterator[ModuleType]:
         yield recordings
 
 
-@pytest.mark.parametrize('name', INJECTED_EFFECTS)
+@pytest.mark.parametrize('name', [*recordings.IN_CATALOGUE, *NOT_IN_CATALOGUE])
 def test_no_hidden_effect_is_called_a_mistake(benchmark: ModuleType, name: str) -> None:
     place = benchmark.scene(11, 0.0)
-    read = place.plant.readings([draw_effect(name, np.random.default_rng(4), 4.0)])
-    part = slice(benchmark.LEAD, None)
-    time = place.motion.time[part]
-    effort = read.effort[part] + np.random.default_rng(5).normal(0, 0.08, (len(time), 6))
+    run = place.inject([Choice(name, np.random.default_rng(4))])
+    part, time = slice(benchmark.LEAD, None), place.time
+    effort = run.efforts[part] + np.random.default_rng(5).normal(0, 0.08, (len(time), 6))
     found = find_mistakes(place.model, Recording.from_arrays(
-        name, time - time[0], np.round(read.position[part], 6), None, effort))
+        name, time - time[0], np.round(run.position[part], 6), None, effort))
     assert found == ()
 
 

@@ -26,7 +26,7 @@ from pprs_dynamics.simulation.export.exported_robot import TreePositions, export
 from pprs_dynamics.simulation.export.expressed import MJCF, URDF, express
 from pprs_dynamics.simulation.export.replay import DURATION, Replay, replay_excitation
 from pprs_dynamics.simulation.export.writers import closures, written
-from pprs_dynamics.simulation.mechanism_run import draw_motion
+from pprs_dynamics.simulation.injection import draw_motion
 
 EXACT = 1e-9  # of the largest effort
 NO_LOADS = {'friction.drives.coulomb': (0.0,) * 6, 'friction.revolute.coulomb': 0.0,

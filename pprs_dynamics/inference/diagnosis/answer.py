@@ -202,8 +202,7 @@ class Answer:
             without.cost - self.table.best.cost, root_mean_square(self.remaining + force),
             root_mean_square(self.remaining), before, after, estimates.at_bound,
             (less - with_force) / max(self.over_noise(self.given.error), 1e-300),
-            float('nan') if gain is None else gain.certainty,
-            self._objection(candidate, less / max(with_force, 1e-300), gain),
+            gain, self._objection(candidate, less / max(with_force, 1e-300), gain),
             self._ranked_set(without), self._in_model(candidate, parameters),
             None if course is None else replace(
                 course, begin=course.begin - begun, end=course.end - begun), estimates.moments)

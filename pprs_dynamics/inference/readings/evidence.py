@@ -63,7 +63,9 @@ def parts_of(model: ForceModel, excerpt: Excerpt, reading: Reading, in_pieces: b
                 return None
     if not np.isfinite(found).any():
         return None
-    width = np.broadcast_to(model.reversal.velocity, (position.shape[1],))
+    # A drive that is always slow turns over within its own speeds.
+    width = np.minimum(model.reversal.velocity, table.REVERSAL * np.sqrt(
+        np.mean(motion.velocity ** 2, axis=0)) + 1e-300)
     return Parts(found[0], found[1], found[2], motion.velocity, smooth_sign(motion.velocity, width))
 
 

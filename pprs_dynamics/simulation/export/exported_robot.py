@@ -11,7 +11,7 @@ free joints draw it, and two balls are cut.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -110,7 +110,7 @@ class ExportedRobot:
     ----------
     name : str
     mechanism : Mechanism
-    joints : dict of str to dict
+    joints : mapping of str to mapping
         See `Expressed`.
     bodies : tuple of Body
         Parents first.
@@ -118,7 +118,7 @@ class ExportedRobot:
 
     name: str
     mechanism: Mechanism
-    joints: dict[str, dict[str, float]]
+    joints: Mapping[str, Mapping[str, float]]
     bodies: tuple[Body, ...]
 
     @property
@@ -140,12 +140,16 @@ def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
         For bodies that no real ones are, and closures that no format has.
     """
     model = expressed.model
+    robot = with_bodies(model.robot, model.effects)
     if isinstance(model, DriveModel):
-        robot = with_bodies(model.robot, model.effects)
-        name, mechanism = 'three_pprs', _platform(robot, model, kind)
-    else:
-        name, mechanism = model.block, with_bodies(model.robot, model.effects)
-    return ExportedRobot(name, mechanism, expressed.joints, tuple(_bodies(mechanism)))
+        return described('three_pprs', platform_mechanism(robot, model, kind), expressed.joints)
+    return described(model.block, robot, expressed.joints)
+
+
+def described(name: str, mechanism: Mechanism, joints: Mapping[str, Mapping[str, float]] = {},
+              ) -> ExportedRobot:
+    """Return a mechanism as files of simulators describe it; `joints` as of `Expressed`."""
+    return ExportedRobot(name, mechanism, joints, tuple(_bodies(mechanism)))
 
 
 def _bodies(mechanism: Mechanism) -> Iterator[Body]:
@@ -190,7 +194,7 @@ def _inertia(name: str, parameters: Array) -> tuple[float, Array, Array, Array]:
     return max(mass, LEAST), centre, moments, axes
 
 
-def _platform(robot: Robot, model: DriveModel, kind: str) -> Mechanism:
+def platform_mechanism(robot: Robot, model: DriveModel, kind: str) -> Mechanism:
     """Return the 3-PPRS."""
     geometry, masses = robot.geometry, robot.masses
     R, r, l = geometry.base_radius, geometry.platform_radius, geometry.rod_length  # noqa: E741
