@@ -86,7 +86,7 @@ class Inputs:
     def of(cls, model: Model, recordings: Recordings, validate: Recordings = (),
            topic: str | None = None, progress: Progress | None = None,
            whole: bool = False, as_it_is: bool = False) -> Inputs:
-        """Read what is given as a path and check it, and take what is in memory as it is.
+        """Read and check paths; recordings in memory are not checked.
 
         Of recordings that are too long for a fit excerpts are taken, but where the `whole` is
         asked for.
@@ -191,7 +191,7 @@ class Inputs:
                        paths=self.paths - {name}).require_recordings()
 
     def since(self, reference: Given | None, model: ForceModel | None = None) -> Inputs:
-        """Return this with reference runs, () for the model's own; as it is for None.
+        """Return this with reference runs, () for the model's own; unchanged for None.
 
         They are fitted to the model, or to another one that is given.
 
