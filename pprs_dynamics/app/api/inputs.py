@@ -119,9 +119,6 @@ class Inputs:
         shipped = base is not None and base == find_file(DEFAULT_MODEL)
         given = base or '' if isinstance(model, ForceModel) else model
         name = '' if shipped else str(given)
-        # Before anything is read, which may take minutes.
-        _refuse_same_paths(listed_recordings(recordings), [], ONCE)
-        _refuse_same_paths(listed_recordings(validate), listed_recordings(recordings), OTHER)
         fitted, held_out = (_read_all(found, listed, topic, progress)
                             for listed in (recordings, validate))
         _refuse_repeats(fitted, [], ONCE)
@@ -300,16 +297,6 @@ def _read_all(model: ForceModel, given: Given, topic: str | None, progress: Prog
 def listed_recordings(given: Given) -> Sequence[File | Recording]:
     """Return what is given as one or several, as several."""
     return [given] if isinstance(given, (str, PathLike, Recording)) else given
-
-
-def _refuse_same_paths(given: Sequence[File | Recording], earlier: Sequence[File | Recording],
-                       rule: str) -> None:
-    seen = {str(one) for one in earlier if not isinstance(one, Recording)}
-    for one in given:
-        if not isinstance(one, Recording):
-            if str(one) in seen:
-                raise UnreadableFileError(str(one), f'it is given twice, but {rule}')
-            seen.add(str(one))
 
 
 def _require_kinds(recordings: Given, validate: Given) -> None:
