@@ -31,7 +31,6 @@ from pprs_dynamics.drives import CHANNELS
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.differentiation import Stretch, choose_smoothing
 from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.simulation.injected_effect import DriveForce, InjectedEffect
@@ -193,9 +192,10 @@ def _motion(seed: int) -> tuple[Any, DrivenMotion]:
 def tolerant_model(tolerance: float) -> DriveModel:
     """Return the paper's robot, its masses and friction coefficients known to a tolerance."""
     values = default_parameters()
-    model = build_model(values)
+    model = DriveModel.from_parameters(values)
     keys = dict.fromkeys(key for key, _ in tolerated_numbers(model.values))
-    return build_model({**values, **{f'tolerances.{key}': tolerance for key in keys}})
+    return DriveModel.from_parameters(
+        {**values, **{f'tolerances.{key}': tolerance for key in keys}})
 
 
 def noise_settings(noise: float | str, deviation: float) -> SensorSettings:

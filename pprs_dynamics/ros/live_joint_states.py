@@ -30,7 +30,7 @@ from std_msgs.msg import Float64MultiArray, String
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.live import ERROR_SPAN
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.live_stream import LiveStream
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
@@ -57,7 +57,7 @@ class LiveJointStates(Node):
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     topic : str
         Of sensor_msgs/JointState.
     monitor, feedforward : str
@@ -66,7 +66,7 @@ class LiveJointStates(Node):
         Of `rclpy.node.Node`.
     """
 
-    def __init__(self, model: ForceModel, topic: str, monitor: str, feedforward: str,
+    def __init__(self, model: DriveModel, topic: str, monitor: str, feedforward: str,
                  **options: Any) -> None:
         super().__init__(NAME, **options)
         self._ring: deque[tuple[int, Any, Any]] = deque(maxlen=MOST_SAMPLES)
@@ -128,7 +128,7 @@ class LiveJointStates(Node):
                 self._statuses[name] = found
 
     @property
-    def model(self) -> ForceModel:
+    def model(self) -> DriveModel:
         """What is compared with."""
         return self.stream.model
 
@@ -206,7 +206,7 @@ class LiveNodes:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
         That running nodes have as well.
     topic, monitor, feedforward : str
         As `LiveJointStates`.
@@ -216,7 +216,7 @@ class LiveNodes:
         Of ROS 2, with --ros-args: remappings, use_sim_time, QoS overrides.
     """
 
-    def __init__(self, model: ForceModel, topic: str = 'joint_states', monitor: str = 'monitor',
+    def __init__(self, model: DriveModel, topic: str = 'joint_states', monitor: str = 'monitor',
                  feedforward: str = 'feedforward', namespace: str = '',
                  arguments: Sequence[str] = ()) -> None:
         self._context = Context()
@@ -225,7 +225,7 @@ class LiveNodes:
         self._node = LiveJointStates(model, topic, monitor, feedforward, namespace=namespace,
                                      context=self._context)
         self._steps = ModelSteps(self._node.clients_of)
-        self._models: list[ForceModel] = []  # before each step
+        self._models: list[DriveModel] = []  # before each step
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name='live', daemon=True)
@@ -260,12 +260,12 @@ class LiveNodes:
         return '; '.join((f'nodes {", ".join(self._node.full_name(name) for name in there)}',
                           *self._node.machines(there)))
 
-    def set_model(self, model: ForceModel, confirmed: str) -> dict[str, Any]:
+    def set_model(self, model: DriveModel, confirmed: str) -> dict[str, Any]:
         """Set a model's effects on the running nodes, all or none, and compare with it here.
 
         Parameters
         ----------
-        model : ForceModel
+        model : DriveModel
         confirmed : str
             `machine` as a person has read it.
 

@@ -17,10 +17,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.errors import ModelError, PprsError
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import is_mechanism
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
@@ -101,12 +99,12 @@ class SimulatedRobotNode(ExplainsRefusals):
         declare_model(self)
         values = {name: value for name, value in current_values(self).items()
                   if name not in node_values}
-        self._model = build_model(values)
+        self._model = DriveModel.from_parameters(values)
         self._names = RobotNames.of(self._model)
         self._use_effort = node_values['use_effort']
         hidden = Hidden.of(node_values) if not of_joints else None
         self._robot = (_mechanism(self._model, node_values)
-                       if isinstance(self._model, MechanismModel) else
+                       if self._model.moves_joints else
                        _platform(self._model, node_values, hidden.effects if hidden else ()))
         self._queue = SetpointQueue(self._robot.control)
         self._period = round(conversions.NANOSECONDS / node_values['rate'])
@@ -216,7 +214,7 @@ def _loop_in_words(node_values: dict[str, Any]) -> str:
     return f'PD gains {node_values["stiffness"]:g} N/m and {node_values["damping"]:g} N s/m'
 
 
-def _platform(model: ForceModel, node_values: dict[str, Any], effects: Sequence[InjectedEffect],
+def _platform(model: DriveModel, node_values: dict[str, Any], effects: Sequence[InjectedEffect],
               ) -> SimulatedRobot:
     rate = node_values['rate']
     if 2000 % rate:
@@ -227,7 +225,7 @@ def _platform(model: ForceModel, node_values: dict[str, Any], effects: Sequence[
                           control=control, sensors=_sensors(node_values))
 
 
-def _mechanism(model: MechanismModel, node_values: dict[str, Any]) -> SimulatedRobot:
+def _mechanism(model: DriveModel, node_values: dict[str, Any]) -> SimulatedRobot:
     seed, rate = node_values['seed'], node_values['rate']
     plant = MechanismPlant(model, node_values['hidden_effects'], seed, node_values['hidden_scale'],
                            rate)

@@ -25,7 +25,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.injected_effect import InjectedEffectError
 from pprs_dynamics.simulation.joint_forms import FORMS, JointMoment, draw_form, truth
@@ -59,7 +59,7 @@ class MechanismPlant:
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
         Of which the mechanism and its own friction count, and no added effects.
     names : sequence of str
         Of `HIDDEN`, or 'random': physics that the model lacks.
@@ -92,7 +92,7 @@ class MechanismPlant:
         For a name of none.
     """
 
-    def __init__(self, model: MechanismModel, names: Sequence[str] = (), seed: int = 0,
+    def __init__(self, model: DriveModel, names: Sequence[str] = (), seed: int = 0,
                  scale: float = 1.0, rate: float = 500.0) -> None:
         self.time_step = 1 / (rate * math.ceil(1 / (rate * LONGEST_STEP)))
         self.model, self.engine = model, MechanismEngine(model)

@@ -21,7 +21,7 @@ from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.injected_effect import InjectedEffectError, algebraic_sign, eyring
 from pprs_dynamics.simulation.joint_forms import (
     CROSSED,
@@ -75,7 +75,7 @@ class MechanismRun:
     channels: Mapping[str, Array]
 
 
-def draw_motion(model: MechanismModel, duration: float, seed: int, rate: float = RATE,
+def draw_motion(model: DriveModel, duration: float, seed: int, rate: float = RATE,
                 ) -> JointMotion:
     """Return a random Fourier series of all drives within their limits and the workspace.
 
@@ -116,7 +116,7 @@ class Injection:
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
     read : JointMotion
         Motion that the encoders measure.
     random : numpy.random.Generator
@@ -145,7 +145,7 @@ class Injection:
         What was injected.
     """
 
-    def __init__(self, model: MechanismModel, read: JointMotion, random: np.random.Generator,
+    def __init__(self, model: DriveModel, read: JointMotion, random: np.random.Generator,
                  scale: float, climate: np.random.Generator) -> None:
         assert read.time is not None
         self.model, self.random, self.scale, self.climate = model, random, scale, climate
@@ -190,7 +190,7 @@ class Injection:
 
 
 def simulate_mechanism(
-    model: MechanismModel, names: Sequence[str], seed: int, scale: float = 1.0,
+    model: DriveModel, names: Sequence[str], seed: int, scale: float = 1.0,
     noise: float | None = None, duration: float = 40.0, path_seed: int = 0,
     progress: Callable[[float], None] | None = None, thermometers: bool = False,
     link_encoders: bool = False,
@@ -199,7 +199,7 @@ def simulate_mechanism(
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
         Its added effects are part of the model, not of the simulated robot.
     names : sequence of str
         Of `NAMES`, or 'random'.
@@ -334,7 +334,7 @@ def _external_wrench(run: Injection) -> Injected:
     return Injected(None, {'force_z': float(run.engine.wrench[2])}, 'at the tool')
 
 
-def _require_tool(model: MechanismModel, name: str) -> None:
+def _require_tool(model: DriveModel, name: str) -> None:
     """Raise InjectedEffectError for an axis, which a force across it does not move."""
     if not model.is_described:
         raise InjectedEffectError(f'{name} does not act along a single axis: choose effort_offset')
@@ -519,7 +519,7 @@ NAMES = tuple(sorted((name for _, effects in STAGES for name in effects),
                      key=lambda name: name not in FORMS))
 
 
-def _own_friction(model: MechanismModel, engine: MechanismEngine, motion: JointMotion) -> Array:
+def _own_friction(model: DriveModel, engine: MechanismEngine, motion: JointMotion) -> Array:
     """Return friction, offset and armature as the model file has them, under the true loads."""
     v = motion.velocity
     friction: Array = (
@@ -533,7 +533,7 @@ def _own_friction(model: MechanismModel, engine: MechanismEngine, motion: JointM
     return friction
 
 
-def links_that_weigh(model: MechanismModel) -> list[int]:
+def links_that_weigh(model: DriveModel) -> list[int]:
     """Return the links whose mass can be hidden.
 
     What turns about an upright axis shows in no weight, and the last link is the payload's.
@@ -542,14 +542,14 @@ def links_that_weigh(model: MechanismModel) -> list[int]:
             and (j or model.robot.structure.loops)]
 
 
-def able_joints(name: str, model: MechanismModel, motion: JointMotion) -> list[int]:
+def able_joints(name: str, model: DriveModel, motion: JointMotion) -> list[int]:
     """Return the joints that a hidden force can act in along a motion."""
     turn, stroke = FORMS[name].needs_turn, np.ptp(motion.position, axis=0)
     return [j for j, unit in enumerate(model.units)
             if not turn or (unit.turns and stroke[j] >= turn)]
 
 
-def one_able_joint(name: str, model: MechanismModel, motion: JointMotion,
+def one_able_joint(name: str, model: DriveModel, motion: JointMotion,
                    random: np.random.Generator) -> int:
     """Return one of the joints that a hidden force can act in along a motion."""
     able = able_joints(name, model, motion)

@@ -38,7 +38,7 @@ from scipy.linalg.lapack import dposv
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError, SingularityError
-from pprs_dynamics.physics.model.limits import Limits
+from pprs_dynamics.physics.model.platform_block import platform_limits
 from pprs_dynamics.simulation.closed_chains import (
     DRIVE_DOFS,
     ClosedChains,
@@ -154,7 +154,7 @@ class Plant:
                  settings: PlantSettings | None = None) -> None:
         self.settings, self._values = settings or PlantSettings(), values
         self.time_step = self.settings.step
-        self.limits = Limits.of(values)
+        self.limits = platform_limits(values)
         self.lower, self.upper = self.limits.strokes
         self.resistance = Resistance(values, self.settings.drive_width,
                                      self.settings.passive_width, self.settings.friction)

@@ -33,10 +33,9 @@ from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.form_error import DIRECTIONS, FormErrors
 from pprs_dynamics.inference.search.held_out import BLOCKS, PredictiveGain, predictive_gain
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.physics.model.model_file import build_model
 
 PLAIN = DriveModel.load()
-WITH_EFFECT = build_model({**PLAIN.values, 'effects.active': ['payload_mass'],
+WITH_EFFECT = DriveModel.from_parameters({**PLAIN.values, 'effects.active': ['payload_mass'],
                            'effects.payload_mass.mass': 0.1})
 
 
@@ -246,7 +245,7 @@ def test_what_the_recordings_do_not_call_for_is_refused_with_the_reason() -> Non
                        'threshold')
 
 
-FRICTION = build_model({**PLAIN.values, 'effects.active': ['coulomb_friction'],
+FRICTION = DriveModel.from_parameters({**PLAIN.values, 'effects.active': ['coulomb_friction'],
                         'effects.coulomb_friction.lift_2.force': -1.0})
 
 

@@ -29,7 +29,6 @@ from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.monitor import MonitorNode
 from pprs_dynamics.ros.play_trajectory import PlayTrajectoryNode
@@ -86,7 +85,7 @@ def test_effects_come_and_go_with_their_topics_while_running(caller: Caller) -> 
               'effects.stribeck_friction.lift_1.force': 1.2,
               'effects.stribeck_friction.lift_1.velocity': 0.01,
               'effects.effort_offset.slide_3.force': -0.7}
-    expected = build_model(values).drive_forces(MOTION)
+    expected = DriveModel.from_parameters(values).drive_forces(MOTION)
     topic = '/feedforward/effort/effort_offset'
     part = node.bench.listen(JointState, topic)
     assert node.bench.spin_until(lambda: node.node.count_subscribers(topic))
@@ -124,7 +123,8 @@ def test_many_parameters_change_at_once_or_not_at_all(caller: Caller) -> None:
     values = {**DriveModel.load().values, **whole}
     values.pop('max_age')
     np.testing.assert_allclose(caller.node.answer(MESSAGE),
-                               build_model(values).drive_forces(MOTION).total[0], atol=EQUAL)
+                               DriveModel.from_parameters(
+                                   values).drive_forces(MOTION).total[0], atol=EQUAL)
 
 
 REFUSED = [

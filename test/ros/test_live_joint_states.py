@@ -31,7 +31,6 @@ from std_msgs.msg import Float64MultiArray, String
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.ros.live_joint_states import SHOWN, LiveJointStates, LiveNodes
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.model_transaction import RAMP, set_on_all
@@ -89,7 +88,7 @@ def test_joint_states_are_heard_whatever_their_publisher_offers(
         assert running.spin_until(lambda: publisher.publish(message) or node.to_dict()['received'])
 
 
-HEAVIER = build_model({
+HEAVIER = DriveModel.from_parameters({
     **MODEL.values, 'masses.payload': MODEL.values['masses.payload'] + 0.1,
     'effects.active': ['effort_offset'], 'effects.effort_offset.lift_1.force': 0.5})
 
@@ -209,7 +208,8 @@ def test_the_step_of_another_program_is_not_undone(robot: Robot) -> None:
             assert time.monotonic() < end
             time.sleep(0.1)
         assert live.set_model(HEAVIER, live.machine())['is_set']
-        answer = other.set_model(build_model({**MODEL.values, 'masses.payload': 0.7}),
+        answer = other.set_model(DriveModel.from_parameters(
+            {**MODEL.values, 'masses.payload': 0.7}),
                                  live.machine())
         assert not answer['is_set']
         assert 'changed by another program' in answer['nodes']['monitor']
@@ -255,7 +255,7 @@ def test_the_machine_is_named_by_robot_file_and_who_takes_its_commands(
             assert running.spin_until(lambda: nodes.machine() == (
                 'nodes /feedforward; robot 3-PPRS of paper.yaml; commands of feedforward go to '
                 '/left_drives'), 20), nodes.machine()
-            answer = nodes.set_model(build_model({
+            answer = nodes.set_model(DriveModel.from_parameters({
                 **MODEL.values, 'masses.payload': 1.5}), nodes.machine())
             assert answer == {'is_set': True, 'nodes': {'feedforward': ''}}
         finally:

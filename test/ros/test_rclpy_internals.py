@@ -66,10 +66,11 @@ def test_the_node_answers_takes_parameters_and_has_its_last_word(
                    f'masses.payload:={PAYLOAD}', '-p', 'timeout_action:=zero')
     values = {'masses.payload': PAYLOAD, 'effects.active': ['effort_offset'],
               'effects.effort_offset.lift_2.force': 1.5}
-    from pprs_dynamics.physics.model.model_file import build_model
+    from pprs_dynamics.physics.model.drive_model import DriveModel
     from pprs_dynamics.physics.model.parameter_file import default_parameters
 
-    expected = build_model({**default_parameters(), **values}).drive_forces(ONE).total[0]
+    expected = DriveModel.from_parameters(
+        {**default_parameters(), **values}).drive_forces(ONE).total[0]
     with bench() as running:
         commands = running.listen(Float64MultiArray, '/feedforward/commands')
         running.follow_status('/feedforward/status')

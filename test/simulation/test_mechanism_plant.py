@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import robots_with_loops as robots
 
-from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.simulation.drive_control import Setpoint
 from pprs_dynamics.simulation.injected_effect import InjectedEffectError
@@ -28,11 +28,11 @@ QUIET = SensorSettings.with_effort_noise(0.0)
 TICK = 0.002
 
 
-def models(tmp_path: Path) -> dict[str, MechanismModel]:
+def models(tmp_path: Path) -> dict[str, DriveModel]:
     """Return the example robots with friction in every joint, and an arm."""
-    return {'hexapod': MechanismModel.load('config/hexapod.yaml'),
-            'delta': MechanismModel.load('config/delta.yaml'),
-            'arm': MechanismModel.load(made_up_arm.write_arm(tmp_path, **{
+    return {'hexapod': DriveModel.load('config/hexapod.yaml'),
+            'delta': DriveModel.load('config/delta.yaml'),
+            'arm': DriveModel.load(made_up_arm.write_arm(tmp_path, **{
                 key.replace('.', '__'): list(value)
                 for key, value in made_up_arm.FRICTION.items()}))}
 
@@ -78,7 +78,7 @@ def test_it_follows_with_the_feedforward_and_applies_what_the_model_says(
 
 def test_the_loop_of_the_drives_is_stable(tmp_path: Path) -> None:
     """After a jump of the setpoint it comes to rest where friction lets it."""
-    plant = MechanismPlant(MechanismModel.load('config/hexapod.yaml'))
+    plant = MechanismPlant(DriveModel.load('config/hexapod.yaml'))
     robot = SimulatedRobot(plant, control=plant.gains(7.0, 0.9, command_timeout=np.inf),
                            sensors=QUIET)
     goal = plant.position + np.array([3.0, -3.0, 2.0, 0.0, 1.0, -2.0]) * 1e-3
@@ -92,7 +92,7 @@ def test_the_loop_of_the_drives_is_stable(tmp_path: Path) -> None:
 
 
 def test_it_holds_at_home_saturates_and_refuses(tmp_path: Path) -> None:
-    plant = MechanismPlant(MechanismModel.load('config/hexapod.yaml'))
+    plant = MechanismPlant(DriveModel.load('config/hexapod.yaml'))
     robot = SimulatedRobot(plant, control=plant.gains(7.0, 0.9), sensors=QUIET)
     home = plant.position.copy()
     for _ in range(50):
@@ -107,7 +107,7 @@ def test_it_holds_at_home_saturates_and_refuses(tmp_path: Path) -> None:
 
 
 def test_a_hidden_payload_is_moved_by_the_drive_that_carries_it(tmp_path: Path) -> None:
-    model = MechanismModel.load(robots.five_bar().write(tmp_path))
+    model = DriveModel.load(robots.five_bar().write(tmp_path))
     plain, loaded = MechanismPlant(model), MechanismPlant(model, ['payload_mass'], seed=2)
     rest = np.zeros(2)
     weight = [each._equations(each.position, rest, rest)[0] for each in (plain, loaded)]
@@ -117,7 +117,7 @@ def test_a_hidden_payload_is_moved_by_the_drive_that_carries_it(tmp_path: Path) 
 
 
 def test_what_cannot_be_hidden_is_told(tmp_path: Path) -> None:
-    model = MechanismModel.load(robots.five_bar().write(tmp_path))
+    model = DriveModel.load(robots.five_bar().write(tmp_path))
     with pytest.raises(InjectedEffectError, match='rod_mass cannot be hidden'):
         MechanismPlant(model, ['rod_mass'])
 
@@ -144,7 +144,7 @@ def test_a_tilted_base_turns_the_gravity_that_the_robot_has(
     tmp_path: Path, gravity: list[float],
 ) -> None:
     angle = 0.02
-    model = MechanismModel.load(made_up_arm.write_arm(tmp_path))
+    model = DriveModel.load(made_up_arm.write_arm(tmp_path))
     tilt = BaseTilt({'x': angle, 'y': 0.0})
     robot = replace(model.robot, gravity=tuple(gravity))
     assert tilted(np.array(gravity), angle) == pytest.approx(tilt.changed(robot).gravity)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import robots_with_loops as robots
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism import structure
 from pprs_dynamics.physics.model import robot_block
@@ -58,21 +58,21 @@ def described(folder: Path) -> Path:
 
 
 def test_plant_and_model_agree(tmp_path: Path) -> None:
-    MechanismEngine(MechanismModel.load(described(tmp_path)))
+    MechanismEngine(DriveModel.load(described(tmp_path)))
     for robot in (robots.hexapod, robots.delta, robots.five_bar):
-        MechanismEngine(MechanismModel.load(robot().write(tmp_path)))
+        MechanismEngine(DriveModel.load(robot().write(tmp_path)))
     (tmp_path / 'robot.xml').write_text(MJCF)
     path = tmp_path / 'mjcf.yaml'
     path.write_text('/**:\n  ros__parameters:\n    robot: {mjcf: robot.xml, base: plate, tool: l2, '
                     'drives: [j1, j2]}\n')
-    engine = MechanismEngine(MechanismModel.load(path))
+    engine = MechanismEngine(DriveModel.load(path))
     engine.add_payload(1.0, np.array([0.0, 0.1, 0.2]))
     engine.add_to_link(0, 0.5)
     engine._require_agreement(_loaded(path, engine))
 
 
-def _loaded(path: Path, engine: MechanismEngine) -> MechanismModel:
-    return replace(MechanismModel.load(path), robot=engine.robot)
+def _loaded(path: Path, engine: MechanismEngine) -> DriveModel:
+    return replace(DriveModel.load(path), robot=engine.robot)
 
 
 def locked_at_zero(self: object, joint: object) -> float:
@@ -108,5 +108,5 @@ def test_faults_of_the_model_are_seen(tmp_path: Path, fault: str,
         monkeypatch.setattr(mechanism_engine, 'described_gravity', as_standard)
     robot_block._structure.cache_clear()
     with pytest.raises(ModelError, match='in MuJoCo'):
-        MechanismEngine(MechanismModel.load(described(tmp_path)))
+        MechanismEngine(DriveModel.load(described(tmp_path)))
     robot_block._structure.cache_clear()

@@ -14,7 +14,6 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MotionError, SingularityError
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.injected_bodies import PayloadPickUp
 from pprs_dynamics.simulation.injected_effect import InjectedEffect
@@ -70,7 +69,7 @@ def motion() -> DrivenMotion:
     {'geometry.platform_angles': [0.1, 2.2, 4.1], 'masses.slides': [0.0, 0.2, 1.0]},
 ], ids=['paper', 'masses', 'gravity', 'angles'])
 def test_with_nothing_hidden_the_drives_need_what_the_model_says(change: dict[str, object]) -> None:
-    model = build_model({**MODEL.values, **change})
+    model = DriveModel.from_parameters({**MODEL.values, **change})
     motion, forces = excited(model, 0.4)
     found = PrescribedPlant(model.values, motion).efforts().total
     # A slide without mass has 1e-9 kg in the engine.

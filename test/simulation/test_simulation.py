@@ -18,7 +18,6 @@ import pprs_dynamics
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MissingLibraryError, MotionError
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.simulation.closed_chains import ClosedChains
 from pprs_dynamics.simulation.drive_control import (
@@ -75,7 +74,8 @@ def unexplained(run: SimulatedRun, model: DriveModel = MODEL) -> np.ndarray:
 
 
 def changed(**values: object) -> DriveModel:
-    return build_model({**MODEL.values, **{k.replace('__', '.'): v for k, v in values.items()}})
+    return DriveModel.from_parameters(
+        {**MODEL.values, **{k.replace('__', '.'): v for k, v in values.items()}})
 
 
 def rms(values: np.ndarray) -> np.ndarray:
@@ -417,7 +417,7 @@ def drag_power(p: dict[str, float], run: SimulatedRun) -> np.ndarray:
 
 
 def stiffness_power(p: dict[str, float], run: SimulatedRun) -> np.ndarray:
-    chains = MODEL.mechanism(run.platform_motion()).chains
+    chains = MODEL.mechanism(run.platform_motion()).links.chains
     x = chains.rod_angle - p['rest']
     return np.sum(p['stiffness'] * (x + x ** 3 / p['hardening'] ** 2) * chains.u_dot, axis=1)
 
@@ -440,11 +440,11 @@ def joint_power(p: dict[str, float], speed: np.ndarray) -> np.ndarray:
 
 
 def revolute_power(p: dict[str, float], run: SimulatedRun) -> np.ndarray:
-    return joint_power(p, np.abs(MODEL.mechanism(run.platform_motion()).chains.u_dot))
+    return joint_power(p, np.abs(MODEL.mechanism(run.platform_motion()).links.chains.u_dot))
 
 
 def spherical_power(p: dict[str, float], run: SimulatedRun) -> np.ndarray:
-    chains = MODEL.mechanism(run.platform_motion()).chains
+    chains = MODEL.mechanism(run.platform_motion()).links.chains
     n = chains.angular_velocity
     return joint_power(p, np.sqrt(n.e ** 2 + (chains.u_dot - n.n) ** 2 + n.k ** 2))
 
@@ -782,7 +782,7 @@ def test_actuation_delay_makes_efforts_come_late() -> None:
 
 def test_stops_end_the_strokes() -> None:
     robot = SimulatedRobot(MODEL.values, sensors=QUIET)
-    lowest, highest = MODEL.limits.lift_stroke
+    lowest, highest = MODEL.values['limits.lift_stroke']
     for _ in range(400):
         robot.command(Setpoint(effort=np.array([0.0, 0.0, 0.0, 30.0, 30.0, 30.0])))
         robot.tick()
@@ -799,7 +799,7 @@ CONTAINERS = (
     'pprs_dynamics.drives', 'pprs_dynamics.physics.mechanism.motion',
     'pprs_dynamics.physics.mechanism.joint_motion',
     'pprs_dynamics.physics.mechanism.structure_load',
-    'pprs_dynamics.physics.mechanism.joint_series', 'pprs_dynamics.physics.model.mechanism_model',
+    'pprs_dynamics.physics.mechanism.joint_series', 'pprs_dynamics.physics.model.drive_model',
     'pprs_dynamics.physics.model.limits')
 # Robots by URDF are built in MuJoCo from what was read of their file: joints, loops, names and
 # numbers, friction's among them. Kinematics, loops, reactions and friction are the engine's, or

@@ -20,9 +20,6 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.simulation.drive_control import ControlSettings, Note
 
@@ -40,7 +37,7 @@ class SimulationResult(Result):
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recording : Recording
         What the sensors said.
     effects : tuple of dict
@@ -54,7 +51,7 @@ class SimulationResult(Result):
     seed : int
     """
 
-    model: ForceModel
+    model: DriveModel
     recording: Recording
     effects: tuple[dict[str, Any], ...]
     notes: tuple[Note, ...]
@@ -119,7 +116,7 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
 
     Parameters
     ----------
-    model : ForceModel or path
+    model : DriveModel or path
     effects : str or sequence of str
         Names of effects, drawn from the seed; 'random' draws the names, too.
     seed : int
@@ -153,10 +150,10 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     PprsError
         For an unknown effect, a motion beyond the strokes, or a model that cannot be simulated.
     """
-    found = model if isinstance(model, ForceModel) else load_model(find_file(model))
+    found = model if isinstance(model, DriveModel) else DriveModel.load(find_file(model))
     names = [effects] if isinstance(effects, str) else list(effects)
     share_done = stage(progress, 'simulating')
-    if isinstance(found, MechanismModel):
+    if found.moves_joints:
         from pprs_dynamics.simulation.mechanism_run import RATE as MECHANISM_RATE
         from pprs_dynamics.simulation.mechanism_run import simulate_mechanism
 
@@ -166,7 +163,6 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
         recording = Recording.from_arrays('simulated', run.motion.time, run.position, None,
                                           run.effort, found.drives, run.channels)
         return SimulationResult(found, recording, run.effects, (), run.motion, MECHANISM_RATE, seed)
-    assert isinstance(found, DriveModel)
     if feedforward not in FEEDFORWARDS:
         raise MotionError('feedforward', repr(feedforward),
                           f'be one of {", ".join(FEEDFORWARDS)}', 'shape')

@@ -18,7 +18,6 @@ from pprs_dynamics.app.commands.info import show_recordings
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.mechanism_description import mechanism_lines
 from pprs_dynamics.app.report.terminal import console, shown
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
@@ -55,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
                         tool=options.tool, drives=drives, rate=options.rate,
                         ask=_ask if sys.stdin.isatty() else None)
     write_text(options.output, first.text)
-    for line in mechanism_lines(first.model) if isinstance(first.model, MechanismModel) else ():
+    for line in mechanism_lines(first.model) if first.model.moves_joints else ():
         screen.print(shown(line))
     for note in first.notes:
         screen.print(f'[yellow]![/] {shown(note)}')

@@ -13,7 +13,7 @@ import numpy as np
 from pprs_dynamics.app.report.charts import plotly_objects
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.skeleton import Skeleton
 from pprs_dynamics.system.plain_text import counted
 
@@ -21,7 +21,7 @@ COLOURS = {'driven': '#0072B2', 'passive': '#009E73', 'held': '#999999'}
 LOOP = '#E69F00'
 
 
-def describe_mechanism(model: MechanismModel) -> dict[str, Any]:
+def describe_mechanism(model: DriveModel) -> dict[str, Any]:
     """Return bodies, joints, loops, mobility and conditioning, for JSON."""
     robot = model.robot
     s = robot.structure
@@ -47,7 +47,7 @@ def describe_mechanism(model: MechanismModel) -> dict[str, Any]:
         'remarks': list(s.description.remarks)}
 
 
-def mechanism_lines(model: MechanismModel) -> list[str]:
+def mechanism_lines(model: DriveModel) -> list[str]:
     """Return the same as sentences for the terminal."""
     found = describe_mechanism(model)
     s = model.robot.structure
@@ -69,13 +69,13 @@ def mechanism_lines(model: MechanismModel) -> list[str]:
     return lines
 
 
-def _role(model: MechanismModel, name: str) -> str:
+def _role(model: DriveModel, name: str) -> str:
     s = model.robot.structure
     c = int(s.tables.coordinate[s.rows[name]])
     return ('driven' if c in s.tables.drives else 'held' if c in s.mobility.held else 'passive')
 
 
-def write_mechanism_page(path: str | PathLike[str], model: MechanismModel, title: str) -> None:
+def write_mechanism_page(path: str | PathLike[str], model: DriveModel, title: str) -> None:
     """Write what a mechanism is as one HTML file that needs no network."""
     page = Page(title)
     for line in mechanism_lines(model):
@@ -85,7 +85,7 @@ def write_mechanism_page(path: str | PathLike[str], model: MechanismModel, title
     page.write(path)
 
 
-def draw_mechanism(model: MechanismModel, title: str) -> Any:
+def draw_mechanism(model: DriveModel, title: str) -> Any:
     """Return a Plotly figure of the joints at home: seen from the front, and from above."""
     from plotly.subplots import make_subplots
 

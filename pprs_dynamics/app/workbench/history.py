@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from pprs_dynamics.app.workbench.tick_fits import Tick
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MOST_MOMENTS = 200  # that are kept; a moment is a few kilobytes
 
@@ -20,13 +20,13 @@ class Moment:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     ticks : mapping of str to Tick
     fitted_since : int
         Revision at which the fits began that the ticks belong to.
     """
 
-    model: ForceModel = field(repr=False)
+    model: DriveModel = field(repr=False)
     ticks: Mapping[str, Tick]
     fitted_since: int
 

@@ -38,9 +38,8 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import Step, read_steps, without_last_step
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.system.numbers import finite
 from pprs_dynamics.system.plain_text import for_json
@@ -55,7 +54,7 @@ class Session:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings : mapping of str to Recording
         To fit to, by whatever name.
     validation : mapping of str to Recording, optional
@@ -86,7 +85,7 @@ class Session:
         As `measure_residuals`.
     """
 
-    def __init__(self, model: ForceModel, recordings: Mapping[str, Recording],
+    def __init__(self, model: DriveModel, recordings: Mapping[str, Recording],
                  validation: Mapping[str, Recording] | None = None,
                  base: str | PathLike[str] | None = None,
                  reference: Reference | None = None) -> None:
@@ -282,7 +281,7 @@ class Session:
     # What there is
 
     @property
-    def model(self) -> ForceModel:
+    def model(self) -> DriveModel:
         """With everything that was adopted."""
         return self.fits.model
 
@@ -632,14 +631,14 @@ class Session:
         """
         with self._changing(revision, 'last step of the ledger taken back'):
             values, step = without_last_step(self.model.values)
-            model = replace(build_model(values), source=self.model.source)
+            model = replace(DriveModel.from_parameters(values), source=self.model.source)
             self.diagnosis = None
             self._use(_fits_of(model, self.inputs), self.view_state.ticks)
             return step
 
     # What goes out
 
-    def ticked_model(self) -> ForceModel:
+    def ticked_model(self) -> DriveModel:
         """Return the model with the ticked effects as they are shown, without a ledger entry.
 
         Raises
@@ -699,6 +698,6 @@ class Session:
                              for key, one in self.inputs.validation.items()]}
 
 
-def _fits_of(model: ForceModel, inputs: Inputs) -> TickFits:
+def _fits_of(model: DriveModel, inputs: Inputs) -> TickFits:
     """Return the fits of a model to recordings, since their reference where there is one."""
     return TickFits(model, inputs.fitted, inputs.reference)

@@ -36,9 +36,8 @@ from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.inference.search.held_out import predictive_gain
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import original_values
-from pprs_dynamics.physics.model.model_file import build_model
 
 # Shares of the work, for the progress bar.
 DIAGNOSIS, FIT = 0.5, 0.85
@@ -47,7 +46,7 @@ WEAK = 'blocks of the same recordings are weak evidence: give one'
 
 
 def adopt(
-    model: ForceModel, request: EffectRequest | CurveRequest, recordings: Sequence[Recording],
+    model: DriveModel, request: EffectRequest | CurveRequest, recordings: Sequence[Recording],
     validate: Sequence[Recording] = (), force: bool = False,
     progress: Callable[[float], None] | None = None, diagnosis: Diagnosis | None = None,
     reference: Reference | None = None,
@@ -58,7 +57,7 @@ def adopt(
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     request : EffectRequest or CurveRequest
     recordings : sequence of Recording
         To fit to.
@@ -148,7 +147,7 @@ def adopt(
                        moments=fitted.moments)
 
 
-def original(model: ForceModel) -> ForceModel:
+def original(model: DriveModel) -> DriveModel:
     """Return a model with its numbers as they were before anything was fitted to them.
 
     Tolerances are limits about what the file said at first; counted from where the last fit
@@ -157,15 +156,15 @@ def original(model: ForceModel) -> ForceModel:
     values = original_values(model.values)
     if all(values[key] == value for key, value in model.values.items()):
         return model
-    return replace(build_model(values), source=model.source)
+    return replace(DriveModel.from_parameters(values), source=model.source)
 
 
 @dataclass(frozen=True)
 class _Case:
     """What is asked."""
 
-    model: ForceModel
-    start: ForceModel
+    model: DriveModel
+    start: DriveModel
     request: EffectRequest | CurveRequest
     recordings: Sequence[Recording]
     validate: Sequence[Recording]
@@ -179,13 +178,13 @@ class _Case:
         return ('the validation recordings' if self.validate
                 else 'held-out blocks of the recordings')
 
-    def residuals(self, after: ForceModel) -> tuple[Residuals, Residuals]:
+    def residuals(self, after: DriveModel) -> tuple[Residuals, Residuals]:
         """Return those of the model as given and of another on the recordings."""
         before = (self.diagnosis.residuals if self.start is self.model
                   else self.beyond(self.recordings, self.model)[0])
         return before, self.beyond(self.recordings, after)[0]
 
-    def beyond(self, recordings: Sequence[Recording], *models: ForceModel) -> list[Residuals]:
+    def beyond(self, recordings: Sequence[Recording], *models: DriveModel) -> list[Residuals]:
         """Return the residuals of models, less what the reference shows as well."""
         found = [measure_residuals(one, recordings)[0] for one in models]
         if self.reference is None:
@@ -208,7 +207,7 @@ class _Case:
                        reason=f'its fit gives no model: {reason}')
 
     def answer(
-        self, after: ForceModel, drives: tuple[str, ...] | None, found: list[str],
+        self, after: DriveModel, drives: tuple[str, ...] | None, found: list[str],
         remarks: list[str], residuals_before: Residuals, residuals_after: Residuals,
         held_out: tuple[float, float], parameters: dict[str, Estimate],
         calibrated: tuple[Calibration, ...] = (), rivals: tuple[str, ...] = (),

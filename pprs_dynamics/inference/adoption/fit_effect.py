@@ -34,9 +34,8 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import set_number
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.uncertainties import UNCERTAINTIES, with_uncertainties
 
 SURE = 2.0  # standard deviations, by which a number that is something differs from 0
@@ -56,9 +55,9 @@ class EffectFit:
     request : EffectRequest
     drives : tuple of str or None
         On which it was fitted.
-    model : ForceModel
+    model : DriveModel
         With the effect.
-    plain : ForceModel
+    plain : DriveModel
         Without it, its own numbers fitted alike.
     parameters : dict of str to Estimate
     at_bound : tuple of str
@@ -79,8 +78,8 @@ class EffectFit:
 
     request: EffectRequest
     drives: tuple[str, ...] | None
-    model: ForceModel
-    plain: ForceModel
+    model: DriveModel
+    plain: DriveModel
     parameters: dict[str, Estimate]
     at_bound: tuple[str, ...]
     calibrated: list[Calibration]
@@ -93,7 +92,7 @@ class EffectFit:
 
 
 def fit_effect(
-    model: ForceModel, request: EffectRequest, recordings: Sequence[Recording],
+    model: DriveModel, request: EffectRequest, recordings: Sequence[Recording],
     progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
     carry_over: Callable[[Design], CarriedOver] | None = None,
 ) -> EffectFit | None:
@@ -169,13 +168,13 @@ def _is_move(design: Design, one: Calibration) -> bool:
     return abs(one.after - one.before) > LEAST_MOVE * deviations.get((one.key, one.element), 0.0)
 
 
-def _with_numbers(fitted: ForceModel, start: ForceModel, moved: Sequence[Calibration],
-                  ) -> ForceModel:
+def _with_numbers(fitted: DriveModel, start: DriveModel, moved: Sequence[Calibration],
+                  ) -> DriveModel:
     """Return a fitted model in which only some numbers are not as they were at the start."""
     values = {**fitted.values, **{key: start.values[key] for key in start.keys}}
     for one in moved:
         set_number(values, one.key, one.element, one.after)
-    return replace(build_model(values), source=fitted.source)
+    return replace(DriveModel.from_parameters(values), source=fitted.source)
 
 
 def _nothing_left(design: Design, candidate: EffectCandidate,
@@ -201,13 +200,13 @@ def _nothing_left(design: Design, candidate: EffectCandidate,
     return tuple(found)
 
 
-def _with_uncertainties(fitted: ForceModel, known: Mapping[str, Mapping[str, Estimate]],
-                        nothing: Sequence[str]) -> ForceModel:
+def _with_uncertainties(fitted: DriveModel, known: Mapping[str, Mapping[str, Estimate]],
+                        nothing: Sequence[str]) -> DriveModel:
     """Return a fitted model with what is known of its effects' parameters.
 
     Parameters
     ----------
-    fitted : ForceModel
+    fitted : DriveModel
     known : mapping of str to mapping of str to Estimate
         By effect, the one that was asked for last.
     nothing : sequence of str
@@ -225,4 +224,4 @@ def _with_uncertainties(fitted: ForceModel, known: Mapping[str, Mapping[str, Est
         values = {key: value for key, value in values.items() if not key.startswith(gone)}
         if not any(key.startswith(f'effects.{name}.') for key in values):
             values['effects.active'] = [one for one in values['effects.active'] if one != name]
-    return replace(build_model(values), source=fitted.source)
+    return replace(DriveModel.from_parameters(values), source=fitted.source)

@@ -18,11 +18,8 @@ from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.held_out import PredictiveGain
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.force_model import (
-    ACTIVE_FRICTION,
-    PASSIVE_FRICTION,
-    ForceModel,
-)
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.forces import ACTIVE_FRICTION, PASSIVE_FRICTION
 
 MOVING = 5.0  # widths in which friction turns over
 PUSHES = 0.1  # of the moving time, in which a drive's friction may give power back
@@ -80,7 +77,7 @@ def _evidence_alone(name: str, diagnosis: Diagnosis) -> float:
                 next(one.evidence for one in diagnosis.effects if one.name == name))
 
 
-def of_prediction(gain: PredictiveGain, before: Residuals, after: Residuals, model: ForceModel,
+def of_prediction(gain: PredictiveGain, before: Residuals, after: Residuals, model: DriveModel,
                   where: str) -> list[str]:
     """Return why an effect does not lower the error beyond its uncertainty; nothing if it does.
 
@@ -90,7 +87,7 @@ def of_prediction(gain: PredictiveGain, before: Residuals, after: Residuals, mod
         Of the model with the effect.
     before, after : Residuals
         Of the two models, for the sentence.
-    model : ForceModel
+    model : DriveModel
         As given: more is asked where it has effects already.
     where : str
         What was predicted, for the sentence.
@@ -133,7 +130,7 @@ def of_constraints(fitted: EffectFit, after: Residuals, decisions: Decisions) ->
         f'with {fitted.request.name}, {where} in {shares[worst]:.0%} of the moving time']
 
 
-def _pushing(model: ForceModel, residuals: Residuals) -> dict[str, float]:
+def _pushing(model: DriveModel, residuals: Residuals) -> dict[str, float]:
     """Return the share of the moving time with negative friction power, by drive; '' is all."""
     own, passive = np.zeros((2, *residuals.model.shape))
     for effect in model.effects:

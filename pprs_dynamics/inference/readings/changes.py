@@ -31,10 +31,10 @@ from pprs_dynamics.inference.readings.table import (
 )
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of, forces_on
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 
-def find_changed_efforts(model: ForceModel, recording: Recording) -> Iterator[OtherReading]:
+def find_changed_efforts(model: DriveModel, recording: Recording) -> Iterator[OtherReading]:
     """Yield efforts that lack their sign, and units or signs that are others from a time on."""
     excerpt = excerpt_of(recording)
     forces = None if excerpt is None else forces_on(model, excerpt.motion, excerpt.time)

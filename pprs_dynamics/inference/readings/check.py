@@ -66,7 +66,7 @@ from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Defect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 SCALES = (1.0, -1.0, *EFFORTS, *(-unit for unit in EFFORTS))
 # Of one drive among others; other units are those of all drives.
@@ -97,7 +97,7 @@ class Fit:
                 and not np.any(np.isin(self.scales, OF_ONE)))
 
 
-def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False) -> Recording:
+def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False) -> Recording:
     """Return a recording with its mistakes among its findings.
 
     Raises
@@ -114,12 +114,12 @@ def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False)
     return replace(recording, findings=(*mistakes, *recording.findings))
 
 
-def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]:
+def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]:
     """Return where a recording is read better otherwise than its names and units say.
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recording : Recording
         Of the model's drives.
     """
@@ -162,12 +162,12 @@ class Search:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     excerpts : dict of float to Excerpt
         Of the recording, by the unit of its times [s].
     """
 
-    def __init__(self, model: ForceModel, excerpts: dict[float, Excerpt]) -> None:
+    def __init__(self, model: DriveModel, excerpts: dict[float, Excerpt]) -> None:
         self.model, self.excerpts = model, excerpts
         self.plain_left = 1.0  # residual of the plain reading
         self.fits: list[Fit] = []
@@ -355,7 +355,7 @@ def _time_units(recording: Recording) -> list[float]:
 # --------------------------------------------------------------------------------- sentences
 
 
-def _of_fit(model: ForceModel, fit: Fit) -> Iterator[OtherReading]:
+def _of_fit(model: DriveModel, fit: Fit) -> Iterator[OtherReading]:
     """Yield the mistakes of times, of positions and order, and of efforts."""
     drives, units = model.drives, model.units
     if fit.time_unit != 1.0:
@@ -381,7 +381,7 @@ def _of_fit(model: ForceModel, fit: Fit) -> Iterator[OtherReading]:
                               scales=effort_scales(model, group, np.full(len(drives), 1 / scale)))
 
 
-def position_scales(model: ForceModel, reading: Reading) -> Scales:
+def position_scales(model: DriveModel, reading: Reading) -> Scales:
     """Return the factors and offsets below `columns` with which positions are read so."""
     found = []
     offset = np.zeros(len(model.drives)) + reading.offset
@@ -398,7 +398,7 @@ def position_scales(model: ForceModel, reading: Reading) -> Scales:
     return () if reading.kind == 'drive_order' else tuple(found)
 
 
-def effort_scales(model: ForceModel, group: tuple[int, ...], factors: Array) -> Scales:
+def effort_scales(model: DriveModel, group: tuple[int, ...], factors: Array) -> Scales:
     """Return the factors below `columns` with which efforts are read so."""
     before = model.recorded.columns
     return tuple((drive, 'effort_scale', float(factors[k]) * (
@@ -406,7 +406,7 @@ def effort_scales(model: ForceModel, group: tuple[int, ...], factors: Array) -> 
         for k, drive in enumerate(model.drives) if k in group)
 
 
-def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Defect]:
+def _of_strokes(model: DriveModel, recording: Recording) -> Iterator[Defect]:
     """Yield positions far beyond the strokes, which no effort is needed to recognise."""
     lower, upper = model.strokes
     drives, ends = recording.drives, np.maximum(-lower, upper)
@@ -430,7 +430,7 @@ def _of_strokes(model: ForceModel, recording: Recording) -> Iterator[Defect]:
             scales=() if unit == 1.0 else position_scales(model, scale))
 
 
-def _of_velocities(model: ForceModel, recording: Recording, excerpt: Excerpt | None,
+def _of_velocities(model: DriveModel, recording: Recording, excerpt: Excerpt | None,
                    ) -> Iterator[Defect]:
     """Yield recorded velocities that are not the derivatives of positions."""
     if excerpt is None or excerpt.velocity is None:

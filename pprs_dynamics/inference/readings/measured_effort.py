@@ -42,7 +42,7 @@ from pprs_dynamics.inference.readings.table import (
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model import recorded_names
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.recorded_names import EFFORT_KIND
 
 STRETCHES = 8  # of an excerpt
@@ -105,13 +105,13 @@ class EffortContent(Shares):
         return NOISE_FREE if self.noise < LEAST_NOISE or self.left < LEAST_LEFT else ''
 
 
-def find_no_measurements(model: ForceModel, contents: Mapping[str, EffortContent],
+def find_no_measurements(model: DriveModel, contents: Mapping[str, EffortContent],
                          ) -> tuple[NoMeasurement, ...]:
     """Return what efforts look like that are no measurement, a finding for each kind.
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     contents : mapping of str to EffortContent
         By drive; of a recording in the units and signs that it says.
     """
@@ -133,7 +133,7 @@ def find_no_measurements(model: ForceModel, contents: Mapping[str, EffortContent
                  for kind in dict.fromkeys(kinds.values()) if kind)
 
 
-def looks_like(model: ForceModel, recordings: Sequence[Recording]) -> dict[str, NoMeasurement]:
+def looks_like(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, NoMeasurement]:
     """Return the finding for each drive whose effort is no measurement in one of the recordings."""
     found: dict[str, NoMeasurement] = {}
     for recording in recordings:
@@ -147,7 +147,7 @@ def kinds_of(findings: Mapping[str, NoMeasurement]) -> dict[str, str] | None:
     return {drive: finding.kind for drive, finding in findings.items()} or None
 
 
-def effort_contents(model: ForceModel, recording: Recording, excerpt: Excerpt | None = None,
+def effort_contents(model: DriveModel, recording: Recording, excerpt: Excerpt | None = None,
                     ) -> dict[str, EffortContent]:
     """Return the shares of the efforts of drives that move and have enough samples."""
     excerpt = excerpt or excerpt_of(recording, stretches=STRETCHES)
@@ -192,7 +192,7 @@ def _fast_noise(recording: Recording, drive: int) -> float:
                      np.min(np.diff(values)) / np.sqrt(12)))
 
 
-def _finding(model: ForceModel, contents: Mapping[str, EffortContent], drives: Sequence[str],
+def _finding(model: DriveModel, contents: Mapping[str, EffortContent], drives: Sequence[str],
              kind: str) -> NoMeasurement:
     group = tuple(model.drives.index(drive) for drive in drives)
     content = contents[drives[0]]

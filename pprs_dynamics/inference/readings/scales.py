@@ -27,13 +27,13 @@ from pprs_dynamics.inference.readings.table import (
 )
 from pprs_dynamics.measurement.files.recording import Recording, signed
 from pprs_dynamics.measurement.files.samples import Defect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 BITS = range(7, 16)  # of magnitudes
 CALMER = 0.5  # changes from sample to sample, over those of the numbers as they are
 
 
-def find_scales(model: ForceModel, contents: Mapping[str, Shares]) -> list[OtherReading]:
+def find_scales(model: DriveModel, contents: Mapping[str, Shares]) -> list[OtherReading]:
     """Return the unit of efforts whose common or several factors over the model's tell it."""
     factors = {k: contents[drive].scale for k, drive in enumerate(model.drives)
                if drive in contents}
@@ -74,7 +74,7 @@ def find_scales(model: ForceModel, contents: Mapping[str, Shares]) -> list[Other
     return []
 
 
-def _unit(model: ForceModel, what: str, factors: Array) -> OtherReading:
+def _unit(model: DriveModel, what: str, factors: Array) -> OtherReading:
     before = model.recorded.columns
     scales: Scales = tuple((drive, 'effort_scale', float(factors[k]) * (
         1.0 if before is None else before.drives[drive].effort_scale))

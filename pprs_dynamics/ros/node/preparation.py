@@ -15,7 +15,7 @@ from typing import Any
 from rclpy.node import Node
 
 from pprs_dynamics.physics.mechanism.evaluation import compiling_here
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.preparation import prepare
 
 NAME = 'preparation'
@@ -24,7 +24,7 @@ NAME = 'preparation'
 SWITCH_INTERVAL = 0.0002
 
 
-def prepare_beside(node: Node, model: ForceModel) -> threading.Thread:
+def prepare_beside(node: Node, model: DriveModel) -> threading.Thread:
     """Start loading or compiling what a model needs in a thread of its own.
 
     Compiled kernels load in a second. The first time after an installation they are compiled,
@@ -55,7 +55,7 @@ def end_if_preparing(status: int) -> None:
         os._exit(status)
 
 
-def _prepare(logger: Any, model: ForceModel) -> None:
+def _prepare(logger: Any, model: DriveModel) -> None:
     began, interval = time.monotonic(), sys.getswitchinterval()
     sys.setswitchinterval(SWITCH_INTERVAL)
     try:
