@@ -43,6 +43,9 @@ demo: $(VENV)/.demo
 demo-feedforward: $(VENV)/.demo
 	@$(BIN)/python demo/feedforward_demo.py output
 
+# A test that hangs ends after this many seconds, with the stacks of all threads.
+LIMIT := --timeout 300
+
 # Nodes run in real time and mostly wait: they have the processor when they want it, and all else
 # calculates meanwhile, in files by name, the dear ones of `app` and `inference` first.
 # PYTEST has more options for both.
@@ -50,15 +53,15 @@ test: $(VENV)/.test lint
 	$(MAKE) --jobs 2 --output-sync=target test-nodes test-others
 
 test-nodes: $(VENV)/.test
-	$(BIN)/python -m pytest test -n 2 --dist loadfile -m 'nodes and not slow' $(PYTEST)
+	$(BIN)/python -m pytest test -n 2 --dist loadfile -m 'nodes and not slow' $(LIMIT) $(PYTEST)
 
 test-others: $(VENV)/.test
 	nice -n 10 $(BIN)/python -m pytest test -n 2 --dist loadfile --no-loadscope-reorder \
-	    -m 'not nodes and not slow' --file-budget 20 $(PYTEST)
+	    -m 'not nodes and not slow' --file-budget 20 $(LIMIT) $(PYTEST)
 
 # What runs before a release: the site, colcon, demonstrations, clusters, long diagnoses, pictures.
 test-slow: $(VENV)/.test $(VENV)/.docs
-	$(BIN)/python -m pytest test -n 2 --dist loadfile -m slow $(PYTEST)
+	$(BIN)/python -m pytest test -n 2 --dist loadfile -m slow --timeout 1800 $(PYTEST)
 	$(MAKE) naming NAMING=small
 
 # Property tests with examples that no run has seen.

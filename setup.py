@@ -76,7 +76,8 @@ setup(
         'docs': ['sphinx>=8', 'furo>=2024.8', 'myst-nb>=1.1', 'matplotlib>=3.8'],
         # Peers of the naming benchmark: LASSO, group LASSO, sparse identification of dynamics.
         'naming': ['scikit-learn>=1.5', 'skglm>=0.4', 'pysindy>=2.0'],
-        'test': ['pytest>=8', 'pytest-xdist>=3.5', 'hypothesis>=6', 'mujoco>=4.0', 'pin>=3',
+        'test': ['pytest>=8', 'pytest-xdist>=3.5', 'pytest-timeout>=2.3', 'hypothesis>=6',
+                 'mujoco>=4.0', 'pin>=3',
                  'playwright>=1.45', 'ruff>=0.6', 'mypy>=1.11',
                  'axe-playwright-python>=0.1.4',  # accessibility of pages
                  'cosmic-ray>=8.3',  # make mutants

@@ -129,7 +129,6 @@ def arm_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, 
         motion = made_up_arm.motion(SECONDS, RATE, seed=3)
         changed = DriveModel.from_parameters(
             {**model.values, **block(effect, 'swing')}, model.source)
-    assert isinstance(changed, DriveModel)
     plain, at = model.drive_forces(motion), motion
     if changed.misreadings:  # as in `platform_law`
         read = (motion.position + changed.position_error(motion.position)

@@ -39,8 +39,7 @@ from pprs_dynamics.physics.model.model_writer import format_model
 from pprs_dynamics.simulation.export.exported_robot import export_robot
 from pprs_dynamics.simulation.export.expressed import express
 from pprs_dynamics.simulation.export.writers import written
-from pprs_dynamics.simulation.injected_effects import NOT_IN_CATALOGUE
-from pprs_dynamics.simulation.mechanism_run import simulate_mechanism
+from pprs_dynamics.simulation.injection import NOT_IN_CATALOGUE, simulate_mechanism
 from pprs_dynamics.simulation.sensors import EffortNoise
 
 DURATION = 40.0  # [s]
@@ -182,7 +181,6 @@ def _of_platform(draw: Draw) -> tuple[DriveModel, Recording, Truth]:
 
 def _of_arm(draw: Draw) -> tuple[DriveModel, Recording, Truth]:
     model = DriveModel.load(model_of(draw.robot))
-    assert isinstance(model, DriveModel)
     motion_seed = draw.seed % 1_000_000
     plain, run = (simulate_mechanism(model, names, draw.seed, noise=0.0, duration=DURATION,
                                      path_seed=motion_seed) for names in ((), draw.names))

@@ -29,7 +29,7 @@ from benchmarks.node.stream import Stream, feedforward, node_process, served
 from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.ros.messages.conversions import write_trajectory
-from pprs_dynamics.simulation.mechanism_run import draw_motion
+from pprs_dynamics.simulation.injection import draw_motion
 
 RATES = (500.0, 1000.0)
 ROUNDS = 5

@@ -269,7 +269,6 @@ def tell(bench: Bench) -> dict[str, str]:
               'loaded.yaml')
     free = bench.run('free', 'diagnose', file(HELD_OUT), '--model', 'base.yaml')
     base = DriveModel.load(bench.folder / 'base.yaml')
-    assert isinstance(base, DriveModel)
     if (bench.folder / 'loaded.yaml').exists():
         pictures(bench)
     write_model(bench.folder / 'hand.yaml', with_hand(base), bench.folder / 'base.yaml')

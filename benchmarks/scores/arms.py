@@ -41,7 +41,7 @@ from pprs_dynamics.physics.effects.laws.coupled_drives import CoupledDrives
 from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
 from pprs_dynamics.physics.effects.laws.link_mass import LinkMass
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
-from pprs_dynamics.simulation.mechanism_run import NAMES, links_that_weigh
+from pprs_dynamics.simulation.injection import NAMES, links_that_weigh
 
 # Effects of real machines, and what each was taken for before it was in the catalogue.
 PAIRS = {

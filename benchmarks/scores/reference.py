@@ -65,7 +65,6 @@ class Change:
             return base
         changed = DriveModel.from_parameters({**base.values, 'effects.active': [self.effect],
                                f'effects.{self.effect}.{self.key}': self.value}, base.source)
-        assert isinstance(changed, DriveModel)
         return changed
 
     def told(self, found: Diagnosis) -> dict[str, bool]:
@@ -114,7 +113,6 @@ def score(seeds: int, drift: float, path: int) -> list[dict[str, Any]]:
         (Path(folder) / 'made_up.urdf').write_text(URDF)
         (Path(folder) / 'arm.yaml').write_text(MODEL)
         base = DriveModel.load(Path(folder) / 'arm.yaml')
-        assert isinstance(base, DriveModel)
         reference = Reference.of(base, [record(base, 0, drift)])
         rows = []
         for number, change in enumerate(CHANGES):

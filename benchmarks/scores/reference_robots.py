@@ -7,7 +7,7 @@
     python -m benchmarks.scores.reference_robots --model ur_base.yaml --changes --power
 
 In every drive there are hysteresis, ripple and Stribeck friction of forms that the catalogue has
-not (`pprs_dynamics.simulation.joint_forms`), and in every passive joint of a robot with loops dry
+not (`injected_forms` of the simulation), and in every passive joint of a robot with loops dry
 friction that turns over otherwise. They are the same on all days. A run on path 0 is the
 reference. Others, on `--path`, have noise of their own, and a change: of `--effects` in the place
 of the catalogue's that are drawn in turn, of `--changes` those of a table, and of `--power` the
@@ -42,9 +42,9 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.robot_block import inertial_values
-from pprs_dynamics.simulation.joint_forms import FORMS, STEEPNESS, JointForm, JointMoment
-from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
-from pprs_dynamics.simulation.mechanism_run import (
+from pprs_dynamics.simulation.engine import MechanismEngine
+from pprs_dynamics.simulation.injected_forms import FORMS, STEEPNESS, JointForm, JointMoment
+from pprs_dynamics.simulation.injection import (
     MechanismRun,
     draw_motion,
     noise_like,
@@ -54,7 +54,7 @@ from pprs_dynamics.simulation.mechanism_run import (
 DURATION, REFERENCE_SEED = 20.0, 1000
 HEALTHY, SHARE = ('hysteresis', 'force_ripple', 'stribeck_friction'), 0.4  # of a form's size
 PASSIVE = 0.02  # of a drive's largest effort, from each passive joint
-# Hidden in turn: what changes on a machine, on which joint_forms and the healthy forms agree.
+# Hidden in turn: what changes on a machine, on which the injected and the healthy forms agree.
 EFFECTS = ('coulomb_friction', 'viscous_friction', 'payload_mass', 'link_mass', 'drive_spring',
            'effort_offset', 'homing_error', 'drive_inertia', 'load_friction', 'joint_friction')
 # Of an arm: number of the model file, drive from the base, and by which share it grows.
@@ -186,7 +186,6 @@ class Robot:
             values.update({key: tuple(map(float, given)) for key, given in inertial_values(
                 robot.with_body(tool, point).inertial).items()})
         changed = DriveModel.from_parameters(values, self.model.source)
-        assert isinstance(changed, DriveModel)
         return changed
 
     def record(self, change: Change, seed: int, path: int,
@@ -332,7 +331,6 @@ def main() -> int:
     parser.add_argument('--file', type=Path)
     options = parser.parse_args()
     model = DriveModel.load(options.model)
-    assert isinstance(model, DriveModel)
     robot = Robot(without_reference(model), options.duration)
     file = options.file or OUTPUT / f'reference_{options.model.stem}.jsonl'
     reference = Reference.of(robot.model, [robot.record(
@@ -352,7 +350,6 @@ def without_reference(model: DriveModel) -> DriveModel:
     values = {key: value for key, value in model.values.items()
               if key.partition('_')[0] != 'reference'}
     plain = DriveModel.from_parameters(values, model.source)
-    assert isinstance(plain, DriveModel)
     return plain
 
 

@@ -25,7 +25,7 @@ from benchmarks import ROOT
 from benchmarks.speed.model import CALLS, _print, _rounds
 from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, Evaluation
-from pprs_dynamics.simulation.mechanism_run import draw_motion
+from pprs_dynamics.simulation.injection import draw_motion
 
 BATCH = 5000
 ROUNDS = 25

@@ -78,7 +78,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._inputs: list[Any] = []
         self._watchdog: CommandWatchdog | None = None
         parameters = parameters_for(drive_count(self))
-        self._settings = ModelParameters(self, parameters, self._use_settings)
+        self._settings = ModelParameters(self, parameters, self._use_settings, drives=True)
         node_values = self._settings.node_values
         for name, assumed in self._settings.model.assumed_at_start.items():
             self.get_logger().info(f'{name} begins anew: {assumed}')
@@ -414,7 +414,8 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             rate=round((accepted - before) / max(now - then, 1e-3), 1),
             compute_time=self._compute_time.summary(), lag=self._lag.summary(),
             lagging=bool(threshold and accepted > before and waits),
-            model={'files': self._files, 'sha256': self._settings.model.fingerprint})
+            model={'files': self._files, 'sha256': self._settings.model.fingerprint},
+            changes=len(self._settings.history or ()))
 
 
 def _since(stamp: int) -> float:

@@ -11,11 +11,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.qos import QoSProfile
 from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
+from std_srvs.srv import Trigger
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_effort
@@ -31,8 +33,8 @@ from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
 from pprs_dynamics.ros.node.all_joints import AllJoints
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.managed_node import AUTOSTART, ManagedNode
+from pprs_dynamics.ros.node.model_owner import ModelOwner, NotSetError, changes
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.ros.node.model_services import ModelServices, NotAdoptedError
 from pprs_dynamics.ros.node.parameters import NodeParameter, node_parameter, overrides
 from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import files_given, hardware_of
@@ -103,10 +105,11 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._adoptable: dict[str, Any] = {}  # values of the model with what is claimed
         self._diagnosed = self._settings.model  # the latest window against it
         self._begin_stream()
-        self._model_services = ModelServices(
-            self, node_values['feedforward'],
-            lambda: (self._settings.model.fingerprint, self._settings.model.values),
-            self._to_adopt, self._forget)
+        self._owner = ModelOwner(self, node_values['feedforward'], lambda: self._settings.model,
+                                 self.set_parameters_atomically)
+        # In a group of its own: while it waits for the owner, all else is served.
+        self.create_service(Trigger, '~/adopt_confirmed', self._adopt,
+                            callback_group=ReentrantCallbackGroup())
         self._status = StatusReporter(
             self, {}, self._counters, hardware_of(self._settings.model), self._refresh)
         self._refresh()
@@ -159,6 +162,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
 
     def _use(self) -> None:
         self._stream.use_model(self._settings.model)
+        self._changed, self._adoptable = '', {}  # they were of the model before
 
     # --- measurements -----------------------------------------------------------------------------
 
@@ -214,7 +218,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
                 f'than two in a row; {text}')
         elif self._changed:
             self._status.report('WARN', 'CHANGED', f'{self._changed}; {text}')
-        elif different := self._model_services.difference():
+        elif different := self._owner.difference():
             self._status.report('WARN', 'MODEL', f'{different}: what is compared is not what '
                                 f'drives; {text}')
         else:
@@ -258,18 +262,27 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
     def _to_adopt(self) -> dict[str, Any]:
         """Return what a person may adopt now, or raise PprsError."""
         if self._diagnosed.values != self._settings.model.values:
-            raise NotAdoptedError('the latest window was diagnosed against another model than is '
+            raise NotSetError('the latest window was diagnosed against another model than is '
                                   'in force')
         if not self._changed:
-            raise NotAdoptedError('no effect is confirmed')
+            raise NotSetError('no effect is confirmed')
         if not self._adoptable:
-            raise NotAdoptedError('the latest window names other effects than are confirmed, and '
+            raise NotSetError('the latest window names other effects than are confirmed, and '
                                   'its numbers were fitted together; the next one decides')
         return self._adoptable
 
-    def _forget(self) -> None:
-        """Claim nothing of a model that is in force no more."""
-        self._changed, self._adoptable = '', {}
+    async def _adopt(self, request: Any, response: Any) -> Any:
+        """Set the confirmed effects on the node that drives, which this one follows."""
+        try:
+            values = self._to_adopt()
+            result = ((await self._owner.set_model(values)).result if self._owner.is_there
+                      else self.set_parameters_atomically(changes(self._settings.model, values)))
+            response.success = result.successful
+            response.message = result.reason or 'the confirmed effects are in the model'
+        except PprsError as error:
+            response.message = str(error)
+        self.get_logger().warning(f'adopt_confirmed: {response.message}')
+        return response
 
     def destroy_node(self) -> None:
         """Take the process that diagnoses along."""

@@ -37,7 +37,7 @@ from pprs_dynamics.ros.node.parameters import (
 from pprs_dynamics.ros.node.qos import publisher
 from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 from pprs_dynamics.ros.run_node import Finished
-from pprs_dynamics.simulation.mechanism_run import draw_motion
+from pprs_dynamics.simulation.injection import draw_motion
 
 # Fast DDS asks listeners every 3 s what they have got, which none tells by itself.
 ACKNOWLEDGED = Duration(seconds=4.0)

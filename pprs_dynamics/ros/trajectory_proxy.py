@@ -77,7 +77,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
         parameters = (ACTION, TIMEOUT, *(
             replace(one, default=SPLINE) if one.name == 'missing_derivatives' else one
             for one in parameters_for(drive_count(self)) if one.name in SHARED))
-        self._settings = ModelParameters(self, parameters, lambda: None)
+        self._settings = ModelParameters(self, parameters, lambda: None, drives=True)
         node_values = self._settings.node_values
         prepare(self._settings.model)
         self._counters = {'received': 0, 'passed_on': 0, 'refused': 0}

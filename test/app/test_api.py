@@ -235,8 +235,6 @@ def test_a_simulation_hides_what_it_says_and_is_written(tmp_path: Path) -> None:
     read = pprs_dynamics.read_recording(tmp_path / 'run.csv')
     assert read.effort == pytest.approx(run.recording.effort)
     assert run.to_dict()['samples'] == len(read.time)
-    with pytest.raises(PprsError, match='feedforward'):
-        simulate('config/paper.yaml', feedforward='all')
 
 
 def test_an_effect_of_an_axis_is_found_adopted_and_the_error_falls() -> None:

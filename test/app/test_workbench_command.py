@@ -126,9 +126,9 @@ def test_a_single_axis_has_the_same_session(tmp_path: Path) -> None:
     write_recording(tmp_path / 'axis.csv', Recording.from_arrays(
         'axis', time, position[:, None], velocity[:, None], effort[:, None], drives=('axis',)))
     session = Session.open([tmp_path / 'axis.csv'], AXIS)
-    session.settle()
-    session.tick('drive_spring')
-    shown = session.settle()
+    session.ticks.settle()
+    session.ticks.tick('drive_spring')
+    shown = session.ticks.settle()
     assert shown.estimates['drive_spring']['axis.stiffness'].value == pytest.approx(SPRING, rel=0.1)
     assert session.overall().now < 0.5 * session.overall().before
     json.dumps(session.to_dict(), allow_nan=False)

@@ -188,18 +188,6 @@ def synthetic(values: dict[str, Any], **recorded: Any) -> tuple[DriveModel, Reco
         'synthetic', motion.time, forces.mechanism.position, None, forces.total + noise)
 
 
-def test_without_drives_it_goes_where_the_diagnosis_names_it(files: Files) -> None:
-    """An effect scanned alone may pay on drives where what is beside it does the same."""
-    model = DriveModel.load(files.model)
-    told = files.diagnosis.effects[0]
-    assert told.drives != ('slide_3',)
-    elsewhere = replace(files.diagnosis, effects=(replace(told, drives=('slide_3',)),))
-    request = EffectRequest.named(told.name)
-    answers = [adopt(model, request, files.recordings[:1], diagnosis=one)
-               for one in (files.diagnosis, elsewhere)]
-    assert [one.drives for one in answers] == [told.drives, ('slide_3',)]
-
-
 def test_the_right_effect_on_a_wrong_drive_is_refused() -> None:
     model, recording = synthetic({}, **{
         'effects.active': [HIDDEN], f'effects.{HIDDEN}.slide_1.force': 0.4})
@@ -228,7 +216,7 @@ def test_where_nothing_is_missing_nothing_is_added() -> None:
     model, recording = synthetic({})
     answer = adopt(model, EffectRequest.of('platform_inertia'), [recording])
     assert not answer.adopted
-    assert 'do not call for platform_inertia' in answer.reason
+    assert 'do not support platform_inertia' in answer.reason
 
 
 @pytest.mark.parametrize('damage', ['cut', 'binary', 'value', 'ledger'])

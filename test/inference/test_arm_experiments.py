@@ -102,7 +102,6 @@ def one_speed(model: DriveModel, tmp_path_factory: pytest.TempPathFactory) -> Pa
     viscous[1] += 6.0
     real = DriveModel.from_parameters(
         {**model.values, 'friction.viscous': tuple(viscous)}, model.source)
-    assert isinstance(real, DriveModel)
     path = folder / 'run.csv'
     write_recording(path, arm.record(real, JointMotion(*q, time), NOISE))
     return path
@@ -131,7 +130,6 @@ def test_a_motion_is_designed_that_tells_rivals_apart(
                         table['time'].to_numpy())
     real = DriveModel.from_parameters({**model.values, 'friction.viscous': tuple(
         np.add(model.values['friction.viscous'], (0, 6.0, 0)))}, model.source)
-    assert isinstance(real, DriveModel)
     second = tmp_path / 'second.csv'
     write_recording(second, arm.record(real, moved, NOISE, seed=1))
     found = diagnose(model, [read_recording(one_speed, model.drives),

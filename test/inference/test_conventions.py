@@ -30,7 +30,7 @@ from pprs_dynamics.inference.readings.findings import OtherReading, columns_line
 from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
 from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
-from pprs_dynamics.simulation.injected_effects import INJECTED_EFFECTS, draw_effect
+from pprs_dynamics.simulation.injection import NOT_IN_CATALOGUE, Choice
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / 'docs'
@@ -136,7 +136,6 @@ def test_a_mistake_is_said_in_one_sentence_each(mistake: str) -> None:
 def test_a_mistake_is_recognised_where_the_model_lacks_an_effect(mistake: str) -> None:
     lacking = DriveModel.from_parameters({**MODEL.values, 'masses.payload': 1.3, 'effects.active': [
         'viscous_friction'], 'effects.viscous_friction.slide_2.coefficient': 5.0})
-    assert isinstance(lacking, DriveModel)
     change, patterns = MISTAKES[mistake]
     expect(told(change(robot(lacking, 3))), patterns)
 
@@ -158,15 +157,14 @@ def benchmark() -> Iterator[ModuleType]:
         yield recordings
 
 
-@pytest.mark.parametrize('name', INJECTED_EFFECTS)
+@pytest.mark.parametrize('name', [*recordings.IN_CATALOGUE, *NOT_IN_CATALOGUE])
 def test_no_hidden_effect_is_called_a_mistake(benchmark: ModuleType, name: str) -> None:
     place = benchmark.scene(11, 0.0)
-    read = place.plant.readings([draw_effect(name, np.random.default_rng(4), 4.0)])
-    part = slice(benchmark.LEAD, None)
-    time = place.motion.time[part]
-    effort = read.effort[part] + np.random.default_rng(5).normal(0, 0.08, (len(time), 6))
+    run = place.inject([Choice(name, np.random.default_rng(4))])
+    part, time = slice(benchmark.LEAD, None), place.time
+    effort = run.efforts[part] + np.random.default_rng(5).normal(0, 0.08, (len(time), 6))
     found = find_mistakes(place.model, Recording.from_arrays(
-        name, time - time[0], np.round(read.position[part], 6), None, effort))
+        name, time - time[0], np.round(run.position[part], 6), None, effort))
     assert found == ()
 
 
@@ -194,7 +192,6 @@ def test_a_recording_of_another_robot_is_told_nothing_false() -> None:
     other = DriveModel.from_parameters(
         {**MODEL.values, 'geometry.rod_length': 0.36, 'masses.payload': 3.0,
                          'friction.drives.coulomb': (0.2,) * 6})
-    assert isinstance(other, DriveModel)
     assert told(robot(other)) == []
 
 

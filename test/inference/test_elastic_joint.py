@@ -63,7 +63,6 @@ def with_elastic(model: DriveModel, compliance: float, loss: float) -> DriveMode
     found = DriveModel.from_parameters({**model.values, 'effects.active': ['elastic_joint'],
                          'effects.elastic_joint.swing.compliance': compliance,
                          'effects.elastic_joint.swing.loss': loss}, model.source)
-    assert isinstance(found, DriveModel)
     return found
 
 

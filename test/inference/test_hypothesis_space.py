@@ -198,4 +198,4 @@ def test_the_terms_of_a_cost_add_up_to_the_likelihood_and_the_prior_costs() -> N
         assert terms['names'] == pytest.approx(len(candidates) * 2 * np.log(7 * 10))
         assert terms['drives'] == pytest.approx(
             2 * np.log(3) + 2 * np.log(3) if on_drives in candidates else 0)
-        assert all(terms[name] == 0 for name in ('shapes', 'signs', 'discrepancy', 'feasibility'))
+        assert all(terms[name] == 0 for name in ('shapes', 'signs', 'feasibility'))

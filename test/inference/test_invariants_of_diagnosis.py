@@ -36,7 +36,6 @@ EFFECTS = [name for name in HIDDEN if name != 'nothing']
 def axis_model(scale: float = 1.0) -> DriveModel:
     model = DriveModel.from_parameters(
         {**OTHERS, **{key: scale * one for key, one in EFFORTS.items()}})
-    assert isinstance(model, DriveModel)
     return model
 
 
@@ -46,7 +45,6 @@ def recorded(name: str, seed: int) -> Recording:
     effect = {f'effects.{name}.{AXIS}.{key}': one for key, one in HIDDEN[name].items()}
     model = DriveModel.from_parameters({**EFFORTS, **OTHERS, **effect,
                          'effects.active': [name] if effect else []})
-    assert isinstance(model, DriveModel)
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, DURATION, 1 / RATE)
     omega = 2 * np.pi * np.array([0.25, 0.5, 1.0])[:, None]

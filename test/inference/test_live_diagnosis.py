@@ -48,7 +48,6 @@ def window(model: DriveModel, worn: DriveModel, number: int, begins: float = 0.0
 def axis(**values: Any) -> DriveModel:
     model = DriveModel.from_parameters(
         {**DriveModel.load('config/single_axis.yaml').values, **values})
-    assert isinstance(model, DriveModel)
     return model
 
 

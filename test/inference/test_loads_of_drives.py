@@ -56,7 +56,6 @@ def axis() -> DriveModel:
     text = ('/**:\n  ros__parameters:\n    axis: {mass: 20.0, viscous: 100.0, coulomb: 20.0, '
             'offset: 0.0, gravity: -9.81}\n    friction: {reversal_velocity: 0.001}\n')
     model = DriveModel.from_parameters(parse_parameters(text))
-    assert isinstance(model, DriveModel)
     return model
 
 

@@ -120,7 +120,6 @@ def test_a_model_with_the_play_leaves_the_noise(tmp_path: Path, size: float) -> 
     recording = with_play(model, size)
 
     def left(one: object) -> float:
-        assert isinstance(one, DriveModel)
         found = reconstruct(one, recording)
         error = found.treat(found.effort) - treated_forces(one, found)['total']
         return float(error[:, SWING].std())
@@ -172,7 +171,6 @@ def test_what_it_is_taken_for_stays_what_it_is(tmp_path: Path, name: str,
     other = DriveModel.from_parameters({**model.values, 'effects.active': [name],
                          **{f'effects.{name}.swing.{key}': one for key, one in values.items()}},
                         model.source)
-    assert isinstance(other, DriveModel)
     moved = made_up_arm.motion(20.0)
     forces = other.measured(other.drive_forces(moved)).total
     recording = recorded(model, moved.position + other.position_error(moved.position), forces,

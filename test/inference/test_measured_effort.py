@@ -24,7 +24,7 @@ from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.readings.measured_effort import (
+from pprs_dynamics.inference.readings.efforts import (
     effort_contents,
     find_no_measurements,
     kinds_of,

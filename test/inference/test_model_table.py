@@ -41,7 +41,6 @@ def axis(hidden: dict[str, dict[str, float]]) -> DriveModel:
     values = {f'effects.{name}.{AXIS}.{key}': value for name, block in hidden.items()
               for key, value in block.items()}
     model = DriveModel.from_parameters({**VALUES, 'effects.active': list(hidden), **values})
-    assert isinstance(model, DriveModel)
     return model
 
 

@@ -294,7 +294,6 @@ def test_a_model_file_that_keeps_the_residual_stands_alone(
 @pytest.mark.slow
 def test_dry_friction_of_passive_joints_is_carried_over_and_no_change() -> None:
     model = DriveModel.load(Path(__file__).parents[2] / 'config' / 'delta.yaml')
-    assert isinstance(model, DriveModel)
     robot = Robot(model, 20.0)
     nothing = Change('nothing', '', value=0.0)
     robot.forms.clear()  # dry friction of all twelve passive joints is left, twelve times the noise

@@ -32,7 +32,6 @@ def ambiguous() -> Diagnosis:
     model = DriveModel.from_parameters(
         {'axis.mass': MASS, 'axis.viscous': VISCOUS, 'axis.coulomb': COULOMB,
                          'axis.offset': 0.0, 'friction.reversal_velocity': WIDTH})
-    assert isinstance(model, DriveModel)
     return diagnose(model, [Recording.from_arrays('sine', time, q[:, None], None, force[:, None],
                                                   (AXIS,))])
 

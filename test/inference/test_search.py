@@ -50,7 +50,6 @@ def axis_recording(hidden: dict[str, dict[str, float]], seed: int, noise: float 
     values = {f'effects.{name}.{AXIS}.{key}': value for name, block in hidden.items()
               for key, value in block.items()}
     model = DriveModel.from_parameters({**AXIS_VALUES, 'effects.active': list(hidden), **values})
-    assert isinstance(model, DriveModel)
     rng = np.random.default_rng(seed)
     time = np.arange(0, 20, 0.002)
     omega = 2 * np.pi * np.array([0.21, 0.37, 0.83])[:, None]

@@ -63,7 +63,6 @@ def diagnosed(name: str, s: float, k: float) -> Diagnosis:
     values = {f'effects.{effect}.{AXIS}.{key}': value for effect, block in hidden.items()
               for key, value in block.items()}
     true = DriveModel.from_parameters({**AXIS_VALUES, 'effects.active': list(hidden), **values})
-    assert isinstance(true, DriveModel)
     time = np.arange(0, 20, 0.002)
     omega = 2 * np.pi * np.array([0.21, 0.37, 0.83])[:, None]
     size = np.array([0.08, 0.04, 0.015])[:, None]
@@ -90,7 +89,6 @@ def platform_diagnosed(s: float, k: float) -> Diagnosis:
         {**given.values, 'effects.active': ['payload_mass', 'viscous_friction'],
                         'effects.payload_mass.mass': 0.3,
                         'effects.viscous_friction.slide_2.coefficient': 3.0})
-    assert isinstance(true, DriveModel)
     time = np.arange(0, 10, 0.004)
     forces = true.drive_forces(Excitation(10.0, seed=3).motion(time))
     noise = 0.08 * np.random.default_rng(5).normal(size=forces.total.shape)

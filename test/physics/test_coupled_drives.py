@@ -30,7 +30,6 @@ def with_effect(model, name, **values):
     found = DriveModel.from_parameters({**model.values, 'effects.active': [name], **{
         f'effects.{name}.{key.replace("__", ".")}': value for key, value in values.items()}},
         model.source)
-    assert isinstance(found, DriveModel)
     return found
 
 

@@ -54,7 +54,6 @@ def _load(folder: Path, name: str, block: str) -> DriveModel:
     path.write_text('/**:\n  ros__parameters:\n    '
                     + block.replace('{', f'{{{kind}: {name}, ', 1) + '\n')
     model = DriveModel.load(path)
-    assert isinstance(model, DriveModel)
     return model
 
 

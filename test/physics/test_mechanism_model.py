@@ -171,7 +171,6 @@ def test_joints_that_share_a_transmission_need_the_turns_of_its_motors(tmp_path:
     path = arm.write_arm(tmp_path, arm.urdf(more=TRANSMISSION),
                          friction__motors='{left: {turn: 1.0, swing: 1.0}}')
     model = DriveModel.load(path)
-    assert isinstance(model, DriveModel)
     assert model.robot.motors == {'left': (1.0, 1.0, 0.0)}
 
 

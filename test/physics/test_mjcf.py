@@ -54,7 +54,6 @@ def test_an_arm_is_that_of_mj_inverse_with_ref_rotor_friction_and_gravity(
     tmp_path: Path, dry: float,
 ) -> None:
     model = DriveModel.load(arm(tmp_path, dry))
-    assert isinstance(model, DriveModel)
     engine = mujoco.MjModel.from_xml_path(str(tmp_path / 'robot.xml'))
     engine.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
     data = mujoco.MjData(engine)
@@ -100,7 +99,6 @@ LOOP = '''<mujoco><compiler angle="radian"/><option gravity="0 -9.81 0"/><worldb
 @pytest.mark.parametrize('anchor', ['0 0 0', '0.03 -0.02 0'])
 def test_a_weld_closes_at_its_anchor_and_passive_joints_rub(tmp_path: Path, anchor: str) -> None:
     model = DriveModel.load(write(tmp_path, LOOP.format(ref=0.3, anchor=anchor), 'a', 'rod'))
-    assert isinstance(model, DriveModel)
     engine = mujoco.MjModel.from_xml_path(str(tmp_path / 'robot.xml'))
     engine.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     data = mujoco.MjData(engine)

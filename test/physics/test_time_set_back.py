@@ -35,7 +35,6 @@ def with_effect(name: str) -> DriveModel:
         'measured_curve') else f'effects.{name}'
     model = DriveModel.from_parameters({**PAPER.values, 'effects.active': [name],
                          **{f'{place}.{key}': value for key, value in own.items()}})
-    assert isinstance(model, DriveModel)
     return model
 
 

@@ -586,7 +586,6 @@ def test_a_robot_from_mjcf_is_that_of_mujoco(tmp_path: Path) -> None:
         '/**:\n  ros__parameters:\n    robot: {mjcf: bar.xml, base: world, tool: left_rod, '
         'drives: [a, b], gravity: [0.0, -9.81, 0.0]}\n')
     model = DriveModel.load(tmp_path / 'bar.yaml')
-    assert isinstance(model, DriveModel)
     assert model.robot.structure.mobility.freedoms == 2
     import mujoco
     engine = mujoco.MjModel.from_xml_path(str(tmp_path / 'bar.xml'))

@@ -91,7 +91,7 @@ def test_a_feedforward_of_another_model_is_told(monitor: MonitorBench) -> None:
     for sha256, code in (('0' * 64, 'MODEL'), (own, 'OK')):
         publisher.publish(String(data=json.dumps({'model': {'sha256': sha256}})))
         assert monitor.bench.spin_until(
-            lambda sha256=sha256: monitor.node._model_services._in_force == sha256)
+            lambda sha256=sha256: monitor.node._owner.fingerprint == sha256)
         monitor.send(400)
         assert monitor.bench.status[-1]['code'] == code
     publisher.publish(String(data=json.dumps({'model': {'sha256': '0' * 64}})))

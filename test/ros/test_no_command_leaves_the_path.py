@@ -72,55 +72,58 @@ def distance(position: np.ndarray, places: np.ndarray) -> float:
     return float(np.abs(places - position).max(axis=1).min())
 
 
-def stopped(cell: Cell, ros_domain: int, log: Path, last: float) -> float:
-    """Stop the process in the middle of a path, and return where on it [s]."""
+def stop(cell: Cell, ros_domain: int, log: Path, last: float) -> None:
+    """Stop the process in the middle of a path that ends at a time [s]."""
     command = [executable('feedforward'), '--ros-args', '-p', 'demo:=true']
     with node_process(command, ros_domain, log):
         cell.ready()
-        began = time.monotonic()
         cell.send(1.0, last, cell.bench.probe.get_clock().now().nanoseconds)
         assert cell.bench.spin_until(lambda: cell.trajectories and cell.setpoints)
         cell.bench.spin_for(0.8)
-        where = 1.0 + time.monotonic() - began
     assert cell.bench.spin_until(lambda: len(cell.commands) == 2)
     cell.bench.spin_for(0.5)
-    return where
 
 
-def check_held(cell: Cell, where: float) -> None:
-    """Check that what goes out for drives without a trajectory belongs to a pose on the path."""
-    near, efforts = on_the_path(where - 0.05, where + 0.3)
-    assert distance(np.array(cell.setpoints[-1].position), near) < NEAR
-    assert distance(np.array(cell.commands[-1].data), efforts) < 0.02  # [N]
+def check_held(cell: Cell, first: float, last: float) -> None:
+    """Check that what goes out belongs to one pose of the path between two times [s]."""
+    places, efforts = on_the_path(first, last)
+    position = np.array(cell.setpoints[-1].position)
+    place = int(np.abs(places - position).max(axis=1).argmin())
+    assert np.abs(places[place] - position).max() < NEAR
+    assert np.abs(efforts[place] - np.array(cell.commands[-1].data)).max() < 0.02  # [N]
 
 
 def test_a_controller_completes_a_trajectory_that_ends_at_rest(
     cell: Cell, ros_domain: int, tmp_path: Path,
 ) -> None:
-    where = stopped(cell, ros_domain, tmp_path / 'log', PATH.duration + 0.1)
+    stop(cell, ros_domain, tmp_path / 'log', PATH.duration + 0.1)
     assert len(cell.trajectories) == 1  # of the message alone
     assert not any(cell.trajectories[0].points[-1].velocities)
-    check_held(cell, where)
+    check_held(cell, 1.0, PATH.duration - 0.5)
 
 
 def test_a_controller_whose_trajectory_ends_in_motion_is_stopped_along_the_path(
     cell: Cell, ros_domain: int, tmp_path: Path,
 ) -> None:
-    where = stopped(cell, ros_domain, tmp_path / 'log', 3.0)
-    given, stop = cell.trajectories
+    stop(cell, ros_domain, tmp_path / 'log', 3.0)
+    given, end = cell.trajectories
     assert any(given.points[-1].velocities)
-    places, efforts = on_the_path(where - 0.05, where + 0.5)
-    for point in stop.points:
-        assert distance(np.array(point.positions), places) < NEAR
-    assert not any(stop.points[-1].velocities)
-    assert not any(stop.points[-1].accelerations)
-    assert distance(np.array(stop.points[-1].effort), efforts) < 0.02
-    times = [conversions.nanoseconds(point.time_from_start) for point in stop.points]
+    places, efforts = on_the_path(1.0, 3.5)
+    nearest = []
+    for point in end.points:
+        away = np.abs(places - np.array(point.positions)).max(axis=1)
+        nearest.append(int(away.argmin()))
+        assert away.min() < NEAR
+    assert nearest == sorted(nearest)
+    assert not any(end.points[-1].velocities)
+    assert not any(end.points[-1].accelerations)
+    assert np.abs(efforts[nearest[-1]] - np.array(end.points[-1].effort)).max() < 0.02  # [N]
+    times = [conversions.nanoseconds(point.time_from_start) for point in end.points]
     assert np.all(np.diff(times) > 0)
-    # From the speed of the path at the place of the stop.
-    speed = MODEL.drive_forces(PATH.motion([where, where + 0.15])).mechanism.velocity
-    assert np.abs(stop.points[0].velocities - speed).max(axis=1).min() < 0.3 * np.abs(speed).max()
-    check_held(cell, where)
+    # From the speed of the path where the stop begins.
+    speed = MODEL.drive_forces(PATH.motion([1.0 + 0.001 * nearest[0]])).mechanism.velocity[0]
+    assert np.abs(end.points[0].velocities - speed).max() < 0.3 * np.abs(speed).max()
+    check_held(cell, 1.0, 3.5)
 
 
 @pytest.mark.parametrize('factor', [0.5, 0.0], ids=['half as fast', 'stands'])
@@ -163,6 +166,7 @@ def test_a_simulation_slower_than_real_time_keeps_to_the_path(
             assert cell.bench.spin_until(lambda: len(cell.commands) == 2, 3.0)
             assert cell.bench.spin_until(lambda: cell.bench.status[-1]['code'] == 'STALE')
             assert 'the clock has stood still' in cell.bench.status[-1]['message']
-            check_held(cell, 3.0 + simulated() - start - 0.05)
+            where = 3.0 + simulated() - start
+            check_held(cell, where - 0.1, where + 0.25)
             assert len(cell.trajectories) == 1
     timer.cancel()

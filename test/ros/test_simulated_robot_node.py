@@ -185,7 +185,7 @@ def test_a_hidden_effect_acts() -> None:
         assert running.spin_until(lambda: len(robot.states) > 500, 60)
         # Encoder steps keep the loop busy: a mean over two seconds.
         change = np.mean([state.effort for state in robot.states[-200:]], axis=0) - WEIGHT
-        truth = robot.node._robot.plant.effects[0].truth()
+        (truth,) = robot.node._robot.plant.injected
         for k, drive in enumerate(DRIVES):
             expected = truth['parameters'].get(drive, {}).get('force', 0.0)
             assert change[k] == pytest.approx(expected, abs=0.05), drive
@@ -205,36 +205,36 @@ def test_what_is_hidden_changes_while_it_runs(robot: RobotBench) -> None:
     assert robot.bench.spin_until(lambda: len(robot.states) > 100)
     place, stamp = robot.position, robot.states[-1].header.stamp
     assert change('hidden_effects', ['effort_offset:lift_2']).successful
-    assert change('hidden_effects', ['effort_offset:lift_2', 'homing_error:slide_1']).successful
-    offset, zero = robot.node._robot.plant.effects
-    expected = WEIGHT + [offset.parameters.get(drive, {}).get('force', 0.0) for drive in DRIVES]
+    assert change('hidden_effects', ['effort_offset:lift_2', 'effort_offset:slide_1']).successful
+    first, second = robot.node._robot.plant.injected
+    offsets = {**first['parameters'], **second['parameters']}
+    expected = WEIGHT + [offsets.get(drive, {}).get('force', 0.0) for drive in DRIVES]
     robot.states.clear()
     # Friction creeps until the loop carries all; then the mean of half a second.
     assert robot.bench.spin_until(lambda: len(robot.states) > 1250, 60)
     effort = np.mean([state.effort for state in robot.states[-250:]], axis=0)
     np.testing.assert_allclose(effort[4:], expected[4:], atol=0.1)
-    assert np.abs(robot.states[0].velocity).max() < 1.0  # a moved zero is no jump of the drive
-    assert change('hidden_effects', ['homing_error:slide_1']).successful
-    assert robot.node._robot.plant.effects == (zero,)
+    assert change('hidden_effects', ['effort_offset:slide_1']).successful
+    assert robot.node._robot.plant.injected == [second]
     assert conversions.nanoseconds(robot.states[-1].header.stamp) > conversions.nanoseconds(stamp)
     np.testing.assert_allclose(robot.position, place, atol=1e-3)
     for name, value, words in (
-        ('hidden_effects', ['friction'], 'no hidden effect is called'),
-        ('hidden_effects', ['payload_mass:lift_1'], 'acts in no drive'),
+        ('hidden_effects', ['friction'], 'cannot be injected'),
+        ('hidden_effects', ['payload_mass:lift_1'], "does not act in 'lift_1'"),
         ('hidden_effects', ['effort_offset:lift_9'], 'lift_9'),
         ('hidden_effects', 'effort_offset', 'a list of words'),
         ('hidden_scale', -1.0, 'at least 0'),
-        ('stiffness', 100.0, 'stay as it was at the start'),
+        ('bandwidth', 10.0, 'stay as it was at the start'),
         ('masses.payload', 2.0, 'stay as it was at the start'),
     ):
         answer = change(name, value)
         assert not answer.successful
         assert words in answer.reason
         assert len(answer.reason.splitlines()) == 1
-    assert robot.node._robot.plant.effects == (zero,)
-    assert change('stiffness', 4000.0).successful  # a dump of the parameters loads
+    assert robot.node._robot.plant.injected == [second]
+    assert change('bandwidth', 7.0).successful  # a dump of the parameters loads
     assert change('hidden_effects', []).successful
-    assert robot.node._robot.plant.effects == ()
+    assert robot.node._robot.plant.injected == []
 
 
 def test_it_restarts_where_it_was_killed(ros_domain: int, tmp_path: Path) -> None:
@@ -276,7 +276,6 @@ def test_each_step_of_feedforward_lowers_the_tracking_error(
     alone, rigid, friction = (tracking[case.name].position_rms for case in CASES)
     assert rigid < alone
     assert 3 * friction < rigid
-    # 1 N of friction on 4 000 N/m: a quarter of a millimetre.
     assert 1e-4 < rigid < 1e-3
 
 

@@ -120,7 +120,6 @@ def test_other_joints_are_rejected(names: tuple[str, ...]) -> None:
 
 def test_a_robot_with_loops_takes_its_drives_and_poses_of_its_tool_in_its_frame() -> None:
     model = DriveModel.load('config/hexapod.yaml')
-    assert isinstance(model, DriveModel)
     own = RobotNames.of(model)
     base = str(model.values['robot.base'])
     for names, frame in ((None, base), (own._replace(frame='cell'), 'cell')):

@@ -13,8 +13,8 @@ import robots_with_loops as robots
 
 from pprs_dynamics import DriveModel, JointMotion, WorkspaceError
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
-from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
-from pprs_dynamics.simulation.mechanism_run import draw_motion
+from pprs_dynamics.simulation.engine import MechanismEngine
+from pprs_dynamics.simulation.injection import draw_motion
 
 ROBOTS = {'hexapod': robots.hexapod, 'delta': robots.delta, 'five_bar': robots.five_bar,
           'three_rrr': robots.three_rrr}

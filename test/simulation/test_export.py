@@ -26,7 +26,7 @@ from pprs_dynamics.simulation.export.exported_robot import TreePositions, export
 from pprs_dynamics.simulation.export.expressed import MJCF, URDF, express
 from pprs_dynamics.simulation.export.replay import DURATION, Replay, replay_excitation
 from pprs_dynamics.simulation.export.writers import closures, written
-from pprs_dynamics.simulation.mechanism_run import draw_motion
+from pprs_dynamics.simulation.injection import draw_motion
 
 EXACT = 1e-9  # of the largest effort
 NO_LOADS = {'friction.drives.coulomb': (0.0,) * 6, 'friction.revolute.coulomb': 0.0,
@@ -47,7 +47,6 @@ def exported(model: str | Path, kind: str, folder: Path, *more: str) -> tuple[Pa
 
 def paper(**changes: Any) -> DriveModel:
     model = DriveModel.from_parameters({**DriveModel.load().values, **changes})
-    assert isinstance(model, DriveModel)
     return model
 
 
@@ -197,7 +196,6 @@ def test_robots_with_loops(name: str, kind: str, tmp_path: Path) -> None:
     file, result = exported(f'config/{name}.yaml', kind, tmp_path)
     assert result['replay_error'] == pytest.approx(result['expected_error'], abs=1e-8)
     model = DriveModel.load(f'config/{name}.yaml')
-    assert isinstance(model, DriveModel)
     # Read as any robot's file, it moves as the model's bodies do.
     own = {key: value for key, value in model.values.items()
            if not key.startswith(('robot.urdf', 'friction.joints'))
@@ -206,7 +204,6 @@ def test_robots_with_loops(name: str, kind: str, tmp_path: Path) -> None:
     again = DriveModel.from_parameters({**own, f'robot.{kind}': str(file), 'robot.base': base})
     motion = draw_motion(model, 3.0, 1)
     expected = model.drive_forces(motion).parts['rigid_body']
-    assert isinstance(again, DriveModel)
     assert again.drive_forces(motion).parts['rigid_body'] == pytest.approx(
         expected, abs=1e-8 * np.abs(expected).max())
     if kind == URDF:
@@ -245,7 +242,6 @@ def test_an_arm_in_another_library(tmp_path: Path) -> None:
     path = arm.write_arm(tmp_path, friction__viscous=[8.0, 5.0, 20.0],
                          friction__coulomb=[6.0, 4.0, 9.0])
     model = DriveModel.load(path)
-    assert isinstance(model, DriveModel)
     file, result = exported(path, URDF, tmp_path)
     assert result['not_expressed'] == []
     assert result['replay_error'] == pytest.approx(result['expected_error'], abs=1e-9)
@@ -299,7 +295,6 @@ def test_a_body_that_cannot_be_is_refused_and_nothing_is_written(
 
 def test_a_closure_that_mujoco_lacks_is_refused() -> None:
     model = DriveModel.load('config/delta.yaml')
-    assert isinstance(model, DriveModel)
     structure = model.robot.structure
     other = replace(structure, loops=tuple(
         replace(loop, kind='universal') for loop in structure.loops))
@@ -335,7 +330,6 @@ def test_joints_of_the_urdf_put_the_platform_where_it_is(motion: Any) -> None:
 @pytest.mark.parametrize('name', ['hexapod', 'delta'])
 def test_joints_and_free_bodies_of_the_urdf_meet_at_every_closure(name: str) -> None:
     model = DriveModel.load(f'config/{name}.yaml')
-    assert isinstance(model, DriveModel)
     structure = model.robot.structure
     tree = TreePositions(model)
     robot = pinocchio.buildModelFromXML(text_of(model, URDF))

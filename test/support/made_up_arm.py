@@ -64,7 +64,6 @@ def real_arm(folder: Path, **changes: Any) -> DriveModel:
     """Return the arm with friction, and with other values."""
     model = DriveModel.load(write_arm(folder))
     real = DriveModel.from_parameters({**model.values, **FRICTION, **changes}, model.source)
-    assert isinstance(real, DriveModel)
     return real
 
 

@@ -27,7 +27,6 @@ def write_hidden(path: Path, seed: int, duration: float = 16.0,
                  hidden: Mapping[str, Any] = HIDDEN) -> Path:
     """Write a recording of the paper's robot with effects, and return its path."""
     robot = DriveModel.from_parameters({**default_parameters(), **hidden})
-    assert isinstance(robot, DriveModel)
     motion = Excitation(duration=duration, seed=seed).motion(np.arange(0.0, duration, STEP))
     forces = robot.drive_forces(motion)
     rng = np.random.default_rng(seed)

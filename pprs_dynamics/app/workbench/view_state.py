@@ -283,9 +283,9 @@ def names_of(candidate: EffectCandidate, drives: tuple[str, ...]) -> tuple[str, 
     return None if on is None else tuple(drives[d] for d in on)
 
 
-def errors_of(before: Array, now: Array, noise: Mapping[str, float], drives: tuple[str, ...],
+def errors_of(fits: TickFits, view: ViewState, noise: Mapping[str, float],
               ) -> dict[str, DriveError]:
-    """Return the errors of the drives that were measured."""
-    return {name: DriveError(root_mean_square(before[:, d]), root_mean_square(now[:, d]),
-                             noise.get(name, NOT_KNOWN))
-            for d, name in enumerate(drives) if np.isfinite(before[:, d]).any()}
+    """Return the errors of the measured drives."""
+    return {name: DriveError(root_mean_square(fits.before[:, d]),
+                             root_mean_square(view.residual[:, d]), noise.get(name, NOT_KNOWN))
+            for d, name in enumerate(fits.drives) if np.isfinite(fits.before[:, d]).any()}

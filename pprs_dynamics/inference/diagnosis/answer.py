@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -35,10 +35,9 @@ from pprs_dynamics.inference.search.candidates import (
     EffectCandidate,
     UnknownCandidate,
 )
-from pprs_dynamics.inference.search.constraints import empty_totals
+from pprs_dynamics.inference.search.constraints import limits_reached
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.estimates import (
-    Estimate,
     Estimates,
     averaged,
     calibrations,
@@ -60,7 +59,6 @@ from pprs_dynamics.inference.search.held_out import (
     predictive_gain,
 )
 from pprs_dynamics.inference.search.noise_floors import noise_floors
-from pprs_dynamics.inference.search.possible_values import why_impossible
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
@@ -204,24 +202,18 @@ class Answer:
             without.cost - self.table.best.cost, root_mean_square(self.remaining + force),
             root_mean_square(self.remaining), before, after, estimates.at_bound,
             (less - with_force) / max(self.over_noise(self.given.error), 1e-300),
-            float('nan') if gain is None else gain.certainty,
-            self._objection(candidate, parameters, less / max(with_force, 1e-300), gain),
+            gain, self._objection(candidate, less / max(with_force, 1e-300), gain),
             self._ranked_set(without), self._in_model(candidate, parameters),
             None if course is None else replace(
                 course, begin=course.begin - begun, end=course.end - begun), estimates.moments)
 
-    def _objection(self, candidate: EffectCandidate, parameters: Mapping[str, Estimate],
-                   ratio: float, gain: PredictiveGain | None) -> str:
+    def _objection(self, candidate: EffectCandidate, ratio: float,
+                   gain: PredictiveGain | None) -> str:
         """Return why an effect of the row is no finding, as a clause; '' where it is one."""
-        impossible = why_impossible(candidate.effect, parameters, self.decisions)
-        if impossible:
-            return impossible
         if self.fitted.terms.feasibility > self.decisions.rival_margin:
             for component in candidate.components:
-                if component.drive is not None:
-                    for of in empty_totals(self.design, self.fitted, component):
-                        return (f'{self.drives[component.drive]} would have less than no {of} '
-                                'with what the model has')
+                for clause in limits_reached(self.design, self.fitted, component):
+                    return clause
         if ratio < 1 - self.decisions.error_rise:
             return f'without its force the error is {1 - ratio:.0%} smaller'
         if gain is None or not np.isfinite(gain.certainty):

@@ -13,7 +13,7 @@ from pprs_dynamics.inference.diagnosis.answer import Answer, answer_of
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
 from pprs_dynamics.inference.diagnosis.statements import word_stick_slip
 from pprs_dynamics.inference.fit.reference import Reference
-from pprs_dynamics.inference.readings.measured_effort import looks_like
+from pprs_dynamics.inference.readings.efforts import looks_like
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.table import input_model_alone, tabulate
 from pprs_dynamics.measurement.files.recording import Recording

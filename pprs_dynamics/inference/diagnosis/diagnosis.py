@@ -21,8 +21,8 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
 )
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.fit.reference import Reference
+from pprs_dynamics.inference.readings.efforts import kinds_of
 from pprs_dynamics.inference.readings.findings import NoMeasurement
-from pprs_dynamics.inference.readings.measured_effort import kinds_of
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals

@@ -17,62 +17,31 @@ import numpy as np
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MisreadError
-from pprs_dynamics.inference.readings.changes import find_changed_efforts, find_changed_positions
+from pprs_dynamics.inference.readings import table
+from pprs_dynamics.inference.readings.efforts import (
+    effort_scales,
+    find_changed_efforts,
+    find_changed_positions,
+    find_no_measurements,
+    find_scales,
+    find_sign_bit,
+)
 from pprs_dynamics.inference.readings.evidence import (
     Parts,
+    Shares,
+    effort_contents,
     likelihood,
     parts_of,
     read_motion,
-    shares,
 )
-from pprs_dynamics.inference.readings.findings import (
-    Mistake,
-    OtherReading,
-    Scales,
-    columns_line,
-)
-from pprs_dynamics.inference.readings.measured_effort import (
-    effort_contents,
-    find_no_measurements,
-)
-from pprs_dynamics.inference.readings.scales import find_scales, sign_bit
-from pprs_dynamics.inference.readings.table import (
-    ALIKE,
-    ANGLES,
-    BEYOND,
-    CERTAIN,
-    CLOSE_FIT,
-    COST,
-    EFFORTS,
-    FAR,
-    FAR_OUTSIDE,
-    GOOD_FIT,
-    LENGTHS,
-    NEAR_ONE,
-    OUTSIDE,
-    QUARTERS,
-    RATE_OFF,
-    STROKE_SLACK,
-    SURE,
-    TIMES,
-    WEAK,
-    Reading,
-    named,
-    plain,
-    quarter_turn,
-    readings,
-)
+from pprs_dynamics.inference.readings.findings import Mistake, OtherReading, Scales, columns_line
+from pprs_dynamics.inference.readings.table import Reading, named, plain, quarter_turn, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-
-SCALES = (1.0, -1.0, *EFFORTS, *(-unit for unit in EFFORTS))
-# Of one drive among others; other units are those of all drives.
-OF_ONE = (1.0, -1.0, 1e3, 1e-3, -1e3, -1e-3)
-SHORTEST_STEP = 1e-5  # [s]; no robot is sampled at more than 100 kHz
-STRETCHES = 8  # of an excerpt, evenly over the recording
+from pprs_dynamics.physics.model.recorded_names import CURRENT
 
 
 @dataclass(frozen=True)
@@ -92,9 +61,10 @@ class Fit:
 
     @property
     def is_other_unit(self) -> bool:
-        """Whether only efforts differ, by a unit that is no prefix."""
+        """Whether only efforts differ, those of all drives by one unit."""
+        sizes = np.abs(self.scales)
         return (not self.reading.kind and self.time_unit == 1
-                and not np.any(np.isin(self.scales, OF_ONE)))
+                and bool(np.all(sizes == sizes[0]) and sizes[0] != 1))
 
 
 def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False) -> Recording:
@@ -123,37 +93,39 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
     recording : Recording
         Of the model's drives.
     """
-    for early in (find_changed_positions, sign_bit):
+    for early in (find_changed_positions, find_sign_bit):
         if found := tuple(early(recording)):
             return found  # no reading of the whole is right
     excerpts = {unit: excerpt for unit in (1.0, *_time_units(recording))
-                if (excerpt := excerpt_of(recording, unit, STRETCHES)) is not None}
+                if (excerpt := excerpt_of(recording, unit, table.STRETCHES)) is not None}
     search = Search(model, excerpts)
     best = search.best()
-    if best is not None and best.is_other_unit:
+    rival = None if best is None else search.rival(best)
+    if best is not None and best.is_other_unit and rival is None:
         best = None  # `find_scales` compares the factors themselves
     contents = effort_contents(model, recording, excerpts.get(1.0))
+    has_columns = model.recorded.columns is not None
     mistakes: list[Defect] = [] if best is None else list(_of_fit(model, best))
-    if best is not None and (rival := search.rival(best)) is not None:
+    if best is not None and rival is not None:
         both = [[*_of_fit(model, fit)] for fit in (best, rival)]
-        lines = [columns_line(each, model.recorded.columns is not None) for each in both]
         mistakes = [OtherReading.of(
             'ambiguous', model.drives, range(len(model.drives)), ', or '.join(
                 ' and '.join(mistake.what for mistake in each) for each in both),
-            ' or '.join(lines))]
+            ' or '.join(columns_line(each, has_columns) for each in both))]
     kinds = {mistake.kind for mistake in mistakes}
     if not mistakes:
         mistakes += find_scales(model, contents)
     # What explains the efforts well is in the right unit, whatever limits say.
-    if not kinds & {'position_unit', 'drive_order', 'ambiguous'} and search.plain_left > GOOD_FIT:
-        mistakes += _of_strokes(model, recording)
+    if (not kinds & {'position_unit', 'drive_order', 'ambiguous'}
+            and search.plain_left > table.GOOD_FIT):
+        mistakes += _of_strokes(model, recording, search.strokes)
     if not kinds & {'position_unit', 'position_sign', 'reversed_time'}:
-        unit = 1.0 if best is None else best.time_unit
-        mistakes += _of_velocities(model, recording, excerpts.get(unit))
-    if not any(isinstance(mistake, OtherReading) for mistake in mistakes):
-        mistakes += find_changed_efforts(model, recording)
-    if not any(isinstance(mistake, OtherReading) for mistake in mistakes):
-        mistakes += find_no_measurements(model, contents)
+        mistakes += _of_velocities(model, recording, excerpts.get(
+            1.0 if best is None else best.time_unit))
+    for last in (find_changed_efforts(model, recording, excerpts.get(1.0)),
+                 find_no_measurements(model, contents)):
+        if not any(isinstance(mistake, OtherReading) for mistake in mistakes):
+            mistakes += last
     return tuple(mistakes)
 
 
@@ -169,9 +141,28 @@ class Search:
 
     def __init__(self, model: DriveModel, excerpts: dict[float, Excerpt]) -> None:
         self.model, self.excerpts = model, excerpts
+        # Of currents without a known gain no force is known: masses say nothing.
+        self.masses = np.inf if model.effort_kind == CURRENT and not model.knows_currents else (
+            table.MASSES)
         self.plain_left = 1.0  # residual of the plain reading
         self.fits: list[Fit] = []
         self._parts: dict[tuple[float, bytes, bytes, bool], Parts | None] = {}
+        self.strokes = self._strokes()
+
+    def _strokes(self) -> tuple[Array, Array]:
+        """Return the ends of the strokes, infinite where a drive turns freely.
+
+        Limits of a turn or more of a motor without weight are invented, as URDF asks for some.
+        """
+        lower, upper = self.model.strokes
+        excerpt = self.excerpts.get(1.0)
+        parts = None if excerpt is None else parts_of(
+            self.model, excerpt, plain(len(lower)), in_pieces=True)
+        if parts is None:
+            return lower, upper
+        free = np.array([units.turns for units in self.model.units]) & (
+            upper - lower >= 2 * np.pi) & (np.nanmax(np.abs(parts.gravity), axis=0) == 0)
+        return np.where(free, -np.inf, lower), np.where(free, np.inf, upper)
 
     def best(self) -> Fit | None:
         """Return the best reading where it is more likely than the plain one."""
@@ -181,14 +172,15 @@ class Search:
         start = self.fit(first, 1.0, in_pieces=True) or Fit(
             first, 1.0, 0.0, np.ones(len(drives)), 1.0)
         self.plain_left = start.left
-        if 1.0 in self.excerpts and start.left < CLOSE_FIT and start.is_plain and not (
+        if 1.0 in self.excerpts and start.left < table.CLOSE_FIT and start.is_plain and not (
                 self._outside(first, self.excerpts[1.0])):
             return None
         best: tuple[Fit | None, float] = (None, start.score)
         if not start.is_plain:
             best = start, start.score
         for reading in (first, *readings(drives, self.model.units)):
-            if reading.kind == 'drive_order' and best[0] is not None and best[0].left < CLOSE_FIT:
+            if (reading.kind == 'drive_order' and best[0] is not None
+                    and best[0].left < table.CLOSE_FIT):
                 break
             for unit in self.excerpts:
                 fit = None if reading is first and unit == 1 else self.fit(reading, unit)
@@ -200,7 +192,7 @@ class Search:
         for seed in seeds:
             best = self._turned(seed, best)
         found = best[0]
-        return None if found is None or found.left > GOOD_FIT or not self._is_certain(
+        return None if found is None or found.left > table.GOOD_FIT or not self._is_certain(
             found) else found
 
     def rival(self, best: Fit) -> Fit | None:
@@ -209,18 +201,18 @@ class Search:
         Inertia alone cannot separate positions in another unit from efforts in another.
         """
         units = ('', 'position_unit')
-        others = [fit for fit in self.fits if best.score - fit.score < SURE and not fit.is_plain
-                  and fit.reading.kind in units and best.reading.kind in units
+        others = [fit for fit in self.fits if best.score - fit.score < table.SURE
+                  and not fit.is_plain and fit.reading.kind in units and best.reading.kind in units
                   and fit.time_unit == best.time_unit == 1
                   and not np.allclose(fit.reading.position, best.reading.position)]
         return max(others, key=lambda fit: fit.score, default=None)
 
     def _turned(self, seed: Fit, best: tuple[Fit | None, float]) -> tuple[Fit | None, float]:
-        if seed.left < CLOSE_FIT or seed.reading.kind not in ('', 'position_unit'):
+        if seed.left < table.CLOSE_FIT or seed.reading.kind not in ('', 'position_unit'):
             return best
         for _ in self.model.drives:
             fits = [fit for d, units in enumerate(self.model.units) if units.turns
-                    for turn in QUARTERS
+                    for turn in table.QUARTERS
                     if (fit := self.fit(quarter_turn(self.model.drives, d, turn, seed.reading),
                                         seed.time_unit)) is not None]
             next_one = max(fits, key=lambda fit: fit.score, default=None)
@@ -249,12 +241,13 @@ class Search:
             return None
         effort, weights = reading.effort_of(excerpt.effort), self._weights(excerpt, parts)
         weights = np.abs(reading.effort) @ weights
-        found = {(d, scale): one for d in np.flatnonzero(weights > 0).tolist() for scale in SCALES
-                 if (one := likelihood(effort[:, d], parts, d, scale)) is not None}
+        found = {(d, scale): one for d in np.flatnonzero(weights > 0).tolist()
+                 for scale in table.SCALES if (one := likelihood(
+                     effort[:, d], parts, d, scale, self.masses)) is not None}
         measured = sorted({d for d, _ in found})
         if not measured:
             return None
-        cost = (reading.cost + (COST['time_unit'] if unit != 1 else 0.0)
+        cost = (reading.cost + (table.COST['time_unit'] if unit != 1 else 0.0)
                 + self._outside(reading, excerpt))
 
         def fit_of(scales: Array) -> Fit:
@@ -267,11 +260,11 @@ class Search:
 
         alone = np.ones(effort.shape[1])
         for d in measured:
-            alone[d] = max(OF_ONE, key=lambda scale: found[d, scale].score
+            alone[d] = max(table.OF_ONE, key=lambda scale: found[d, scale].score
                            - _mistakes(scale) / weights[d])
         choices = [alone]
         # Inertia alone may be invented: units that are no prefixes need a weight.
-        for scale in SCALES if np.nanmax(np.abs(parts.gravity)) > 0 else OF_ONE:
+        for scale in table.SCALES if np.nanmax(np.abs(parts.gravity)) > 0 else table.OF_ONE:
             common = np.ones(effort.shape[1])
             common[np.isfinite(effort).any(axis=0)] = scale
             choices.append(common)
@@ -293,7 +286,7 @@ class Search:
         moves = speed > self.model.reversal.velocity
         force = np.sqrt(np.nanmean((parts.inertia + parts.gravity + parts.others) ** 2, axis=0))
         sizes = np.maximum(effort / max(effort.max(), 1e-300), force / max(force.max(), 1e-300))
-        found = np.where((sizes > WEAK) & (effort > 0), np.sqrt(sizes), 0.0)
+        found = np.where((sizes > table.WEAK) & (effort > 0), np.sqrt(sizes), 0.0)
         weights: Array = found * (moves if np.any(moves & (found > 0)) else 1.0)
         return weights
 
@@ -314,33 +307,35 @@ class Search:
         for d in np.flatnonzero(fit.scales < 0).tolist():
             known = np.isfinite(effort[:, d])
             if np.ptp(effort[known, d]) > 0 and root_mean_square(parts.velocity[:, d]) > width[d]:
-                some = shares(effort[known, d], parts.rows(known), d)
-                if abs(some.friction) > CERTAIN * some.friction_by_chance:
+                some = Shares.of(effort[known, d], parts.rows(known), d)
+                if abs(some.friction) > table.CERTAIN * some.friction_by_chance:
                     votes += float(weights[d] * np.sign(some.friction))
         return votes <= 0
 
     def _possible(self, reading: Reading, excerpt: Excerpt) -> bool:
         """Return whether a reading brings positions into the strokes."""
-        lower, upper = self.model.strokes
+        lower, upper = self.strokes
         with np.errstate(invalid='ignore'):
-            slack = STROKE_SLACK * (upper - lower)
+            slack = table.STROKE_SLACK * (upper - lower)
         position = excerpt.motion.position @ reading.position.T + reading.offset
         slack = np.where(np.isfinite(slack), slack, 0.0)
         return not np.any((position < lower - slack) | (position > upper + slack))
 
     def _outside(self, reading: Reading, excerpt: Excerpt) -> float:
         """Return the cost of positions and speeds that are beyond their limits."""
-        lower, upper = self.model.strokes
+        lower, upper = self.strokes
         motion = read_motion(excerpt.motion, reading)
         reach = np.abs(motion.position).max(axis=0) / np.maximum(np.abs(lower), np.abs(upper))
-        speed = np.abs(motion.velocity).max(axis=0) / self.model.speed_limits
+        speed = np.abs(motion.velocity).max(axis=0) / np.where(
+            np.isfinite(lower), self.model.speed_limits, np.inf)
         most = float(np.max(np.maximum(reach, speed)))
-        return FAR_OUTSIDE if most > FAR else OUTSIDE if most > BEYOND else 0.0
+        return (table.FAR_OUTSIDE if most > table.FAR
+                else table.OUTSIDE if most > table.BEYOND else 0.0)
 
 
 def _mistakes(scale: float) -> float:
-    return (COST['effort_sign'] if scale < 0 else 0.0) + (
-        COST['effort_unit'] if abs(scale) != 1 else 0.0)
+    return (table.COST['effort_sign'] if scale < 0 else 0.0) + (
+        table.COST['effort_unit'] if abs(scale) != 1 else 0.0)
 
 
 def _time_units(recording: Recording) -> list[float]:
@@ -348,8 +343,8 @@ def _time_units(recording: Recording) -> list[float]:
     steps = np.concatenate([np.diff(recording.time[part]) for part in recording.segments]
                            or [np.zeros(0)])
     step = float(np.median(steps)) if len(steps) else 0.0
-    return [unit for unit in TIMES
-            if step > SLOW_STEP and SHORTEST_STEP <= step * unit <= SLOW_STEP]
+    return [unit for unit in table.TIMES
+            if step > SLOW_STEP and table.SHORTEST <= step * unit <= SLOW_STEP]
 
 
 # --------------------------------------------------------------------------------- sentences
@@ -359,7 +354,7 @@ def _of_fit(model: DriveModel, fit: Fit) -> Iterator[OtherReading]:
     """Yield the mistakes of times, of positions and order, and of efforts."""
     drives, units = model.drives, model.units
     if fit.time_unit != 1.0:
-        yield OtherReading('time_unit', 1, f'the times look like {TIMES[fit.time_unit]}: as '
+        yield OtherReading('time_unit', 1, f'the times look like {table.TIMES[fit.time_unit]}: as '
                            f'seconds they make the motion {1 / fit.time_unit:.0f} times too slow '
                            'for its efforts', scales=(('', 'time_scale', fit.time_unit),))
     if fit.reading.kind:
@@ -369,7 +364,7 @@ def _of_fit(model: DriveModel, fit: Fit) -> Iterator[OtherReading]:
         group = tuple(np.flatnonzero(fit.scales == scale).tolist())
         if scale == 1.0:
             continue
-        unit = ' or '.join(dict.fromkeys(EFFORTS[abs(scale)].format(units[k].effort)
+        unit = ' or '.join(dict.fromkeys(table.EFFORTS[abs(scale)].format(units[k].effort)
                                          for k in group)) if abs(scale) != 1 else None
         times = 'minus' if scale == -1.0 else f'{scale:.4g} times'
         guess = '' if unit is None else f', as if it were in {unit}'
@@ -398,22 +393,15 @@ def position_scales(model: DriveModel, reading: Reading) -> Scales:
     return () if reading.kind == 'drive_order' else tuple(found)
 
 
-def effort_scales(model: DriveModel, group: tuple[int, ...], factors: Array) -> Scales:
-    """Return the factors below `columns` with which efforts are read so."""
-    before = model.recorded.columns
-    return tuple((drive, 'effort_scale', float(factors[k]) * (
-        1.0 if before is None else before.drives[drive].effort_scale))
-        for k, drive in enumerate(model.drives) if k in group)
-
-
-def _of_strokes(model: DriveModel, recording: Recording) -> Iterator[Defect]:
+def _of_strokes(model: DriveModel, recording: Recording, strokes: tuple[Array, Array],
+                ) -> Iterator[Defect]:
     """Yield positions far beyond the strokes, which no effort is needed to recognise."""
-    lower, upper = model.strokes
+    lower, upper = strokes
     drives, ends = recording.drives, np.maximum(-lower, upper)
     reach = np.abs(recording.position).max(axis=0)
-    for turns, names in ((False, LENGTHS), (True, ANGLES)):
+    for turns, names in ((False, table.LENGTHS), (True, table.ANGLES)):
         alike = [k for k, units in enumerate(model.units) if units.turns == turns]
-        far = tuple(k for k in alike if reach[k] > FAR * ends[k])
+        far = tuple(k for k in alike if reach[k] > table.FAR * ends[k])
         if not far:
             continue
         # Encoders of a robot's turning joints count alike; its rails may not.
@@ -441,13 +429,13 @@ def _of_velocities(model: DriveModel, recording: Recording, excerpt: Excerpt | N
         recorded, true = (values[known, drive] for values in (
             excerpt.velocity, excerpt.motion.velocity))
         size = float(true @ true) * float(recorded @ recorded)
-        if size > 0 and abs(float(recorded @ true)) >= ALIKE * np.sqrt(size):
+        if size > 0 and abs(float(recorded @ true)) >= table.ALIKE * np.sqrt(size):
             factors[drive] = float(recorded @ true) / float(true @ true)
     columns = model.recorded.columns
     rate = None if columns is None else columns.rate
     middle = float(np.median([*factors.values()])) if factors else 1.0
-    if rate is not None and middle > 0 and abs(np.log(middle)) > RATE_OFF and np.all(
-            np.abs(np.array([*factors.values()]) / middle - 1) < RATE_OFF):
+    if rate is not None and middle > 0 and abs(np.log(middle)) > table.RATE_OFF and np.all(
+            np.abs(np.array([*factors.values()]) / middle - 1) < table.RATE_OFF):
         true_rate = float(f'{rate * middle:.4g}')
         yield OtherReading('rate', len(recording.time), f'the recorded velocities are '
                            f'{middle:.4g} times the derivatives of the positions at {rate:g} '
@@ -456,8 +444,8 @@ def _of_velocities(model: DriveModel, recording: Recording, excerpt: Excerpt | N
         return
     groups: dict[float, list[int]] = {}
     for drive, factor in factors.items():
-        for wrong in (-1.0, 1e-3, -1e-3, 1e3, -1e3, *(1 / unit for unit in ANGLES)):
-            if abs(factor / wrong - 1) <= NEAR_ONE:
+        for wrong in (-1.0, 1e-3, -1e-3, 1e3, -1e3, *(1 / unit for unit in table.ANGLES)):
+            if abs(factor / wrong - 1) <= table.NEAR_ONE:
                 groups.setdefault(wrong, []).append(drive)
     for factor, group in groups.items():
         times = 'minus' if factor == -1.0 else f'{factor:.4g} times'

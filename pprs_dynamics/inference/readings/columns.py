@@ -15,33 +15,8 @@ import numpy as np
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.readings.table import (
-    ALIKE,
-    CHANNEL_WORDS,
-    CLEAR,
-    COMMANDS,
-    COPY,
-    CURRENT,
-    EFFORT,
-    LEAST_ROWS,
-    LENGTHS_OF_STEPS,
-    LETTERS,
-    MEASURED,
-    OTHERS,
-    PLURALS,
-    POSITION,
-    RATE_OFF,
-    SAME_UNIT,
-    SHORTEST,
-    SINCE_BOOT,
-    SLOWEST,
-    TIME_WORDS,
-    UNIT_WORDS,
-    UNLIKE,
-    VELOCITY,
-    VELOCITY_FACTORS,
-    WORDS,
-)
+from pprs_dynamics.inference.readings import table
+from pprs_dynamics.inference.readings.table import CURRENT, EFFORT, POSITION, VELOCITY
 from pprs_dynamics.measurement.files.contents import Series
 from pprs_dynamics.measurement.files.table_files import LATEST_SECOND, TIME_COLUMNS, TIME_LIKE
 
@@ -160,9 +135,9 @@ def words_of(title: str) -> list[str]:
 
 def _split(word: str) -> list[str]:
     """Return a word, and apart from it a last letter that says actual or desired: posa, qd_d."""
-    known = {each for words in WORDS.values() for each in words}
-    if word[:-1] in known and len(word) > 3 and word not in known and word[-1] in LETTERS:
-        return [word[:-1], LETTERS[word[-1]]]
+    known = {each for words in table.WORDS.values() for each in words}
+    if word[:-1] in known and len(word) > 3 and word not in known and word[-1] in table.LETTERS:
+        return [word[:-1], table.LETTERS[word[-1]]]
     return [word]
 
 
@@ -193,21 +168,22 @@ def _time(series: Sequence[Series], has_rate: bool,
             return None, None, notes
         found = even[0]
         notes.append(f'column {found.column} rises all the time: taken as time')
-    scale = next((TIME_WORDS[word] for word in words_of(found.title) if word in TIME_WORDS), None)
+    scale = next((table.TIME_WORDS[word] for word in words_of(found.title)
+                  if word in table.TIME_WORDS), None)
     known = found.values[np.isfinite(found.values)]
     if known[0] > LATEST_SECOND:  # since 1970, in a unit that the size of the stamps tells
         parts = 1.0
         while known[0] * parts > LATEST_SECOND:
             parts /= 1e3
         step = float(np.median(np.diff(known)))
-        if scale is None and step * parts < SHORTEST:  # since boot
-            scale = next(unit for unit in SINCE_BOOT if step * unit <= SLOWEST)
+        if scale is None and step * parts < table.SHORTEST:  # since boot
+            scale = next(unit for unit in table.SINCE_BOOT if step * unit <= table.SLOWEST)
             notes.append(f'times rise by {step:g}: taken as units of {scale:g} s since boot')
         parts = scale or parts
         return replace(found, values=found.values * parts), scale, notes
     step = float(np.median(np.diff(known)))
-    if scale is None and step > SLOWEST:
-        scale = next(unit for unit in SINCE_BOOT if step * unit <= SLOWEST)
+    if scale is None and step > table.SLOWEST:
+        scale = next(unit for unit in table.SINCE_BOOT if step * unit <= table.SLOWEST)
         notes.append(f'times rise by {step:g}: taken as units of {scale:g} s')
     return replace(found, values=found.values * (scale or 1.0)), scale, notes
 
@@ -258,11 +234,11 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
             continue
         if each == CURRENT and any(kind == EFFORT for _, kind in columns):
             continue
-        if {*best} & COMMANDS:
+        if {*best} & table.COMMANDS:
             notes.append(f'{each}: only commands are there ({" ".join(best)})')
         columns.update({(joint, each): column for joint, column in groups[best].items()})
-    for channel, telling in CHANNEL_WORDS.items() if quantity is None else ():
-        told = [key for key in groups if {*key} & telling and not {*key} & COMMANDS]
+    for channel, telling in table.CHANNEL_WORDS.items() if quantity is None else ():
+        told = [key for key in groups if {*key} & telling and not {*key} & table.COMMANDS]
         if told:
             columns.update({(joint, channel): column for joint, column in groups[max(
                 told, key=lambda key: len(groups[key]))].items()})
@@ -272,10 +248,10 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
 def _fit(key: tuple[str, ...], members: dict[str, Column], quantity: str, given: str | None,
          ) -> tuple[float, ...]:
     """Return how well a group of columns fits a quantity; not at all below 0."""
-    told = {kind for kind, words in WORDS.items() if {*key} & {*words}}
+    told = {kind for kind, words in table.WORDS.items() if {*key} & {*words}}
     if {*key} & {'joint', 'joints', 'state'} and len(told) > 1:
         told.discard(POSITION)  # "joint torque" is no position
-    if {*key} & {*WORDS[POSITION][:7]}:
+    if {*key} & {*table.WORDS[POSITION][:7]}:
         told.add(POSITION)
     if CURRENT in told and EFFORT in told:
         told.discard(EFFORT)
@@ -284,10 +260,10 @@ def _fit(key: tuple[str, ...], members: dict[str, Column], quantity: str, given:
     fits = given is not None or quantity in told or (quantity == POSITION and plain)
     if quantity == POSITION and VELOCITY in told:
         fits = False
-    if not fits or {*key} & OTHERS:
+    if not fits or {*key} & table.OTHERS:
         return (-1.0,)
-    return (float(len(members)), float(not {*key} & COMMANDS), float(bool({*key} & MEASURED)),
-            -float(len(key)))
+    return (float(len(members)), float(not {*key} & table.COMMANDS),
+            float(bool({*key} & table.MEASURED)), -float(len(key)))
 
 
 def _joint_in(words: Sequence[str], joints: Sequence[str]) -> tuple[str, int, int] | None:
@@ -350,12 +326,12 @@ class Links:
         values, time = values[known], time[known]
         count = values.shape[1]
         best = [np.full((count, count), np.nan) for _ in range(3)]
-        if len(time) < LEAST_ROWS:
+        if len(time) < table.LEAST_ROWS:
             return cls(*best)
         steps = np.diff(time)[:, None]
         area = np.vstack([np.zeros(count), np.cumsum(
             0.5 * (values[1:] + values[:-1]) * steps, axis=0)])
-        for length in (step for step in LENGTHS_OF_STEPS if step < len(time) // 4):
+        for length in (step for step in table.LENGTHS_OF_STEPS if step < len(time) // 4):
             change, covered = (each[length:] - each[:-length] for each in (values, area))
             change, covered = change - change.mean(axis=0), covered - covered.mean(axis=0)
             with np.errstate(divide='ignore', invalid='ignore'):
@@ -396,7 +372,7 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
         groups = [rest[k:k + count] for k in range(0, len(rest) - count + 1, count)]
         shares = [_explained(values[:, group], position, time) for group in groups]
         order = sorted(range(len(shares)), key=lambda k: -shares[k])
-        if len(order) > 1 and shares[order[0]] - shares[order[1]] < CLEAR and not _are_alike(
+        if len(order) > 1 and shares[order[0]] - shares[order[1]] < table.CLEAR and not _are_alike(
                 values, groups[order[0]], groups[order[1]]):
             first, second = (groups[k] for k in order[:2])
             raise AmbiguousColumns(joints, [
@@ -405,7 +381,7 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
             # Of what is the same but for its scale, as measured and asked efforts, the first.
             kinds[EFFORT] = next(group for group in groups if group is groups[order[0]] or
                                  _are_alike(values, group, groups[order[0]]))
-    told = [f'{_span(series, places)} taken as {PLURALS[kind]}'
+    told = [f'{_span(series, places)} taken as {table.PLURALS[kind]}'
             for kind, places in kinds.items()]
     unused = [place for place in range(len(series))
               if place not in {k for places in kinds.values() for k in places}]
@@ -420,7 +396,7 @@ def _are_alike(values: Array, block: Sequence[int], other: Sequence[int]) -> boo
     pairs = [np.corrcoef(values[:, a], values[:, b])[0, 1]
              for a, b in zip(block, other, strict=False)
              if np.ptp(values[:, a]) > 0 and np.ptp(values[:, b]) > 0]
-    return bool(pairs) and min(pairs) > COPY
+    return bool(pairs) and min(pairs) > table.COPY
 
 
 def _span(series: Sequence[Series], places: Sequence[int]) -> str:
@@ -433,8 +409,8 @@ def _span(series: Sequence[Series], places: Sequence[int]) -> str:
 def _chains(links: Links, count: int) -> dict[str, list[int]]:
     """Return positions and velocities by derivatives; empty where not each joint has both."""
     with np.errstate(invalid='ignore'):
-        derived = (links.correlation > ALIKE) & (links.slope > 0)
-        same = links.alike > COPY
+        derived = (links.correlation > table.ALIKE) & (links.slope > 0)
+        same = links.alike > table.COPY
     np.fill_diagonal(derived, False)
     # What is asked for moves as what is measured, which the velocity follows more exactly.
     places = [i for i in range(len(derived)) if derived[i].any() and not derived[:, i].any()]
@@ -453,7 +429,8 @@ def _chains(links: Links, count: int) -> dict[str, list[int]]:
     pairs.sort()
     # Velocities of one robot are in one unit.
     slopes = [float(np.log(links.slope[pair])) for pair in pairs]
-    if len(pairs) != count or len({j for _, j in pairs}) != count or np.ptp(slopes) > SAME_UNIT:
+    if (len(pairs) != count or len({j for _, j in pairs}) != count
+            or np.ptp(slopes) > table.SAME_UNIT):
         return {}
     return {POSITION: [i for i, _ in pairs], VELOCITY: [j for _, j in pairs]}
 
@@ -493,15 +470,15 @@ def _linked(values: Array, block: Sequence[int], other: Sequence[int], time: Arr
     count = len(block)
     links = Links.of(values[:, [*block, *other]], time)
     found = np.diagonal(links.correlation[:count, count:])
-    return bool(np.isfinite(found).any() and np.nanmedian(found) > ALIKE)
+    return bool(np.isfinite(found).any() and np.nanmedian(found) > table.ALIKE)
 
 
 def _is_known(links: Links, place: int, used: Collection[int]) -> bool:
     """Return whether a column is the derivative of a used one in its units, or alike one."""
     for k in used:
-        if links.alike[k, place] > COPY or (links.correlation[k, place] > COPY and any(
-                abs(links.slope[k, place] / links.slope[i, j] - 1) < SAME_UNIT
-                for i in used for j in used if links.correlation[i, j] > ALIKE)):
+        if links.alike[k, place] > table.COPY or (links.correlation[k, place] > table.COPY and any(
+                abs(links.slope[k, place] / links.slope[i, j] - 1) < table.SAME_UNIT
+                for i in used for j in used if links.correlation[i, j] > table.ALIKE)):
             return True
     return False
 
@@ -511,7 +488,7 @@ def _explained(efforts: Array, position: Array, time: Array) -> float:
     known = (np.isfinite(efforts).all(axis=1) & np.isfinite(position).all(axis=1)
              & np.isfinite(time))
     efforts, position, time = efforts[known], position[known], time[known]
-    if len(time) < LEAST_ROWS or not np.all(np.diff(time) > 0):
+    if len(time) < table.LEAST_ROWS or not np.all(np.diff(time) > 0):
         return 0.0
     half = max(1, len(time) // 400)
     speed = np.zeros_like(position)
@@ -537,7 +514,7 @@ def _explained(efforts: Array, position: Array, time: Array) -> float:
 
 
 def _scale(title: str, quantity: str) -> float | None:
-    known = UNIT_WORDS.get(quantity, {})
+    known = table.UNIT_WORDS.get(quantity, {})
     return next((known[word] for word in words_of(title) if word in known), None)
 
 
@@ -558,9 +535,9 @@ def _judge_velocities(guess: Guess, series: Mapping[Column, Series], time: Serie
                                 for each in (POSITION, VELOCITY)])
         stamps = time.values if time is not None else np.arange(len(pair)) / (rate or 1.0)
         links = Links.of(pair, stamps[:len(pair)])
-        if links.correlation[0, 1] > ALIKE:
+        if links.correlation[0, 1] > table.ALIKE:
             slopes[joint] = float(links.slope[0, 1])
-        elif np.isfinite(links.correlation[0, 1]) and abs(links.correlation[0, 1]) < UNLIKE:
+        elif np.isfinite(links.correlation[0, 1]) and abs(links.correlation[0, 1]) < table.UNLIKE:
             guess.notes.append(
                 f'{guess.columns[joint, VELOCITY]} is called a velocity, but is not the '
                 f'derivative of {guess.columns[joint, POSITION]} (correlation '
@@ -575,18 +552,18 @@ def _judge_velocities(guess: Guess, series: Mapping[Column, Series], time: Serie
             guess.notes.append(f'rate {found:g} Hz: the velocities are the derivatives of the '
                                'positions at this rate')
             return replace(guess, rate=found)
-        is_unit = any(abs(middle / factor - 1) < RATE_OFF for factor in (
-            1.0, *VELOCITY_FACTORS, *(1 / factor for factor in VELOCITY_FACTORS)))
+        is_unit = any(abs(middle / factor - 1) < table.RATE_OFF for factor in (
+            1.0, *table.VELOCITY_FACTORS, *(1 / factor for factor in table.VELOCITY_FACTORS)))
         if not is_unit:
             raise RateError(rate, float(f'{rate * middle:.3g}'))
     scales = dict(guess.scales)
     for joint, slope in slopes.items():
         factor = scales.get((joint, POSITION), 1.0)
-        if (joint, VELOCITY) in scales or abs(slope - 1) < SAME_UNIT:
+        if (joint, VELOCITY) in scales or abs(slope - 1) < table.SAME_UNIT:
             continue
-        exact = min((1.0, *VELOCITY_FACTORS), key=lambda unit: abs(
+        exact = min((1.0, *table.VELOCITY_FACTORS), key=lambda unit: abs(
             math.log(unit * slope / factor)))
-        if abs(exact * slope / factor - 1) < SAME_UNIT:
+        if abs(exact * slope / factor - 1) < table.SAME_UNIT:
             scales[joint, VELOCITY] = exact
             guess.notes.append(f'the velocity of {joint} is {slope:.4g} times the derivative of '
                                f'its position: velocity_scale {exact:g}')

@@ -27,6 +27,12 @@ ANGLES = {math.pi / 180: 'degrees', 2 * math.pi: 'turns', TICK: 'ticks of 4096 p
 TIMES = {1e-3: 'milliseconds', 1e-6: 'microseconds', 1e-9: 'nanoseconds'}
 # Multiples of N m and N that files have, and what a unit of effort is called in a sentence.
 EFFORTS = {1e3: 'm{}', 1e-3: 'k{}', 1 / 0.0980665: 'kgf cm'}
+PREFIXES = (1e3, 1e-3)
+SCALES = (1.0, -1.0, *EFFORTS, *(-unit for unit in EFFORTS))
+# Of one drive among others; other units are those of all drives.
+OF_ONE = (1.0, -1.0, 1e3, 1e-3, -1e3, -1e-3)
+SIGN_BITS = range(7, 16)  # of magnitudes
+CALMER = 0.5  # changes from sample to sample, over those of the numbers without a sign
 # Efforts in percent and per mille of the largest of each drive, as multiples of that.
 SHARES = {0.01: 'percent', 1e-3: 'per mille'}
 QUARTERS = {math.pi / 2: 90, -math.pi / 2: -90, math.pi: 180}
@@ -41,6 +47,8 @@ CLOSEST = 2e-4
 MASSES, MASSES_MOST = 0.35, 7.0
 # Standard deviation of a constant effort, as a share of the effort.
 CONSTANT = 0.3
+# Width in which friction turns over, at most, as a share of a drive's speeds.
+REVERSAL = 0.2
 # Times the rigid body's forces, beyond which friction is unlikely, and what it can cost at most.
 FRICTION, FRICTION_MOST = 3.0, 9.0
 # Prior costs of mistakes [nats].
@@ -58,7 +66,7 @@ WEAK = 0.01  # efforts and swings that are this much smaller than others tell no
 
 # ------------------------------------------------------------------------- scales of efforts
 
-NEAR_UNIT = 0.15  # relative distance from a unit's constant
+NEAR_UNIT, AT_UNIT = 0.15, 0.05  # relative distance from a unit's constant; a sure one
 SAME_MASSES = 3.0  # factor by which masses of a description are off at most
 ONE_FACTOR, SEVERAL_FACTORS = 0.25, 0.5  # spread of logarithms: one factor, several factors
 LARGEST_OVERLOAD = 4.0  # largest effort over the rated one
@@ -74,7 +82,8 @@ LEAST_FRICTION = 0.05  # over the swing of an effort: drives with gears have mor
 FOLLOWS = 0.9  # share of variance from which an effort follows the velocity and nothing else
 LARGEST_COMPLIANCE = 0.02  # [rad/(N m), m/N]: controllers are stiffer than 50 N m/rad
 LEAST_NOISE, LEAST_LEFT = 1e-5, 5e-4  # over the swing of an effort, of real sensors and drives
-LEAST_MEANS = 50  # of an excerpt
+LEAST_MEANS, STRETCHES = 50, 8  # of an excerpt; evenly over the recording
+NORMAL = 1.4826  # standard deviation over the median of absolute values
 STEADY = 0.1  # a weight whose swing is a smaller share of its size is a constant
 NOISE_STEP, NOISE_ORDER = 0.01, 4  # differences that separate noise from motion [s]
 

@@ -28,7 +28,7 @@ from pprs_dynamics.measurement.motion.drive_motion import (
     smoothed_again,
     smoothed_as,
 )
-from pprs_dynamics.measurement.motion.rests import find_rests
+from pprs_dynamics.measurement.motion.rests import are_held_poses, find_rests, rest_speeds
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.laws.elastic_joint import LINK_POSITION
@@ -403,13 +403,19 @@ def _channels(recording: Recording, index: Array) -> dict[str, Array]:
 
 
 def _efforts(model: DriveModel | Geometry, recording: Recording) -> Array:
-    """Return the efforts of a recording, NaN where a drive stands."""
+    """Return the efforts of a recording, NaN where a drive stands between motions.
+
+    Where poses are held throughout, their efforts count: they show gravity and offsets.
+    """
     effort = recording.effort
-    if isinstance(model, DriveModel) and model.rest_speed:
+    if isinstance(model, DriveModel) and model.rest_speed and not are_held_poses(
+            recording.position, recording.segments):
         effort = effort.copy()
         for part in recording.segments:
             step = float(np.median(np.diff(recording.time[part])))
-            effort[part][find_rests(recording.position[part], step, model.rest_speed)] = np.nan
+            position = recording.position[part]
+            speeds = rest_speeds(position, step, model.rest_speed)
+            effort[part][find_rests(position, step, speeds)] = np.nan
     return effort
 
 

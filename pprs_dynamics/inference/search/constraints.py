@@ -208,8 +208,8 @@ def _given(component: Component) -> Array:
     return np.array([known.get(name, 0.0) for name in component.names])
 
 
-def empty_totals(design: Design, fitted: CandidateSet, component: Component) -> tuple[str, ...]:
-    """Return what a drive has none of, by a set with a component: inertia or a friction.
+def limits_reached(design: Design, fitted: CandidateSet, component: Component) -> tuple[str, ...]:
+    """Return the limits that a component of a set reaches, each as a clause.
 
     Parameters
     ----------
@@ -218,22 +218,27 @@ def empty_totals(design: Design, fitted: CandidateSet, component: Component) -> 
     component : Component
         Of the set.
     """
-    if component.drive is None:
-        return ()
+    c, place = fitted.coefficients(component), ''
     found = dict[str, None]()
-    for name in component.names:
-        for of, way in ADDS_TO.get((component.effect.name, name), ()):
-            own = own_total(design, component.drive, of)
-            total, size = own, abs(own)
-            for other in fitted.blocks:
-                if other.drive == component.drive:
-                    for k, one in enumerate(other.names):
-                        if (of, way) in ADDS_TO.get((other.effect.name, one), ()):
-                            value = fitted.coefficients(other)[k] + _given(other)[k]
-                            total, size = total + value, size + abs(value)
-            value = fitted.coefficients(component)[component.names.index(name)]
-            if value < 0 and abs(total) <= 1e-9 * size:
-                found[of] = None
+    if component.drive is not None:
+        place = f' of {design.drives[component.drive]}'
+        for name in component.names:
+            for of, way in ADDS_TO.get((component.effect.name, name), ()):
+                own = own_total(design, component.drive, of)
+                values = [fitted.coefficients(other)[k] + _given(other)[k]
+                          for other in fitted.blocks if other.drive == component.drive
+                          for k, other_name in enumerate(other.names)
+                          if (of, way) in ADDS_TO.get((other.effect.name, other_name), ())]
+                size = abs(own) + float(np.abs(values).sum())
+                if c[component.names.index(name)] < 0 and abs(own + sum(values)) <= 1e-9 * size:
+                    found[f'the {of}{place} would be less than 0 with what the model has'] = None
+    values_of = component.values(c)
+    for parameter in component.effect.linear:
+        bounded = parameter.of(units_of(design.given, component.drive).turns)
+        for bound in (bounded.lower, bounded.upper):
+            if bound and abs(values_of[parameter.name] - bound) <= 1e-9 * abs(bound):
+                found[f'the {parameter.name}{place} would be beyond {bound:g} '
+                      f'{bounded.unit}'] = None
     return tuple(found)
 
 

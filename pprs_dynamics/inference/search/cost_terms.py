@@ -28,8 +28,6 @@ class CostTerms:
         Variants and shapes, among those tried.
     signs : float
         Less than nothing for physical ones.
-    discrepancy : float
-        What the lack of fit of other effects makes of it; 0, as it is judged after the fit.
     feasibility : float
         By how much possible bodies, and friction and inertia that are not negative, fit worse
         than those of the least squares.
@@ -44,7 +42,6 @@ class CostTerms:
     drives: float = 0.0
     shapes: float = 0.0
     signs: float = 0.0
-    discrepancy: float = 0.0
     feasibility: float = 0.0
     linearisation: float = 0.0
 

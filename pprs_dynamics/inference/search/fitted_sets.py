@@ -121,7 +121,7 @@ class FittedSets:
             moved = replace(fitted, fit=possible)
             signs = CostTerms(signs=self._signs(moved, fit.covariance) - fitted.terms.signs)
             fitted = replace(moved, terms=fitted.terms + signs + feasible)
-        return replace(fitted, barred=self._barred(fitted))
+        return replace(fitted, barred=self.form_errors.reason(fitted))
 
     def pruned(self, fitted: CandidateSet) -> CandidateSet:
         """Return a set without the candidates that do not pay in it."""
@@ -154,16 +154,6 @@ class FittedSets:
     def _terms(self, fit: JointFit) -> CostTerms:
         left = self.regression.misfit(fit)
         return CostTerms(fit=left, coefficients=fit.deviance - left)
-
-    def _barred(self, fitted: CandidateSet) -> str:
-        """Return why a set is inadmissible; '' where it is admissible.
-
-        A candidate that is no more than the form error of others makes it so.
-        """
-        for candidate in fitted.candidates:
-            if names := self.form_errors.hide(fitted, candidate):
-                return f'{candidate.name} may be the form error of {", ".join(names)}'
-        return ''
 
     def _nuisance_blocks(self, candidates: Candidates, fit: JointFit) -> Nuisance:
         """Return columns for what effects leave open, in proportion to their fitted force.
@@ -253,7 +243,7 @@ class FittedSets:
             if moved is None:
                 return fitted
             after = self.evaluate(moved)
-            if after.cost > fitted.cost - LEAST_IMPROVEMENT:
+            if not after.cost < fitted.cost - LEAST_IMPROVEMENT:
                 return fitted
             fitted = after
         return fitted

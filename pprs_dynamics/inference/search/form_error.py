@@ -1,19 +1,19 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The error that idealised forms leave, and whether a candidate is no more than that.
+"""The form error of idealised effects, and whether a candidate is no more than that.
 
-Friction, springs and cords of the catalogue have nearly the form of real ones. They leave up to
-`Decisions.form_share` of their force. Masses, gravity and sensors are exact. A candidate of a set
-is inadmissible where its force beyond all other candidates is smaller than the form error of
-these: the data cannot separate it from that error. Beside others the input model's own friction
-counts with `Decisions.own_form_share`, too.
+Real friction, springs and cords differ from the catalogue's forms by up to `Decisions.form_share`
+of their force. Masses, gravity and sensors are exact. A candidate is inadmissible if its force
+beyond all other candidates is smaller than the form error of these: the data cannot separate the
+two. Beside other candidates the input model's friction counts with `Decisions.own_form_share`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
@@ -21,11 +21,10 @@ from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, E
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
-# Independent shapes over which a form error is spread, of which a candidate is one.
-DIRECTIONS = 4
 # Ends of the names of coefficients that are of one direction, and of the other.
 SIDES = {'forward': 'backward', 'backward': 'forward', 'driving': 'driven_back',
          'driven_back': 'driving'}
+Squares = dict[int, float]  # whitened squares of a force by drive
 
 
 class FormErrors:
@@ -39,46 +38,71 @@ class FormErrors:
     """
 
     def __init__(self, design: Design, regression: Regression, decisions: Decisions) -> None:
-        self.design, self.regression, self.decisions = design, regression, decisions
+        self.regression, self.decisions = regression, decisions
         # Reference runs contain what the forces of the input model lack of real ones.
         given = () if design.carried is not None else design.given.effects
-        self.given = [effect.name for effect in given
-                      if isinstance(effect, CatalogueEffect) and effect.idealised
-                      and effect.name in regression.residuals.parts]
-        self.own = [effect.name for effect in given
-                    if not isinstance(effect, CatalogueEffect) and effect.name.endswith('friction')
-                    and effect.name in regression.residuals.parts]
-        self._forces = {
-            (name, d): regression.series[d].transform(regression.residuals.parts[name][:, d])
-            for name in (*self.given, *self.own) for d in regression.drives}
+        self._shares = {
+            effect.name: decisions.form_share if isinstance(effect, CatalogueEffect)
+            else decisions.own_form_share
+            for effect in given if effect.name in regression.residuals.parts and (
+                effect.idealised if isinstance(effect, CatalogueEffect)
+                else effect.name.endswith('friction'))}
+        self._own = {effect.name for effect in given if not isinstance(effect, CatalogueEffect)}
+        self._given = {
+            name: {d: regression.series[d].sums(regression.series[d].transform(
+                regression.residuals.parts[name][:, d]) ** 2) for d in regression.drives}
+            for name in self._shares}
 
-    def hide(self, fitted: CandidateSet, candidate: Candidate) -> tuple[str, ...]:
-        """Return the effects whose form error may be all of a candidate; none where it is more."""
-        if isinstance(candidate, EffectCandidate) and self._is_symmetric(fitted, candidate):
-            return ('friction that is the same in both directions',)
-        drives = {d for block in fitted.blocks_of(candidate) for d in block.rows}
-        allowed, names = self.beside(fitted, candidate, drives, len(fitted.candidates) > 1)
-        return names if self._beyond_others(fitted, candidate) < allowed else ()
+    def reason(self, fitted: CandidateSet) -> str:
+        """Return which candidate may be the form error of others; '' for none."""
+        forces = self.forces(fitted)
+        for candidate in fitted.candidates:
+            names: tuple[str, ...] = ()
+            if isinstance(candidate, EffectCandidate) and self._is_symmetric(fitted, candidate):
+                names = ('friction that is the same in both directions',)
+            else:
+                drives = {d for block in fitted.blocks_of(candidate) for d in block.rows}
+                allowed, others = self.beside(fitted, candidate, drives,
+                                              len(fitted.candidates) > 1, forces)
+                if others and self._beyond_others(fitted, candidate) < allowed:
+                    names = others
+            if names:
+                return f'{candidate.name} may be the form error of {", ".join(names)}'
+        return ''
+
+    def forces(self, fitted: CandidateSet) -> list[tuple[EffectCandidate, Squares]]:
+        """Return the idealised effects of a set with the squares of their forces."""
+        return [(effect, self._squares(fitted, effect)) for effect in fitted.effects
+                if effect.effect.idealised]
 
     def beside(self, fitted: CandidateSet, candidate: Candidate, drives: set[int],
-               with_own: bool = True) -> tuple[float, tuple[str, ...]]:
+               with_own: bool = True, forces: list[tuple[EffectCandidate, Squares]] | None = None,
+               ) -> tuple[float, tuple[str, ...]]:
         """Return the whitened square of the form errors beside a candidate, and whose they are.
 
-        `with_own`: with that of the input model's own friction.
+        Parameters
+        ----------
+        fitted : CandidateSet
+        candidate : Candidate
+        drives : set of int
+            On which they count.
+        with_own : bool
+            With that of the input model's friction.
+        forces : list, optional
+            Of `forces`, where it is known.
         """
-        exact = isinstance(candidate, EffectCandidate) and not (
+        is_exact = isinstance(candidate, EffectCandidate) and not (
             candidate.effect.idealised or candidate.effect.shows_at_reversals)
-        share = (self.decisions.exact_share if exact else
-                 self.decisions.form_share / DIRECTIONS ** 0.5)
-        squares: dict[str, float] = {}
-        for other in fitted.effects:
-            if other is not candidate and other.effect.idealised:
-                squares[other.name] = share ** 2 * sum(
-                    self._square(fitted, block, drives) for block in fitted.blocks_of(other))
-        squares |= {name: share ** 2 * self._given(fitted, name, drives) for name in self.given}
-        if with_own and not exact:
-            squares |= {name: self.decisions.own_form_share ** 2 * self._given(
-                fitted, name, drives) for name in self.own}
+        share = self.decisions.exact_share if is_exact else self.decisions.form_share
+        squares = {
+            other.name: share ** 2 * sum(size for d, size in of_drives.items() if d in drives)
+            for other, of_drives in (self.forces(fitted) if forces is None else forces)
+            if other is not candidate}
+        for name, by_band in self._given.items():
+            is_own = name in self._own
+            if not is_own or (with_own and not is_exact):
+                squares[name] = (self._shares[name] if is_own else share) ** 2 * sum(
+                    float(by_band[d] @ self.regression.weights(fitted.fit, d)) for d in drives)
         return sum(squares.values()), tuple(name for name, square in squares.items() if square > 0)
 
     def _is_symmetric(self, fitted: CandidateSet, candidate: EffectCandidate) -> bool:
@@ -96,34 +120,30 @@ class FormErrors:
             c = fitted.fit.of(block)
             mirrored = c.copy()
             mirrored[:len(known)] = c[[known.index(other) for other in others]]
-            for d in block.rows:
-                gram = np.tensordot(self.regression.weights(fitted.fit, d),
-                                    self.regression.products(block, [block], d)[0], 1)
-                half += float((c - mirrored) @ gram @ (c - mirrored)) / 4
-                whole += float((c + mirrored) @ gram @ (c + mirrored)) / 4
+            half += sum(self._of_block(fitted, block, (c - mirrored) / 2).values())
+            whole += sum(self._of_block(fitted, block, (c + mirrored) / 2).values())
         return half < self.decisions.form_share ** 2 * whole
-
-    def _given(self, fitted: CandidateSet, name: str, drives: set[int]) -> float:
-        """Return the whitened square of a part of the input model's force on some drives."""
-        return sum(float(np.sum(self._forces[name, d] ** 2 * self.regression.series[d].spread(
-            self.regression.weights(fitted.fit, d)))) for d in drives)
 
     def _beyond_others(self, fitted: CandidateSet, candidate: Candidate) -> float:
         """Return the whitened square of a candidate's force that no refit of others replaces."""
         blocks = fitted.blocks_of(candidate)
         if any(block.mean is not None for block in blocks):
-            return sum(self._square(fitted, block, set(block.rows)) for block in blocks)
+            return sum(self._squares(fitted, candidate).values())
         index = fitted.fit.index_of(blocks)
         c = fitted.fit.coefficients[index]
         # Constraints hold some coefficients, of which the variance is 0.
         inverse = np.linalg.pinv(fitted.fit.covariance[np.ix_(index, index)], hermitian=True)
         return float(c @ inverse @ c)
 
-    def _square(self, fitted: CandidateSet, block: Block, drives: set[int]) -> float:
-        """Return the whitened square of a block's force on some drives."""
-        total, c = 0.0, fitted.fit.of(block)
-        for d in drives & set(block.rows):
-            gram = np.tensordot(self.regression.weights(fitted.fit, d),
-                                self.regression.products(block, [block], d)[0], 1)
-            total += float(c @ gram @ c)
-        return total
+    def _squares(self, fitted: CandidateSet, candidate: Candidate) -> Squares:
+        """Return the whitened squares of a candidate's force."""
+        found: Squares = {}
+        for block in fitted.blocks_of(candidate):
+            for d, size in self._of_block(fitted, block, fitted.fit.of(block)).items():
+                found[d] = found.get(d, 0.0) + size
+        return found
+
+    def _of_block(self, fitted: CandidateSet, block: Block, c: Array) -> Squares:
+        """Return the whitened squares of a block's force with coefficients c (k,)."""
+        return {d: float(self.regression.weights(fitted.fit, d) @ (
+            self.regression.products(block, [block], d)[0] @ c @ c)) for d in block.rows}

@@ -101,10 +101,10 @@ class Search:
         while True:
             before = self.best.cost
             self._fit(self._additions(with_patterns))
-            if self.best.cost > before - LEAST_IMPROVEMENT:
+            if not self.best.cost < before - LEAST_IMPROVEMENT:
                 self._fit(self._replacements(self.best))
             simplified(self.fits, self.best)
-            if (self.best.cost > before - LEAST_IMPROVEMENT
+            if (not self.best.cost < before - LEAST_IMPROVEMENT
                     or (until_nonlinear and self.best.is_nonlinear)):
                 return
 
@@ -193,7 +193,7 @@ class Search:
                 self.fits.evaluate((candidate,))
             after = min((fitted for fitted in self.fits.sets if fitted.candidates),
                         key=lambda fitted: fitted.cost)
-            if after.cost > best.cost - LEAST_IMPROVEMENT:
+            if not after.cost < best.cost - LEAST_IMPROVEMENT:
                 return best
             self.fits.refined(after)
 

@@ -149,7 +149,8 @@ class DriveModel:
     @property
     def kind(self) -> str:
         """One of 'platform', 'axis', 'arm'."""
-        return _kind(self.values)
+        return (PLATFORM if self.robot.structure is None else ARM if self.is_described
+                else SINGLE_AXIS)
 
     @property
     def drives(self) -> tuple[str, ...]:
@@ -180,7 +181,7 @@ class DriveModel:
     @property
     def is_described(self) -> bool:
         """Whether its bodies and joints are those of a description, as of a URDF."""
-        return self.block == ROBOT
+        return self.block not in ('', AXIS)
 
     @property
     def units(self) -> tuple[DriveUnits, ...]:
@@ -285,8 +286,10 @@ class DriveModel:
 
     @cached_property
     def fingerprint(self) -> str:
-        """SHA-256 of the values in force, which changes with every parameter."""
-        values = dict(self.values)
+        """SHA-256 of the values in force: it changes with every parameter, not with the ledger."""
+        # A node has no ledger, and an empty list where a file says nothing.
+        values = {key: value for key, value in self.values.items()
+                  if value not in ([], ()) and not key.startswith('history.')}
         if self.content:  # the same wherever the files lie
             values.update({key: self.content for key in FILES if values.get(key)})
         text = json.dumps(values, sort_keys=True, default=str)

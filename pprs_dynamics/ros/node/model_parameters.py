@@ -22,6 +22,7 @@ from pprs_dynamics.physics.model.keys import (
     NODE_KEYS,
     NODE_PREFIXES,
 )
+from pprs_dynamics.ros.node.model_history import ModelHistory
 from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
     added_descriptor,
@@ -125,6 +126,8 @@ class ModelParameters(Followed[tuple[DriveModel, dict[str, Any]]]):
         The node's own, which are declared before the model's.
     changed : callable
         Called after every change that was accepted.
+    drives : bool
+        Whether the node drives a machine, so that it owns the history of the model.
 
     Attributes
     ----------
@@ -132,6 +135,7 @@ class ModelParameters(Followed[tuple[DriveModel, dict[str, Any]]]):
         In force now; of one kind, and of the same drives, as long as the node runs.
     node_values : dict
         Values of the node's own parameters.
+    history : ModelHistory or None
     taken_from_paper : list of str
         Keys without a value of their own; none where a whole model was given.
 
@@ -145,8 +149,9 @@ class ModelParameters(Followed[tuple[DriveModel, dict[str, Any]]]):
 
     def __init__(
         self, node: Node, parameters: Iterable[NodeParameter], changed: Callable[[], None],
+        drives: bool = False,
     ) -> None:
-        self._changed = changed
+        self._changed, self.history = changed, ModelHistory(node) if drives else None
         parameters = (*parameters, DEMO)
         declare_node_parameters(node, parameters)
         given = overrides(node)
@@ -203,7 +208,9 @@ class ModelParameters(Followed[tuple[DriveModel, dict[str, Any]]]):
 
     def _apply(self, checked: tuple[DriveModel, dict[str, Any]],
                changes: Iterable[Parameter]) -> None:
-        self.model, self.node_values = checked
+        before, (self.model, self.node_values) = self.model, checked
+        if self.history is not None and self.model.fingerprint != before.fingerprint:
+            self.history.note(before.values, changes)
         for change in changes:
             if change.name not in NAMES and change.name.startswith('effects.') and (
                     self._node.has_parameter(change.name)):

@@ -215,7 +215,7 @@ def in_declared_type(node: Node, change: Parameter) -> Parameter:
     """Return a change with decimal numbers where whole ones, or nothing, stand for them."""
     kind = (node.get_parameter(change.name).type_ if node.has_parameter(change.name)
             else _added_type(change.name, change.value))
-    value = _plain(change.value)
+    value = plain_value(change.value)
     decimal = _decimal(kind, value)
     return change if decimal is value and value != [] else Parameter(change.name, kind, decimal)
 
@@ -261,13 +261,13 @@ def refuse_unknown(node: Node) -> None:
 def overrides(node: Node) -> dict[str, Any]:
     """Return what was given in files and on the command line, None for an empty list."""
     given = parameter_overrides(node, lambda: {*NAMES, *NODE_KEYS, *names_given()})
-    return {name: _plain(value) for name, value in given.items()}
+    return {name: plain_value(value) for name, value in given.items()}
 
 
 def current_values(node: Node, changes: Iterable[Parameter] = ()) -> dict[str, Any]:
     """Return all declared parameters with some of them changed, flat; those not set left out."""
     merged = {**node.get_parameters_by_prefix(''), **{change.name: change for change in changes}}
-    return {name: _plain(parameter.value) for name, parameter in merged.items()
+    return {name: plain_value(parameter.value) for name, parameter in merged.items()
             if parameter.type_ != Parameter.Type.NOT_SET}
 
 
@@ -320,6 +320,6 @@ def with_hint(error: Exception) -> str:
     return str(error)
 
 
-def _plain(value: Any) -> Any:
+def plain_value(value: Any) -> Any:
     """Return a list for the arrays that rclpy keeps."""
     return value.tolist() if isinstance(value, array) else value

@@ -11,7 +11,7 @@ free joints draw it, and two balls are cut.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -109,7 +109,7 @@ class ExportedRobot:
     ----------
     name : str
     mechanism : Mechanism
-    joints : dict of str to dict
+    joints : mapping of str to mapping
         See `Expressed`.
     bodies : tuple of Body
         Parents first.
@@ -117,7 +117,7 @@ class ExportedRobot:
 
     name: str
     mechanism: Mechanism
-    joints: dict[str, dict[str, float]]
+    joints: Mapping[str, Mapping[str, float]]
     bodies: tuple[Body, ...]
 
     @property
@@ -140,9 +140,15 @@ def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
     """
     model = expressed.model
     robot = with_bodies(model.robot, model.effects)
-    name, mechanism = ((model.block, robot) if model.moves_joints
-                       else ('three_pprs', _platform(robot, model, kind)))
-    return ExportedRobot(name, mechanism, expressed.joints, tuple(_bodies(mechanism)))
+    if model.moves_joints:
+        return described(model.block, robot, expressed.joints)
+    return described('three_pprs', platform_mechanism(robot, model, kind), expressed.joints)
+
+
+def described(name: str, mechanism: Mechanism, joints: Mapping[str, Mapping[str, float]] = {},
+              ) -> ExportedRobot:
+    """Return a mechanism as files of simulators describe it; `joints` as of `Expressed`."""
+    return ExportedRobot(name, mechanism, joints, tuple(_bodies(mechanism)))
 
 
 def _bodies(mechanism: Mechanism) -> Iterator[Body]:
@@ -187,7 +193,7 @@ def _inertia(name: str, parameters: Array) -> tuple[float, Array, Array, Array]:
     return max(mass, LEAST), centre, moments, axes
 
 
-def _platform(robot: ThreePprs, model: DriveModel, kind: str) -> Mechanism:
+def platform_mechanism(robot: ThreePprs, model: DriveModel, kind: str) -> Mechanism:
     """Return the 3-PPRS."""
     geometry, masses = robot.geometry, robot.masses
     R, r, l = geometry.base_radius, geometry.platform_radius, geometry.rod_length  # noqa: E741

@@ -101,7 +101,7 @@ class Hub:
         self.is_over = True
         self._work.set()
         if self.session is not None:
-            for job in list(self.session.jobs.values()):
+            for job in list(self.session.jobs.of_kind.values()):
                 job.cancel()
                 with suppress(Exception):  # whatever it ended with
                     job.result(LAST_WORDS)
@@ -113,7 +113,7 @@ class Hub:
     @contextmanager
     def steady(self) -> Iterator[None]:
         """Keep the state as it is while the block lasts, for one who looks at it."""
-        with self._steady, self.session.steady() if self.session else nullcontext():
+        with self._steady, self.session.ticks.steady() if self.session else nullcontext():
             yield
 
     # Those who listen
@@ -155,7 +155,7 @@ class Hub:
         Raises
         ------
         PprsError
-            As `Session.add`.
+            As `Recordings.add`.
         """
         with self._opening:
             if self.session is None:
@@ -164,7 +164,7 @@ class Hub:
                                        'not be held out')
                 self._use(Session.of(self.inputs.with_more(path)))
             else:
-                self.session.add(path, is_held_out)
+                self.session.recordings.add(path, is_held_out)
         self._changed()
 
     @contextmanager
@@ -199,7 +199,8 @@ class Hub:
     def save(self, path: Path) -> None:
         """Write the session; errors as `Session.save`."""
         session = self.the_session
-        for name in (*session.inputs.recordings, *session.inputs.validation):
+        inputs = session.ticks.inputs
+        for name in (*inputs.recordings, *inputs.validation):
             if Path(name).is_relative_to(self._uploads.name):
                 raise SessionError(f'{Path(name).name} came from the browser and is gone with the '
                                    'server, must be opened from a folder for the session to be '
@@ -208,7 +209,7 @@ class Hub:
 
     def _use(self, session: Session) -> None:
         self.session, self.failure = session, ''
-        session.subscribe(self._changed)
+        session.ticks.subscribe(self._changed)
 
     def _changed(self) -> None:
         self._work.set()
@@ -238,9 +239,9 @@ class Hub:
             session = self.session
             if session is None or self.is_over:
                 continue
-            if not session.view_state.is_settled:
+            if not session.ticks.view.is_settled:
                 try:
-                    session.settle()
+                    session.ticks.settle()
                     self.failure = ''
                 except Exception as error:
                     self._fail(error)
@@ -251,7 +252,7 @@ class Hub:
         if self.session is not None and self._is_unjudged:
             self._is_unjudged = False
             try:
-                self.session.find_mistakes()
+                self.session.recordings.find_mistakes()
             except PprsError as error:
                 self.failure = str(error)
                 self.notify()
@@ -265,7 +266,7 @@ class Hub:
 
     def _diagnose(self) -> None:
         session = self.session
-        if session is not None and session.fits is not self._diagnosed and not any(
-                job.is_running for job in session.jobs.values()):
-            self._diagnosed = session.fits
-            session.diagnose()
+        if session is not None and session.ticks.fits is not self._diagnosed and not any(
+                job.is_running for job in session.jobs.of_kind.values()):
+            self._diagnosed = session.ticks.fits
+            session.jobs.diagnose()

@@ -26,9 +26,11 @@ class BaseTilt(BodyEffect):
     acts_in = frozenset({PLATFORM, ARM})
     idealised: ClassVar[bool] = False
     nonlinear: ClassVar[bool] = True
+    # A base is levelled to a degree; what leans by more than 20 stands so on purpose: gravity in
+    # the model says how.
     linear = tuple(
-        Parameter(axis, f'alpha_{axis}', 'rad', f'turn of gravity about {axis} of base', -3.2, 3.2,
-                  scale=0.01, expected=(0.1, 0.1))
+        Parameter(axis, f'alpha_{axis}', 'rad', f'turn of gravity about {axis} of base', -0.35,
+                  0.35, scale=0.01, expected=(0.1, 0.1))
         for axis in 'xy')
     card = Card(
         'g -> R_y(alpha_y) R_x(alpha_x) g, in base',

@@ -25,8 +25,9 @@ class EffortGain(MeasurementEffect):
     name: ClassVar[str] = 'effort_gain'
     idealised: ClassVar[bool] = False
     nonlinear: ClassVar[bool] = True
-    # Makers state torque constants within some 10 %, as a limit.
-    linear = (Parameter('gain', 'g', '1', 'by which effort is measured too large', -0.9, 9.0,
+    # Makers state torque constants within some 10 %, as a limit. A factor of more than 1.5 is
+    # another unit or motor, which belongs into the model.
+    linear = (Parameter('gain', 'g', '1', 'by which effort is measured too large', -1 / 3, 0.5,
                         scale=0.05, expected=(0.04, 0.04)),)
     card = Card(
         'measured effort = (1 + g) F',

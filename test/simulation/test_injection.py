@@ -15,16 +15,26 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.mechanism.description import body_at
+from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.simulation.injected_effect import InjectedEffectError
-from pprs_dynamics.simulation.joint_forms import FORMS
-from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
-from pprs_dynamics.simulation.mechanism_run import NAMES, draw_motion, simulate_mechanism
+from pprs_dynamics.simulation.engine import MechanismEngine
+from pprs_dynamics.simulation.injected_forms import FORMS, UNKNOWN, InjectedEffectError
+from pprs_dynamics.simulation.injection import (
+    NAMES,
+    Choice,
+    Injection,
+    PlainRobot,
+    draw_motion,
+    named,
+    simulate_mechanism,
+)
+from pprs_dynamics.simulation.platform import as_mechanism
 
 
 @pytest.fixture(scope='module')
@@ -37,7 +47,6 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> DriveModel:
         'links.moment': tuple(mass[:, 1:4].ravel()),
         'links.inertia': tuple(mass[:, 4:][:, [0, 2, 5, 1, 3, 4]].ravel()),
         'robot.armature': (0.4, 0.2, 1.0)}, described.source)
-    assert isinstance(found, DriveModel)
     return found
 
 
@@ -61,7 +70,7 @@ def test_a_hidden_payload_is_a_point_at_the_tool(model: DriveModel) -> None:
     motion = draw_motion(model, 10.0, 1)
     engine = MechanismEngine(model)
     before = engine.torques(motion)
-    engine.add_payload(1.5, np.zeros(3))
+    engine.carry(model.robot.structure.tool, body_at(1.5, (0.0, 0.0, 0.0), np.zeros((3, 3))))
     loaded = DriveModel.from_parameters({**model.values, 'effects.active': ['payload_mass'],
                           'effects.payload_mass.mass': 1.5}, model.source)
     assert engine.torques(motion) - before == pytest.approx(
@@ -85,7 +94,11 @@ def test_a_hidden_link_mass_is_that_of_the_model(model: DriveModel) -> None:
     motion = draw_motion(model, 10.0, 1)
     engine = MechanismEngine(model)
     before = engine.torques(motion)
-    engine.add_to_link(1, 0.7)
+    robot = model.robot
+    m, *moment = robot.inertial[1, :4]
+    frame = robot.structure.links[robot.body_names[1]][1].inverse
+    engine.carry(robot.body_names[1], body_at(0.7, tuple(frame.of_point(
+        np.array(moment) / m)), np.zeros((3, 3))))
     loaded = DriveModel.from_parameters({**model.values, 'effects.active': ['link_mass'],
                           'effects.link_mass.beam.mass': 0.7}, model.source)
     assert engine.torques(motion) - before == pytest.approx(
@@ -118,7 +131,8 @@ def plain_of(wrist: DriveModel) -> Callable[[float], Any]:
     return cache(lambda duration: simulate_mechanism(wrist, (), 4, noise=0.0, duration=duration))
 
 
-@pytest.mark.parametrize('name', [name for name in NAMES if name != 'joint_friction'])
+@pytest.mark.parametrize('name', [
+    name for name in NAMES if name not in ('joint_friction', 'joint_spring')])
 def test_every_hidden_effect_shows(
     wrist: DriveModel, plain_of: Callable[[float], Any], name: str,
 ) -> None:
@@ -135,14 +149,15 @@ def test_every_hidden_effect_shows(
         assert pushed > 0.05
     assert hidden.effects[0]['name'] == name
     assert (hidden.effects[0]['drives'] is None) == (
-        name not in {*FORMS, 'eccentric_encoder', 'effort_gain', 'effort_filter', 'time_delay',
-                     'homing_error', 'lost_motion', 'current_gain',
+        name not in {*FORMS, *UNKNOWN, 'eccentric_encoder', 'effort_gain', 'effort_filter',
+                     'time_delay', 'homing_error', 'lost_motion', 'current_gain',
                      'elastic_joint'})
 
 
 AXIS = DriveModel.load('config/single_axis.yaml')
 NOT_ON_AN_AXIS = ('counterbalance', 'link_mass', 'base_tilt', 'external_wrench',
-                  'eccentric_encoder', 'joint_friction', 'coupled_drives')
+                  'eccentric_encoder', 'joint_friction', 'coupled_drives', 'payload_offset',
+                  'platform_inertia', 'payload_pick_up', 'joint_spring', 'tool_drag')
 
 
 def test_a_simulated_axis_moves_its_mass_against_the_friction_of_its_file() -> None:
@@ -177,7 +192,6 @@ def wrist(model: DriveModel) -> DriveModel:
     """Return the arm with a motor that turns with two joints."""
     found = DriveModel.from_parameters({**model.values, 'friction.motors.wrist.turn': 1.0,
                          'friction.motors.wrist.swing': 1.0}, model.source)
-    assert isinstance(found, DriveModel)
     return found
 
 
@@ -207,8 +221,8 @@ def test_the_command_writes_recording_and_truth(tmp_path: Path,
                  '--duration', '5', '--json', str(truth)]) == 0
     assert json.loads(truth.read_text())['effects'][0]['parameters']['mass'] > 0
     assert main(['simulate', '--model', path, '--output', output + '2.csv', '--effect',
-                 'tool_drag']) == 2
-    assert 'no injected effect of such a robot' in capsys.readouterr().err
+                 'joint_spring']) == 2
+    assert 'needs a passive joint' in capsys.readouterr().err
 
 
 def test_statements_have_the_units_of_joints(model: DriveModel, tmp_path: Path,
@@ -226,3 +240,56 @@ def test_statements_have_the_units_of_joints(model: DriveModel, tmp_path: Path,
     assert 'N m' in said['turn']
     assert 'N m' not in said['reach']
     assert ' N' in said['reach']
+
+
+PLATFORM = DriveModel.load('config/paper.yaml')
+
+
+@pytest.mark.parametrize('change', [
+    {}, {'masses.centre': [0.01, -0.02, 0.03], 'masses.rods': [0.1, 0.3, 0.5]},
+    {'gravity': [1.0, -2.0, -9.0], 'friction.reversal_velocity': 0.0002},
+    {'geometry.platform_angles': [0.1, 2.2, 4.1], 'masses.slides': [0.0, 0.2, 1.0]},
+    {'geometry.elbow': 'down', 'limits.lift_stroke': [-0.1, 1.5]},
+], ids=['paper', 'masses', 'gravity', 'angles', 'elbow down'])
+def test_a_simulated_platform_needs_the_forces_of_the_paper(change: dict[str, Any]) -> None:
+    model = DriveModel.from_parameters({**PLATFORM.values, **change})
+    motion = Excitation(seed=3).motion(6.0 + np.arange(200) / 100)
+    forces, state = model.drive_forces(motion), model.mechanism(motion)
+    plain = PlainRobot(as_mechanism(model), JointMotion(
+        state.position, state.velocity, state.acceleration, motion.time))
+    assert np.abs(plain.effort - forces.total).max() < 1e-8
+
+
+@pytest.mark.parametrize('name', [name for name in NAMES if name not in (
+    'counterbalance', 'eccentric_encoder', 'coupled_drives', 'elastic_joint')])
+def test_an_injected_effect_changes_its_drives_alone_and_repeats(name: str) -> None:
+    plain, effect = plain_platform(), Choice(name, np.random.default_rng(1))
+    first, again = (Injection(plain, [effect], np.random.default_rng(2)) for _ in range(2))
+    np.testing.assert_array_equal(first.efforts, again.efforts)
+    added = np.abs(first.efforts - plain.effort).max(axis=0)
+    shifted = np.abs(first.beside).max(axis=0)
+    (truth,) = first.truths
+    acts = np.isin(PLATFORM.drives, truth['drives'] or PLATFORM.drives)
+    assert added.max() > 0.01 or shifted.max() > 1e-4
+    assert np.all(added[~acts] < 1e-9)
+    assert np.all(shifted[~acts] == 0)
+
+
+@cache
+def plain_platform() -> PlainRobot:
+    time = np.arange(300) / 100
+    state = PLATFORM.mechanism(Excitation(seed=3).motion(time))
+    return PlainRobot(as_mechanism(PLATFORM), JointMotion(
+        state.position, state.velocity, state.acceleration, time))
+
+
+def test_given_drives_have_the_effect() -> None:
+    run = Injection(plain_platform(), [named('effort_offset:lift_1,slide_2',
+                                             np.random.default_rng(0), 1.0)],
+                    np.random.default_rng(2))
+    assert run.truths[0]['drives'] == ['lift_1', 'slide_2']
+    for words, text in (('viscous', 'did you mean'), ('base_tilt:lift_1', 'acts in no drive'),
+                        ('effort_offset:x', 'acts in a drive')):
+        with pytest.raises(InjectedEffectError, match=text):
+            Injection(plain_platform(), [named(words, np.random.default_rng(0), 1.0)],
+                      np.random.default_rng(2))
