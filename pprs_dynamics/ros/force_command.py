@@ -11,16 +11,23 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import LimitError, PprsError
 from pprs_dynamics.measurement.files.samples import Indices
 from pprs_dynamics.physics.mechanism.drive_path import DrivePath
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.pose_spline import load_splines
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState
 from pprs_dynamics.physics.model.limits import DriveLimits
-from pprs_dynamics.ros.messages.conversions import NANOSECONDS
+from pprs_dynamics.ros.messages.conversions import (
+    NANOSECONDS,
+    RobotNames,
+    write_joint_trajectory,
+)
+from pprs_dynamics.ros.messages.conversions import time as time_of
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import REJECT, SPLINE, Motion, TrajectoryRequest
 from pprs_dynamics.ros.node.managed_node import AUTOSTART
@@ -121,6 +128,16 @@ class DriveTrajectory(NamedTuple):
     def ends_at_rest(self) -> bool:
         """Whether the last point stands, by joint_trajectory_controller's own bound."""
         return bool((np.abs(self.drive_motion[1][-1]) <= STILL).all())
+
+    def message(self, start: int, names: RobotNames) -> JointTrajectory:
+        """Return the message that starts at a time [ns]; 0: when it arrives."""
+        return write_joint_trajectory(JointMotion(*self.drive_motion), time_of(start),
+                                      self.offsets.tolist(), names, self.effort)
+
+    @classmethod
+    def holding(cls, held: ForceCommand) -> DriveTrajectory:
+        """Return the trajectory of one point that holds a pose."""
+        return cls(np.zeros(1, np.int64), held.forces.drive_motion, held.effort)
 
     def ends_as(self, held: ForceCommand) -> bool:
         """Return whether the last point is a pose at rest with the efforts of a command."""

@@ -79,7 +79,7 @@ class SimulatedRobotNode(ExplainsRefusals):
         super().__init__('simulated_robot', allow_undeclared_parameters=True, **options)
         self._log = ThrottledLog(self)
         node_values = declare_node_parameters(self, PARAMETERS)
-        declare_model(self)
+        declare_model(self, self.arguments)
         values = {name: value for name, value in current_values(self).items()
                   if name not in node_values}
         self._model = DriveModel.from_parameters(values)

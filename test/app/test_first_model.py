@@ -371,25 +371,13 @@ def two_arms(path: Path) -> Path:
     return path
 
 
-def test_of_two_arms_the_recorded_one_is_taken_and_without_a_recording_one_is_asked_for(
-    tmp_path: Path,
-) -> None:
+def test_of_two_arms_the_recorded_one_is_taken(tmp_path: Path) -> None:
     robot = two_arms(tmp_path / 'two.urdf')
-    asked: list[str] = []
-
-    def ask(question: str, answers: Any) -> int:
-        asked.extend(answers)
-        return 1
-
-    chosen = first_model(robot, ask=ask)
-    assert len(asked) == 2
-    assert chosen.model.values['robot.tool'] in asked[1]
     assert any('--tool' in note for note in first_model(robot).notes)
     right = tuple(f'right_{joint}' for joint in JOINTS)
-    first = first_model(robot, bag(tmp_path, right), ask=ask)
+    first = first_model(robot, bag(tmp_path, right))
     assert first.model.drives == right
     assert first.model.values['robot.tool'] == 'right_flange'
-    assert len(asked) == 2
 
 
 def test_what_cannot_be_told_is_refused_with_what_to_write(robot: Path, tmp_path: Path) -> None:

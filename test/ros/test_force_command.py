@@ -92,18 +92,6 @@ def test_a_change_during_a_ramp_goes_on_from_where_that_is() -> None:
         node.answer(asked).effort, MODEL.drive_forces(asked.motion).total)
 
 
-def test_without_a_ramp_and_before_the_first_command_a_change_is_at_once() -> None:
-    asked = request()
-    expected = HEAVY.drive_forces(asked.motion).total
-    for ramp, has_answered in ((0.0, True), (2.0, False)):
-        own = {**OWN, 'ramp_time': ramp}
-        node = Feedforward(MODEL, own, Clock())
-        if has_answered:
-            node.answer(asked)
-        node.use(HEAVY, own)
-        np.testing.assert_array_equal(node.answer(asked).effort, expected)
-
-
 def test_what_is_gone_over_stays_within_the_limits() -> None:
     asked = request()
     forces = MODEL.drive_forces(asked.motion).total[0]
@@ -167,16 +155,6 @@ def test_of_a_piece_the_first_point_is_remembered_and_what_is_foreseen_is_not() 
                                           STEP * np.arange(count)) for count in (6, 1))
         np.testing.assert_array_equal(pieces.answer(piece).effort[:1],
                                       points.answer(point).effort)
-
-
-def test_what_is_remembered_goes_by_the_time_since_the_first_message() -> None:
-    """The same, whenever the node was started, and as one recording of all of it."""
-    for start in (0, 5_000_000_000):
-        node = Feedforward(REMEMBERS, OWN)
-        found = [node.answer(TrajectoryRequest(request(1.0 + 0.01 * k).motion, start + k * STEP,
-                                               np.array([0]))).effort[0] for k in range(40)]
-        motion = request(1.0, 40).motion.with_time(0.01 * np.arange(40))
-        np.testing.assert_allclose(found, REMEMBERS.drive_forces(motion).total, atol=1e-9)
 
 
 @pytest.mark.parametrize('moment', [0.0, 1.3, 3.0])

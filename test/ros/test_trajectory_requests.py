@@ -84,29 +84,9 @@ def test_derivatives_that_are_missing_are_those_of_a_spline_through_the_position
         np.testing.assert_allclose(found.motion.velocity, RATES * np.cos(angle), atol=1e-15)
 
 
-def test_what_is_given_at_some_points_is_kept_there() -> None:
-    some = message()
-    for point in some.points[5:]:
-        point.accelerations = []
-    some.points[2].accelerations = [99.0, 98.0, 97.0]
-    found: Any = read_joint_trajectory(some, JOINTS, 7, 'spline')
-    assert found.motion.acceleration[2].tolist() == [99.0, 98.0, 97.0]
-    np.testing.assert_allclose(found.motion.acceleration[5:],
-                               -RATES ** 2 * np.sin(TIMES[5:, None] * RATES), atol=2e-2)
-
-
 def test_what_is_missing_is_rejected_where_no_spline_is_asked_for() -> None:
     with pytest.raises(Rejection, match='point 0 has 0 accelerations, must have 3'):
         read_joint_trajectory(message((0, 1, 2), 'accelerations'), JOINTS, 7)
-
-
-def test_a_joint_more_or_less_of_a_point_is_rejected() -> None:
-    for field in ('positions', 'velocities', 'accelerations'):
-        for count in (2, 4):
-            wrong = message()
-            setattr(wrong.points[3], field, [0.1] * count)
-            with pytest.raises(Rejection, match=f'point 3 has {count} {field}, must have 3'):
-                read_joint_trajectory(wrong, JOINTS, 7, 'spline')
 
 
 @pytest.mark.parametrize('names', [JOINTS[:2], (*JOINTS, 'gripper'), ('a', 'b', 'c'),

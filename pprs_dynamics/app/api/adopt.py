@@ -86,7 +86,7 @@ class AdoptionResult(Result):
         """Return what the terminal shows."""
         from pprs_dynamics.app.report.adoption_report import adoption_view
 
-        return adoption_view(self.adoption, details)
+        return adoption_view(self.adoption)
 
     def page(self, saved_as: str = 'better.yaml') -> Page:
         """Return the page of `pprs adopt --report`; its next command names the file of `save`."""

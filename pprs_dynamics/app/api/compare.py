@@ -25,7 +25,6 @@ from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_d
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.inference.search.noise_floors import measure_columns, noise_floors
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
@@ -91,38 +90,17 @@ class ComparisonResult(Result):
         return comparison_page(self.inputs.model, self.inputs.fitted, self.residuals,
                                self.comparison, self.notes, self._next, self.beside)
 
-    def write_bag(self, path: str | PathLike[str], progress: Progress | None = None) -> list[Path]:
-        """Write measured effort, model, parts and residual as a bag, and layouts that open it.
-
-        Parameters
-        ----------
-        path : path
-            .mcap or .db3.
-        progress : callable, optional
-
-        Returns
-        -------
-        list of Path
-            The bag, and beside it the layouts of PlotJuggler (.plotjuggler.xml) and Foxglove
-            (.foxglove.json).
+    def write_bag(self, path: str | PathLike[str], progress: Progress | None = None) -> None:
+        """Write measured effort, model, parts and residual as a bag, .mcap or .db3.
 
         Raises
         ------
         PprsError
             Where it cannot be written.
         """
-        from pprs_dynamics.app.report.layouts import foxglove_layout, plotjuggler_layout
-
-        bag = Path(path)
-        write_comparison(bag, self.inputs.model, self.inputs.fitted,
+        write_comparison(Path(path), self.inputs.model, self.inputs.fitted,
                          [self.verdict, *(statement.text for statement in self.where)],
                          stage(progress, 'bag'))
-        written = [bag]
-        for suffix, layout in (('.plotjuggler.xml', plotjuggler_layout),
-                               ('.foxglove.json', foxglove_layout)):
-            written.append(bag.with_suffix(suffix))
-            write_text(written[-1], layout(self.residuals.drives))
-        return written
 
     def table(self) -> DataFrame:
         """Return a row per drive: rms, bias, peak, noise [N], relative error and grade."""

@@ -48,9 +48,10 @@ def run(options: argparse.Namespace) -> int:
     with staged_bar(screen) as progress:
         result = adopt(inputs.model, options.effect, inputs, force=options.force,
                        progress=progress, reference=options.reference)
+    if result.adopted:
+        result.save(options.output)
     tell(result, options, screen, lambda: result.page(options.output))
     if not result.adopted:
         return 1
-    result.save(options.output)
     screen.print(f'model: {shown(options.output)}')
     return 0

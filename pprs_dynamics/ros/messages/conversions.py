@@ -13,6 +13,7 @@ import numpy as np
 from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Twist, Vector3
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import (
     JointTrajectory,
     JointTrajectoryPoint,
@@ -112,6 +113,11 @@ def joint_state(
         message.position, message.velocity = doubles(position), doubles(velocity)
     message.header.stamp, message.header.frame_id = time(stamp), names.frame
     return message
+
+
+def efforts(effort: Array) -> Float64MultiArray:
+    """Return the drives' efforts, (D,)."""
+    return Float64MultiArray(data=doubles(effort))
 
 
 def joint_positions(stamp: int, names: Sequence[str], position: Array) -> JointState:

@@ -35,6 +35,7 @@ from pprs_dynamics.ros.node.parameters import (
     overrides,
     with_hint,
 )
+from pprs_dynamics.ros.node.provenance import arguments_of
 
 Checked = TypeVar('Checked')
 DEMO = node_parameter('demo', False, 'true: without a model file this is the paper\'s robot, for '
@@ -59,8 +60,17 @@ class NoModelError(PprsError):
 class ExplainsRefusals(Node):
     """A node that refuses parameters in the words of the model's files.
 
-    rclpy compares with the range in a descriptor first, and says less. `_settings` is what checks.
+    rclpy compares with the range in a descriptor first, and says less. `_settings` checks here.
+
+    Attributes
+    ----------
+    arguments : sequence of str
+        Command line of the node.
     """
+
+    def __init__(self, name: str, **options: Any) -> None:
+        self.arguments = arguments_of(options)
+        super().__init__(name, **options)
 
     def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
         """Set parameters one after the other; each is taken or refused by itself."""
@@ -148,14 +158,14 @@ class ModelParameters(Followed[tuple[DriveModel, dict[str, Any]]]):
     """
 
     def __init__(
-        self, node: Node, parameters: Iterable[NodeParameter], changed: Callable[[], None],
-        drives: bool = False,
+        self, node: ExplainsRefusals, parameters: Iterable[NodeParameter],
+        changed: Callable[[], None], drives: bool = False,
     ) -> None:
         self._changed, self.history = changed, ModelHistory(node) if drives else None
         parameters = (*parameters, DEMO)
         declare_node_parameters(node, parameters)
         given = overrides(node)
-        taken_from_paper = declare_model(node)
+        taken_from_paper = declare_model(node, node.arguments)
         self._stays: dict[str, Any] = {}
         super().__init__(node, parameters)
         self.model, self.node_values = self._checked

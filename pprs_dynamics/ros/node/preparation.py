@@ -19,9 +19,6 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.preparation import prepare
 
 NAME = 'preparation'
-# [s] A message asks for the interpreter some five times: with Python's 5 ms each, messages at
-# 200 Hz pile up behind the compiler.
-SWITCH_INTERVAL = 0.0002
 
 
 def prepare_beside(node: Node, model: DriveModel) -> threading.Thread:
@@ -56,13 +53,9 @@ def end_if_preparing(status: int) -> None:
 
 
 def _prepare(logger: Any, model: DriveModel) -> None:
-    began, interval = time.monotonic(), sys.getswitchinterval()
-    sys.setswitchinterval(SWITCH_INTERVAL)
-    try:
-        with compiling_here():
-            prepare(type(model).from_parameters(dict(model.values), model.source))
-    finally:
-        sys.setswitchinterval(interval)
-    # What stands now stays: no walk through Numba's objects in the middle of a control cycle.
-    gc.freeze()
+    began = time.monotonic()
+    with compiling_here():
+        prepare(type(model).from_parameters(dict(model.values), model.source))
+    if gc.get_freeze_count():  # else it is for the program that runs this node
+        gc.freeze()  # no walk through Numba's objects in the middle of a control cycle
     logger.info(f'equations are compiled, after {time.monotonic() - began:.1f} s')
