@@ -20,8 +20,8 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import is_mechanism
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.trajectory_request import Motion
@@ -173,7 +173,7 @@ def _joints(node: Node, values: dict[str, Any], arguments: Sequence[str],
     """Return an excitation of the drives of the node's model, and what writes its messages."""
     declare_model(node, arguments)
     given = current_values(node)
-    model = MechanismModel.from_parameters({
+    model = DriveModel.from_parameters({
         name: given[name] for name in given.keys() - values.keys()})
     drawn = draw_motion(model, values['duration'], values['seed'], values['rate'])
     # One step beyond the end, which is where it began, at rest.

@@ -238,7 +238,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
             return request
         # Drives' positions: the platform's motion follows from them.
         drives: Any = request.motion
-        motion = model.motion_of_drives(drives.position, drives.velocity, drives.acceleration)
+        motion = model.robot.motion_of_drives(drives.position, drives.velocity, drives.acceleration)
         return TrajectoryRequest(motion, request.start, request.offsets)
 
 

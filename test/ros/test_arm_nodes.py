@@ -22,7 +22,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.physics.model.parameter_file import read_parameters
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.monitor import MonitorNode
@@ -42,8 +42,8 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope='module')
-def model(file: Path) -> MechanismModel:
-    return MechanismModel.load(file)
+def model(file: Path) -> DriveModel:
+    return DriveModel.load(file)
 
 
 def parameters(file: Path, **more: Any) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def node(file: Path) -> Iterator[FeedforwardBench]:
 
 
 def test_efforts_are_the_models_on_every_topic(
-    node: FeedforwardBench, model: MechanismModel,
+    node: FeedforwardBench, model: DriveModel,
 ) -> None:
     moved = motion()
     forces = model.drive_forces(moved)
@@ -118,7 +118,7 @@ RULES: list[tuple[str, dict[str, Any], str]] = [
 
 
 def test_parameters_change_between_messages_and_what_is_no_arm_is_refused(
-    node: FeedforwardBench, model: MechanismModel,
+    node: FeedforwardBench, model: DriveModel,
 ) -> None:
     moved = motion(1, 7)
     before = np.array(node.answer(message_of(moved)))
@@ -126,8 +126,7 @@ def test_parameters_change_between_messages_and_what_is_no_arm_is_refused(
     for name, value in steps:
         result, = node.node.set_parameters([Parameter(name, value=value)])
         assert result.successful, result.reason
-    from pprs_dynamics.physics.model.model_file import build_model
-    loaded = build_model({**model.values, **dict(steps)}, model.source)
+    loaded = DriveModel.from_parameters({**model.values, **dict(steps)}, model.source)
     np.testing.assert_allclose(node.answer(message_of(moved)),
                                loaded.drive_forces(moved).total[0], rtol=0, atol=EQUAL)
     for name, value, said in (('friction.viscous', [1.0, 2.0], 'friction.viscous'),
@@ -144,7 +143,7 @@ def test_parameters_change_between_messages_and_what_is_no_arm_is_refused(
 
 
 def test_currents_have_a_topic_of_their_own_and_efforts_stay_efforts(
-    file: Path, model: MechanismModel,
+    file: Path, model: DriveModel,
 ) -> None:
     gain, moved = np.array([10.0, 5.0, 40.0]), motion(2, 4)
     effort = model.drive_forces(moved).total
@@ -178,7 +177,7 @@ def running() -> Iterator[Bench]:
 
 
 def test_the_executable_takes_an_arms_file_and_finds_the_urdf_beside_it(
-    running: Bench, ros_domain: int, file: Path, model: MechanismModel, tmp_path: Path,
+    running: Bench, ros_domain: int, file: Path, model: DriveModel, tmp_path: Path,
 ) -> None:
     commands = running.listen(Float64MultiArray, '/feedforward/commands', 1000)
     running.follow_status('/feedforward/status')
@@ -200,7 +199,7 @@ def test_the_executable_takes_an_arms_file_and_finds_the_urdf_beside_it(
 
 
 def test_the_monitor_tells_what_the_model_of_an_arm_lacks(
-    running: Bench, file: Path, model: MechanismModel,
+    running: Bench, file: Path, model: DriveModel,
 ) -> None:
     gain = np.array([10.0, 5.0, 40.0])
     values = parameters(file, robot__gain=gain.tolist(), robot__effort_unit='A', error_span=1.0)

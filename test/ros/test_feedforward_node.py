@@ -24,7 +24,6 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS
 
 pytestmark = pytest.mark.nodes
@@ -234,7 +233,8 @@ def test_a_parameter_change_acts_on_the_next_message_and_a_bad_one_on_none(
     after = np.array(feedforward.answer(message_of(motion)))
     heavier = DriveModel.load().values | {'masses.payload': 3.0}
     np.testing.assert_allclose(
-        after, build_model(heavier).drive_forces(motion).total[0], rtol=0, atol=EQUAL)
+        after, DriveModel.from_parameters(
+            heavier).drive_forces(motion).total[0], rtol=0, atol=EQUAL)
     assert np.abs(after - before).max() > 1.0
 
 

@@ -28,7 +28,6 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.monitor import MonitorNode
 
@@ -83,7 +82,7 @@ def test_effects_come_and_go_with_their_topics_while_running(caller: Caller) -> 
               'effects.stribeck_friction.lift_1.force': 1.2,
               'effects.stribeck_friction.lift_1.velocity': 0.01,
               'effects.effort_offset.slide_3.force': -0.7}
-    expected = build_model(values).drive_forces(MOTION)
+    expected = DriveModel.from_parameters(values).drive_forces(MOTION)
     topic = '/feedforward/effort/effort_offset'
     part = node.bench.listen(JointState, topic)
     assert node.bench.spin_until(lambda: node.node.count_subscribers(topic))

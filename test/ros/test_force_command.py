@@ -12,19 +12,19 @@ import pytest
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.ros.force_command import Feedforward
 from pprs_dynamics.ros.messages.trajectory_request import TrajectoryRequest
 
 OWN = {'feedforward_scale': 1.0, 'effort_limits': (), 'limit_policy': 'reject',
        'missing_derivatives': 'reject', 'ramp_time': 0.0}
 MODEL = DriveModel.load()
-REMEMBERS = build_model({**MODEL.values, 'effects.active': ['hysteresis', 'friction_drift'],
+REMEMBERS = DriveModel.from_parameters(
+    {**MODEL.values, 'effects.active': ['hysteresis', 'friction_drift'],
                          **{f'effects.hysteresis.slide_1.{key}': value for key, value in {
                              'force': 3.0, 'distance': 0.005}.items()},
                          **{f'effects.friction_drift.slide_1.{key}': value for key, value in {
                              'force': 5.0, 'time': 0.1}.items()}})
-HEAVY = build_model({**MODEL.values, 'masses.payload': 3.0})
+HEAVY = DriveModel.from_parameters({**MODEL.values, 'masses.payload': 3.0})
 STEP = 10_000_000  # [ns]
 
 
@@ -83,7 +83,7 @@ def test_a_change_during_a_ramp_goes_on_from_where_that_is() -> None:
     clock.now += 1.0
     half_way = node.answer(asked).effort
     assert np.abs(half_way - HEAVY.drive_forces(asked.motion).total).max() > 1.0
-    node.use(build_model(dict(HEAVY.values)), {**own, 'limit_policy': 'clamp'})
+    node.use(DriveModel.from_parameters(dict(HEAVY.values)), {**own, 'limit_policy': 'clamp'})
     np.testing.assert_allclose(node.answer(asked).effort, half_way, atol=1e-12)  # no other model
     node.use(MODEL, own)
     np.testing.assert_allclose(node.answer(asked).effort, half_way, atol=1e-12)
@@ -135,7 +135,7 @@ def test_a_path_that_ends_at_rest_and_a_time_of_0_get_no_point_more() -> None:
 def test_a_stop_never_leads_beyond_a_stroke() -> None:
     asked = request(1.0, 2)
     lifts = MODEL.drive_forces(asked.motion).mechanism.position[-1, 3:]
-    narrow = build_model({**MODEL.values, 'limits.lift_stroke': [
+    narrow = DriveModel.from_parameters({**MODEL.values, 'limits.lift_stroke': [
         float(lifts.min() - 1e-4), float(lifts.max() + 1e-4)]})
     node = Feedforward(narrow, OWN)
     node.answer(request(1.0, 1))

@@ -21,7 +21,7 @@ from trajectory_msgs.msg import (
     MultiDOFJointTrajectory,
 )
 
-from pprs_dynamics import DriveModel, JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 
 MOTION = random_motion(np.random.default_rng(8), 1)
 
@@ -63,7 +63,7 @@ def test_a_robot_with_loops_is_answered_at_once_and_compiled_beside(
     ros_domain: int, tmp_path: Path,
 ) -> None:
     pytest.importorskip('numba')
-    log, model = tmp_path / 'log', MechanismModel.load('config/hexapod.yaml')
+    log, model = tmp_path / 'log', DriveModel.load('config/hexapod.yaml')
     cold = {**environment(ros_domain), 'NUMBA_CACHE_DIR': str(tmp_path / 'cache'),
             'PPRS_DYNAMICS_PLAIN': '0'}
     command = [executable('feedforward'), '--ros-args', '--params-file', model.source, '-p',

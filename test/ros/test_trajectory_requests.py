@@ -19,7 +19,7 @@ from trajectory_msgs.msg import (
     MultiDOFJointTrajectoryPoint,
 )
 
-from pprs_dynamics import MechanismModel, load_model
+from pprs_dynamics import DriveModel
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import (
@@ -99,8 +99,7 @@ def test_other_joints_are_rejected(names: tuple[str, ...]) -> None:
 
 
 def test_a_robot_with_loops_takes_its_drives_and_poses_of_its_tool_in_its_frame() -> None:
-    model = load_model('config/hexapod.yaml')
-    assert isinstance(model, MechanismModel)
+    model = DriveModel.load('config/hexapod.yaml')
     own = RobotNames.of(model)
     base = str(model.values['robot.base'])
     for names, frame in ((None, base), (own._replace(frame='cell'), 'cell')):
@@ -109,7 +108,7 @@ def test_a_robot_with_loops_takes_its_drives_and_poses_of_its_tool_in_its_frame(
         still = JointTrajectory(joint_names=list(own.joints), points=[JointTrajectoryPoint(
             positions=[0.0] * 6, velocities=[0.0] * 6, accelerations=[0.0] * 6)])
         found = readers[TRAJECTORY].read(serialize_message(still), 7, 'reject')
-        assert type(found.motion) is model.motions[0]
+        assert type(found.motion) is model.robot.motions[0]
         pose = MultiDOFJointTrajectory(
             joint_names=[model.robot.structure.tool],
             points=[MultiDOFJointTrajectoryPoint(transforms=[Transform()]) for _ in range(4)])
@@ -118,7 +117,7 @@ def test_a_robot_with_loops_takes_its_drives_and_poses_of_its_tool_in_its_frame(
         for given in ('', frame):
             pose.header.frame_id = given
             found = readers[POSES].read(serialize_message(pose), 7, 'spline')
-            assert type(found.motion) is model.motions[1]
+            assert type(found.motion) is model.robot.motions[1]
         pose.header.frame_id = 'elsewhere'
         with pytest.raises(Rejection, match=f"must be '{frame}' or empty"):
             readers[POSES].read(serialize_message(pose), 7, 'spline')

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import robots_with_loops as robots
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism import structure
 from pprs_dynamics.physics.model import robot_block
@@ -57,14 +57,14 @@ def described(folder: Path) -> Path:
 
 
 def test_plant_and_model_agree(tmp_path: Path) -> None:
-    MechanismEngine(MechanismModel.load(described(tmp_path)))
+    MechanismEngine(DriveModel.load(described(tmp_path)))
     for robot in (robots.hexapod, robots.delta, robots.five_bar):
-        MechanismEngine(MechanismModel.load(robot().write(tmp_path)))
+        MechanismEngine(DriveModel.load(robot().write(tmp_path)))
     (tmp_path / 'robot.xml').write_text(MJCF)
     path = tmp_path / 'mjcf.yaml'
     path.write_text('/**:\n  ros__parameters:\n    robot: {mjcf: robot.xml, base: plate, tool: l2, '
                     'drives: [j1, j2]}\n')
-    MechanismEngine(MechanismModel.load(path))
+    MechanismEngine(DriveModel.load(path))
 
 
 def locked_at_zero(self: object, joint: object) -> float:
@@ -100,5 +100,5 @@ def test_faults_of_the_model_are_seen(tmp_path: Path, fault: str,
         monkeypatch.setattr(engine, 'described_gravity', as_standard)
     robot_block._structure.cache_clear()
     with pytest.raises(ModelError, match='in MuJoCo'):
-        MechanismEngine(MechanismModel.load(described(tmp_path)))
+        MechanismEngine(DriveModel.load(described(tmp_path)))
     robot_block._structure.cache_clear()

@@ -24,7 +24,7 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.inference.search.noise_floors import measure_columns, noise_floors
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
 
     Parameters
     ----------
-    model : ForceModel or path
+    model : DriveModel or path
     recordings : path, Recording, or a sequence of them
         A path is read, and its units and signs are checked; a Recording is not checked.
     topic : str, optional
@@ -188,7 +188,7 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
 
 def _beside(inputs: Inputs, path: Path) -> Beside:
     """Return the errors of another model on the same recordings."""
-    other = load_model(path)
+    other = DriveModel.load(path)
     if other.drives != inputs.model.drives:
         raise ModelError('--beside', displayed(path), 'have the drives of the model: '
                          f'{", ".join(inputs.model.drives)}')

@@ -50,7 +50,7 @@ from pprs_dynamics.physics.mechanism.description import (
     Description,
 )
 from pprs_dynamics.physics.mechanism.urdf import expanded, read_urdf
-from pprs_dynamics.physics.model.model_file import Model, build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import parse_parameters
 from pprs_dynamics.physics.model.recorded_names import EFFORT_KINDS
 from pprs_dynamics.physics.model.robot_block import coupled
@@ -96,7 +96,7 @@ class FirstModel:
         Where it will stand, from which the description's path counts.
     text : str
         Its content, with comments.
-    model : Model
+    model : DriveModel
         The same, built.
     notes : tuple of str
         What was guessed, and what could not be known.
@@ -109,7 +109,7 @@ class FirstModel:
 
     path: Path
     text: str
-    model: Model
+    model: DriveModel
     notes: tuple[str, ...]
     recordings: tuple[Path, ...]
     has_efforts: bool
@@ -177,11 +177,11 @@ def first_model(
             questions += error.lines
         notes += guessed
 
-    def written() -> tuple[str, Model]:
+    def written() -> tuple[str, DriveModel]:
         text = _text(path, Path(output), is_mjcf, description, base or root_of(description),
                      branch, chosen, names, columns, guessed, [one.name for one in given],
                      CURRENT in found, questions)
-        return text, build_model(parse_parameters(text, output), source=str(output))
+        return text, DriveModel.from_parameters(parse_parameters(text, output), source=str(output))
 
     has_efforts = bool({EFFORT, CURRENT} & {*found})
     text, model = written()
@@ -205,7 +205,7 @@ def first_model(
 # ---------------------------------------------------------------------------------- readings
 
 
-def _corrections(model: Model, path: Path, corrected: set[str],
+def _corrections(model: DriveModel, path: Path, corrected: set[str],
                  ) -> tuple[Scales, list[str], list[str]]:
     """Return factors with which a recording is read surely, why, and what is not sure.
 

@@ -15,7 +15,7 @@ from pprs_dynamics.app.api.result import Result, data_frame
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.inference.fit.base_fit import BaseFit, fit_base
 from pprs_dynamics.inference.fit.reference_runs import with_own_reference
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class FitResult(Result):
     fit: BaseFit
 
     @property
-    def model(self) -> ForceModel:
+    def model(self) -> DriveModel:
         """The fitted model."""
         return self.fit.model
 

@@ -27,9 +27,7 @@ from pprs_dynamics.inference.readings.findings import (
 )
 from pprs_dynamics.measurement.files.recording import Recording, Summary, describe
 from pprs_dynamics.measurement.files.repeats import find_repeat
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 EXAMPLE = 'pprs info run.mcap --model robot.yaml'
 
@@ -43,9 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    model = load_model(options.model)
+    model = DriveModel.load(options.model)
     content: dict[str, Any] = {}
-    if isinstance(model, MechanismModel) and model.is_described:
+    if model.is_described:
         content['robot'] = describe_mechanism(model)
         for line in mechanism_lines(model):
             screen.print(shown(line))
@@ -68,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def show_recordings(model: ForceModel, paths: Sequence[str], topic: str | None, screen: Any,
+def show_recordings(model: DriveModel, paths: Sequence[str], topic: str | None, screen: Any,
                     ) -> tuple[list[Recording], list[Summary]]:
     """Print the content of recordings and their faults, and return both."""
     with staged_bar(screen) as progress:

@@ -16,7 +16,6 @@ from pprs_dynamics.app.commands.info import show_recordings
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.mechanism_description import mechanism_lines
 from pprs_dynamics.app.report.terminal import console, shown
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
@@ -50,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     first = first_model(options.robot, options.recordings, options.output, base=options.base,
                         tool=options.tool, drives=drives, rate=options.rate)
     write_text(options.output, first.text)
-    for line in mechanism_lines(first.model) if isinstance(first.model, MechanismModel) else ():
+    for line in mechanism_lines(first.model) if first.model.moves_joints else ():
         screen.print(shown(line))
     for note in first.notes:
         screen.print(f'[yellow]![/] {shown(note)}')

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.plain_text import counted
 
 
-def describe_mechanism(model: MechanismModel) -> dict[str, Any]:
+def describe_mechanism(model: DriveModel) -> dict[str, Any]:
     """Return bodies, joints, loops, mobility and conditioning, for JSON."""
     robot = model.robot
     s = robot.structure
@@ -37,7 +37,7 @@ def describe_mechanism(model: MechanismModel) -> dict[str, Any]:
         'remarks': list(s.description.remarks)}
 
 
-def mechanism_lines(model: MechanismModel) -> list[str]:
+def mechanism_lines(model: DriveModel) -> list[str]:
     """Return the same as sentences for the terminal."""
     found = describe_mechanism(model)
     s = model.robot.structure
@@ -59,7 +59,7 @@ def mechanism_lines(model: MechanismModel) -> list[str]:
     return lines
 
 
-def _role(model: MechanismModel, name: str) -> str:
+def _role(model: DriveModel, name: str) -> str:
     s = model.robot.structure
     c = int(s.tables.coordinate[s.rows[name]])
     return ('driven' if c in s.tables.drives else 'held' if c in s.mobility.held else 'passive')

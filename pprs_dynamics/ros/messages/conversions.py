@@ -25,7 +25,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages.status_codes import Rejection
 
 BASE = 'base'
@@ -50,7 +50,7 @@ class RobotNames(NamedTuple):
     frame: str
 
     @classmethod
-    def of(cls, model: ForceModel, frame: str = '') -> RobotNames:
+    def of(cls, model: DriveModel, frame: str = '') -> RobotNames:
         """Return the names of a model's drives; `frame` '' for that of its kind."""
         # A platform's is `base`; that of joints means nothing.
         return cls(model.recorded.joints, frame or (BASE if model.drives == DRIVES else ''))

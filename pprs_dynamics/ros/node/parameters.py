@@ -18,7 +18,6 @@ from rclpy.parameter import Parameter
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
     ADDED,
     ANY,
@@ -160,7 +159,9 @@ def declare_model(node: Node, arguments: Sequence[str]) -> list[str]:
     """
     given = overrides(node)
     if is_axis(given):
-        DriveModel.from_parameters(given)  # refuses it
+        key = next(name for name in given if is_axis((name,)))
+        raise ModelError(key, given[key], 'not be given: this needs a 3-PPRS, and a single axis is '
+                         'for pprs compare, diagnose, adopt, fit and history')
     for key in FILES:
         if isinstance(given.get(key), str) and given[key]:
             given[key] = str(located(given[key], folder_of(key, arguments)))

@@ -15,13 +15,13 @@ from typing import Any
 from rclpy.node import Node
 
 from pprs_dynamics.physics.mechanism.evaluation import compiling_here
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.preparation import prepare
 
 NAME = 'preparation'
 
 
-def prepare_beside(node: Node, model: ForceModel) -> threading.Thread:
+def prepare_beside(node: Node, model: DriveModel) -> threading.Thread:
     """Start loading or compiling what a model needs in a thread of its own.
 
     Compiled kernels load in a second. The first time after an installation they are compiled,
@@ -52,7 +52,7 @@ def end_if_preparing(status: int) -> None:
         os._exit(status)
 
 
-def _prepare(logger: Any, model: ForceModel) -> None:
+def _prepare(logger: Any, model: DriveModel) -> None:
     began = time.monotonic()
     with compiling_here():
         prepare(type(model).from_parameters(dict(model.values), model.source))

@@ -12,7 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import FILES
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, LEDGER, find_file
 from pprs_dynamics.system.bounded_yaml import parse, read_text
@@ -33,7 +33,7 @@ def files_given(arguments: Sequence[str]) -> list[dict[str, str]]:
             for path in paths if path.is_file()]
 
 
-def hardware_of(model: ForceModel) -> str:
+def hardware_of(model: DriveModel) -> str:
     """Return which robot a model is of: an arm by its URDF."""
     name = model.title.partition(' ')[2]
     described = [Path(model.values[key]).stem for key in FILES if model.values.get(key)]
