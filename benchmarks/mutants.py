@@ -62,7 +62,6 @@ TESTS = {
     'inference/search/cost_terms.py': (*SEARCH, 'inference/test_prior_costs.py'),
     'inference/search/held_out.py': ('inference/test_gates.py', *SEARCH),
     'inference/search/form_error.py': ('inference/test_gates.py', 'inference/test_search.py'),
-    'inference/adoption/objections.py': ('inference/test_gates.py',),
     'ros/force_command.py': ('ros/test_force_command.py',),
     'ros/messages/measured_states.py': ('ros/test_measured_states.py',),
     'ros/messages/trajectory_request.py': ('ros/test_trajectory_requests.py',

@@ -13,9 +13,8 @@ import json
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,26 +22,30 @@ import rclpy
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.parameter_client import AsyncParameterClient
+from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from std_msgs.msg import Float64MultiArray, String
+from std_srvs.srv import Trigger
 
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.live import ERROR_SPAN
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.live_stream import LiveStream
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
-from pprs_dynamics.ros.model_transaction import ACTIVE, PATIENCE, ModelSteps, running
 from pprs_dynamics.ros.node.clocks import steady_timer
+from pprs_dynamics.ros.node.model_owner import ACTIVE, ModelOwner
+from pprs_dynamics.ros.node.parameters import plain_value
 from pprs_dynamics.ros.node.qos import LATCHED, MEASURED
 from pprs_dynamics.system.numbers import finite
 
 NAME = 'workbench'
 COMPARED = 0.05  # [s] between looks at what came in
 MOST_SAMPLES = 300_000  # in the ring: ten minutes at 500 Hz
+PATIENCE = 5.0  # [s] for a running node's answer
 SHOWN = 20.0  # [s] of residuals that are kept to be drawn
 COMMANDS = {'std_msgs/msg/Float64MultiArray', 'sensor_msgs/msg/JointState',
             'trajectory_msgs/msg/JointTrajectory'}  # what drives take
@@ -57,16 +60,17 @@ class LiveJointStates(Node):
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     topic : str
         Of sensor_msgs/JointState.
     monitor, feedforward : str
-        Names of the nodes that get effects, absolute or in the namespace of this one.
+        Names of the node that reports errors and of the node that drives, absolute or in the
+        namespace of this one.
     options
         Of `rclpy.node.Node`.
     """
 
-    def __init__(self, model: ForceModel, topic: str, monitor: str, feedforward: str,
+    def __init__(self, model: DriveModel, topic: str, monitor: str, feedforward: str,
                  **options: Any) -> None:
         super().__init__(NAME, **options)
         self._ring: deque[tuple[int, Any, Any]] = deque(maxlen=MOST_SAMPLES)
@@ -83,33 +87,34 @@ class LiveJointStates(Node):
                                  raw=True)
         self.create_subscription(String, f'{monitor}/diagnosis', self._on_diagnosis, LATCHED,
                                  raw=True)
-        self._statuses: dict[str, dict[str, Any]] = {}
-        for name in (monitor, feedforward):
-            self.create_subscription(String, f'{name}/status', partial(self._on_status, name),
-                                     LATCHED, raw=True)
+        self.owner = ModelOwner(self, feedforward, lambda: self.model, self._follow)
+        self.restoring = self.create_client(Trigger, f'{feedforward}/restore')
         steady_timer(self, COMPARED, self._compare)
-        self.clients_of = {name: AsyncParameterClient(self, name)
-                           for name in (monitor, feedforward)}
 
-    def full_name(self, name: str) -> str:
-        """Return a node's name with its namespace."""
-        return name if name.startswith('/') else f'{self.get_namespace().rstrip("/")}/{name}'
+    def machine(self) -> str:
+        """Return the node that drives, its robot and who takes its commands; '' where none runs."""
+        if not self.owner.is_there:
+            return ''
+        name, status = self.owner.name, self.owner.status
+        full_name = name if name.startswith('/') else (
+            f'{self.get_namespace().rstrip("/")}/{name}')
+        said = [f'node {full_name}']
+        if robot := status.get('robot'):
+            files = ', '.join(Path(each['file']).name
+                              for each in status.get('model', {}).get('files', ()))
+            said.append(f'robot {robot}' + (f' of {files}' if files else ''))
+        if takers := self._takers(full_name):
+            said.append(f'commands go to {", ".join(takers)}')
+        return '; '.join(said)
 
-    def machines(self, names: Iterable[str]) -> list[str]:
-        """Return which robot each node has a model of, and which nodes take its commands."""
-        found = dict[str, None]()
-        for name in names:
-            status = self._statuses.get(name, {})
-            files = ', '.join(Path(each['file']).name for each in status.get(
-                'model', {}).get('files', ()))
-            if robot := status.get('robot'):
-                found[f'robot {robot}' + (f' of {files}' if files else '')] = None
-            if takers := self._takers(self.full_name(name)):
-                found[f'commands of {name} go to {", ".join(takers)}'] = None
-        return list(found)
+    def _follow(self, parameters: Sequence[Parameter]) -> None:
+        with suppress(PprsError):  # then the fingerprints differ, and nothing can be set
+            self.stream.use_model(DriveModel.from_parameters({
+                **self.model.values,
+                **{each.name: plain_value(each.value) for each in parameters}}, self.model.source))
 
     def _takers(self, full_name: str) -> list[str]:
-        """Return the nodes that listen to what a node tells drives."""
+        """Return the nodes that subscribe to a node's commands."""
         namespace, _, name = full_name.rpartition('/')
         try:
             topics = self.get_publisher_names_and_types_by_node(name, namespace or '/')
@@ -121,14 +126,8 @@ class LiveJointStates(Node):
             for taker in self.get_subscriptions_info_by_topic(topic)} - {
                 self.get_fully_qualified_name()})
 
-    def _on_status(self, name: str, data: bytes) -> None:
-        with suppress(Rejection, ValueError):
-            found = json.loads(message_in(data, String).data, parse_constant=lambda _: None)
-            if isinstance(found, dict):
-                self._statuses[name] = found
-
     @property
-    def model(self) -> ForceModel:
+    def model(self) -> DriveModel:
         """What is compared with."""
         return self.stream.model
 
@@ -206,7 +205,7 @@ class LiveNodes:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
         That running nodes have as well.
     topic, monitor, feedforward : str
         As `LiveJointStates`.
@@ -216,7 +215,7 @@ class LiveNodes:
         Of ROS 2, with --ros-args: remappings, use_sim_time, QoS overrides.
     """
 
-    def __init__(self, model: ForceModel, topic: str = 'joint_states', monitor: str = 'monitor',
+    def __init__(self, model: DriveModel, topic: str = 'joint_states', monitor: str = 'monitor',
                  feedforward: str = 'feedforward', namespace: str = '',
                  arguments: Sequence[str] = ()) -> None:
         self._context = Context()
@@ -224,8 +223,6 @@ class LiveNodes:
                    signal_handler_options=SignalHandlerOptions.NO)
         self._node = LiveJointStates(model, topic, monitor, feedforward, namespace=namespace,
                                      context=self._context)
-        self._steps = ModelSteps(self._node.clients_of)
-        self._models: list[ForceModel] = []  # before each step
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name='live', daemon=True)
@@ -246,57 +243,54 @@ class LiveNodes:
 
     def to_dict(self) -> dict[str, Any]:
         """Return state and running errors."""
-        return {**self._node.to_dict(), 'can_restore': self.can_restore}
+        return {**self._node.to_dict(), 'can_restore': self._node.owner.steps > 0}
 
     def take(self, path: Path) -> None:
         """Write what the ring holds as a recording."""
         write_recording(path, self._node.taken())
 
     def machine(self) -> str:
-        """Return what would be set, in words: nodes, robot, and who takes the commands."""
-        there = running(self._node.clients_of)
-        if not there:
-            return ''
-        return '; '.join((f'nodes {", ".join(self._node.full_name(name) for name in there)}',
-                          *self._node.machines(there)))
+        """Return the machine that would be set, in words; '' where no node drives."""
+        return self._node.machine()
 
-    def set_model(self, model: ForceModel, confirmed: str) -> dict[str, Any]:
-        """Set a model's effects on the running nodes, all or none, and compare with it here.
+    def set_model(self, model: DriveModel, confirmed: str) -> dict[str, Any]:
+        """Set a model on the node that drives, all or none, and compare with it here.
 
         Parameters
         ----------
-        model : ForceModel
+        model : DriveModel
         confirmed : str
             `machine` as a person has read it.
 
         Returns
         -------
         dict
-            `is_set`, and `nodes`: what each said; '' where it took everything.
+            `is_set`, and `nodes`: the reason of each that refused, '' of each that took it.
         """
-        answer = self._steps.set_model(
-            model.values, self._node.model.values, self._confirmed(confirmed))
-        if answer.is_done:
-            self._models.append(self._node.model)
+        self._check(confirmed)
+        answer = self._answer(self._node.owner.set_model(model.values))
+        if answer is not None and answer.result.successful:
             self._node.stream.use_model(model)
-        return {'is_set': answer.is_done, 'nodes': answer.said}
+        return self._said(answer and answer.result.successful, answer and answer.result.reason)
 
     def restore(self, confirmed: str) -> dict[str, Any]:
-        """Set the nodes back to what they had before the last model; see `set_model`."""
-        answer = self._steps.restore(self._confirmed(confirmed))
-        if answer.is_done:
-            self._node.stream.use_model(self._models.pop())
-        return {'is_set': answer.is_done, 'nodes': answer.said}
+        """Undo the last change of the model of the node that drives; see `set_model`."""
+        self._check(confirmed)
+        answer = self._answer(self._node.restoring.call_async(Trigger.Request()))
+        return self._said(answer and answer.success, answer and answer.message)
 
-    @property
-    def can_restore(self) -> bool:
-        """Whether a model was set that can be taken back."""
-        return self._steps.can_restore
+    def _answer(self, future: Future[Any]) -> Any:
+        done = threading.Event()
+        future.add_done_callback(lambda _: done.set())
+        return future.result() if done.wait(PATIENCE) else None
 
-    def _confirmed(self, confirmed: str) -> list[str]:
-        """Return the names of the running nodes, where a person has confirmed just these."""
+    def _said(self, is_set: bool | None, reason: str | None) -> dict[str, Any]:
+        return {'is_set': bool(is_set), 'nodes': {self._node.owner.name: '' if is_set else (
+            reason or f'has not answered within {PATIENCE:g} s')}}
+
+    def _check(self, confirmed: str) -> None:
+        """Raise UnconfirmedError where a person has not confirmed this machine."""
         if not (now := self.machine()):
             raise UnconfirmedError('no node runs that could be set')
         if confirmed != now:
             raise UnconfirmedError(f'not confirmed: what would be set is {now}')
-        return running(self._node.clients_of)

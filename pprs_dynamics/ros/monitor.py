@@ -6,16 +6,17 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.qos import QoSProfile
 from rclpy.timer import Timer
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
+from std_srvs.srv import Trigger
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_effort
@@ -31,8 +32,8 @@ from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
 from pprs_dynamics.ros.node.all_joints import AllJoints
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.managed_node import AUTOSTART, ManagedNode
+from pprs_dynamics.ros.node.model_owner import ModelOwner, NotSetError, changes
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
-from pprs_dynamics.ros.node.model_services import ModelServices, NotAdoptedError
 from pprs_dynamics.ros.node.parameters import NodeParameter, node_parameter, overrides
 from pprs_dynamics.ros.node.preparation import prepare_beside
 from pprs_dynamics.ros.node.provenance import files_given, hardware_of
@@ -60,8 +61,8 @@ PARAMETERS = (
                    'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0, stays=True),
     node_parameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
                    upper=3600.0, stays=True),
-    node_parameter('diagnose_since', (), 'recordings of days on which the machine was right: '
-                   'windows are diagnosed for what has changed since then', stays=True),
+    node_parameter('diagnose_since', (), 'recordings of days on which the machine was correct: '
+                   'windows are diagnosed for changes since then', stays=True),
     node_parameter('feedforward', 'feedforward', 'node that gets what ~/adopt_confirmed sets, '
                    'absolute or in the namespace of this one', stays=True),
 )
@@ -79,7 +80,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
     """
 
     def __init__(self, **options: Any) -> None:
-        ManagedNode.__init__(self, 'monitor', allow_undeclared_parameters=True, **options)
+        super().__init__('monitor', allow_undeclared_parameters=True, **options)
         self._log = ThrottledLog(self)
         self._worker = DiagnosisWorker()
         self._publishers_made: list[Any] = []
@@ -98,15 +99,16 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._counters = self._stream.counters
         self._counters.update(dict.fromkeys(REJECTIONS, 0))
         self._share, self._counted = 1.0, (0, 0)
-        self._files = files_given(options.get('cli_args') or sys.argv)
+        self._files = files_given(self.arguments)
         self._joints = AllJoints()
         self._adoptable: dict[str, Any] = {}  # values of the model with what is claimed
         self._diagnosed = self._settings.model  # the latest window against it
         self._begin_stream()
-        self._model_services = ModelServices(
-            self, node_values['feedforward'],
-            lambda: (self._settings.model.fingerprint, self._settings.model.values),
-            self._to_adopt, self._forget)
+        self._owner = ModelOwner(self, node_values['feedforward'], lambda: self._settings.model,
+                                 self.set_parameters_atomically)
+        # In a group of its own: while it waits for the owner, all else is served.
+        self.create_service(Trigger, '~/adopt_confirmed', self._adopt,
+                            callback_group=ReentrantCallbackGroup())
         self._status = StatusReporter(
             self, {}, self._counters, hardware_of(self._settings.model), self._refresh)
         self._refresh()
@@ -159,6 +161,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
 
     def _use(self) -> None:
         self._stream.use_model(self._settings.model)
+        self._changed, self._adoptable = '', {}  # they were of the model before
 
     # --- measurements -----------------------------------------------------------------------------
 
@@ -200,7 +203,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         unit = common_effort(self._settings.model.units)
         text = (f'largest running error {np.nanmax(running):.4g} {unit}'
                 if np.isfinite(running).any() else
-                'no running error: efforts are not measured, or all joints stand')
+                'no running error: efforts are not measured, or no joint moves')
         text += f'; {self._share:.0%} of the samples are compared'
         if self._stream.measures_no_effort:
             self._status.report('WARN', 'WAITING', f'nothing is compared: {text}')
@@ -214,7 +217,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
                 f'than two in a row; {text}')
         elif self._changed:
             self._status.report('WARN', 'CHANGED', f'{self._changed}; {text}')
-        elif different := self._model_services.difference():
+        elif different := self._owner.difference():
             self._status.report('WARN', 'MODEL', f'{different}: what is compared is not what '
                                 f'drives; {text}')
         else:
@@ -258,18 +261,27 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
     def _to_adopt(self) -> dict[str, Any]:
         """Return what a person may adopt now, or raise PprsError."""
         if self._diagnosed.values != self._settings.model.values:
-            raise NotAdoptedError('the latest window was diagnosed against another model than is '
+            raise NotSetError('the latest window was diagnosed against another model than is '
                                   'in force')
         if not self._changed:
-            raise NotAdoptedError('no effect is confirmed')
+            raise NotSetError('no effect is confirmed')
         if not self._adoptable:
-            raise NotAdoptedError('the latest window names other effects than are confirmed, and '
+            raise NotSetError('the latest window names other effects than are confirmed, and '
                                   'its numbers were fitted together; the next one decides')
         return self._adoptable
 
-    def _forget(self) -> None:
-        """Claim nothing of a model that is in force no more."""
-        self._changed, self._adoptable = '', {}
+    async def _adopt(self, request: Any, response: Any) -> Any:
+        """Set the confirmed effects on the node that drives, which this one follows."""
+        try:
+            values = self._to_adopt()
+            result = ((await self._owner.set_model(values)).result if self._owner.is_there
+                      else self.set_parameters_atomically(changes(self._settings.model, values)))
+            response.success = result.successful
+            response.message = result.reason or 'the confirmed effects are in the model'
+        except PprsError as error:
+            response.message = str(error)
+        self.get_logger().warning(f'adopt_confirmed: {response.message}')
+        return response
 
     def destroy_node(self) -> None:
         """Take the process that diagnoses along."""

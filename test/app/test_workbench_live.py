@@ -29,7 +29,7 @@ from workbench_page import Page
 from workbench_server import Workbench, workbench
 
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 
@@ -97,11 +97,12 @@ def test_an_arm_is_compared_and_set_in_its_own_window_names_and_units(
     real = arm.real_arm(tmp_path)
     more = arm.real_arm(tmp_path, **{'friction.viscous': (14.0, 5.0, 20.0)})
     model = arm.write_arm(tmp_path, **{key: list(value) for key, value in arm.FRICTION.items()})
-    assert load_model(model).values == real.values
+    assert DriveModel.load(model).values == real.values
     with ExitStack() as stack:
-        stack.enter_context(node_process(
-            [executable('monitor'), '--ros-args', '--params-file', str(model), '-r', '__ns:=/left'],
-            ros_domain, tmp_path / 'monitor.log'))
+        for name in ('monitor', 'feedforward'):
+            stack.enter_context(node_process(
+                [executable(name), '--ros-args', '--params-file', str(model), '-r', '__ns:=/left'],
+                ros_domain, tmp_path / f'{name}.log'))
         replay = Replay(arm.record(more, arm.motion(20.0)), '/left/joint_states', 1)
         stack.callback(replay.close)
         bench = stack.enter_context(workbench(
@@ -131,18 +132,18 @@ def test_an_arm_is_compared_and_set_in_its_own_window_names_and_units(
         bench.settled()
         assert bench.post('/api/live/set', confirmed='the other arm').status != 200
         machine = bench.get('/api/live/machine').json['machine']
-        assert machine.startswith('nodes /left/monitor; robot serial arm made_up')
+        assert machine.startswith('node /left/feedforward; robot serial arm made_up')
         assert bench.post('/api/live/set', confirmed=machine).json == {
-            'is_set': True, 'nodes': {'monitor': ''}}
+            'is_set': True, 'nodes': {'feedforward': ''}}
         found = awaited(lambda found: found['error'][0] and max(
             found['error'][0], found['monitor_error'][0]) < 0.5)
         # The way back: the error is there again.
-        assert found['can_restore']
+        awaited(lambda found: found['can_restore'])
         assert bench.post('/api/live/restore', confirmed=machine).json == {
-            'is_set': True, 'nodes': {'monitor': ''}}
+            'is_set': True, 'nodes': {'feedforward': ''}}
         found = awaited(lambda found: found['monitor_error'] and min(
             found['error'][0] or 0.0, found['monitor_error'][0] or 0.0) > 0.5)
-        assert not found['can_restore']
+        awaited(lambda found: not found['can_restore'])
 
 
 @contextmanager
@@ -174,12 +175,12 @@ def test_ticked_effects_go_to_running_nodes_and_the_error_falls(bench: Workbench
                 f'bench.live.{key} && Math.max(...bench.live.{key}) > {6 * NOISE}')
         page.tab.locator('#live-set').click()
         page.tab.locator('#live-confirm[open]').wait_for()
-        assert 'nodes /monitor, /feedforward; robot 3-PPRS' in page.tab.locator(
+        assert 'node /feedforward; robot 3-PPRS' in page.tab.locator(
             '#live-machine').inner_text()
         page.tab.locator('#live-yes').click()
-        page.tab.locator('#live-nodes li').nth(1).wait_for()
+        page.tab.locator('#live-nodes li').wait_for()
         assert page.tab.locator('#live-nodes').inner_text().splitlines() == [
-            'monitor: took the effects', 'feedforward: took the effects']
+            'feedforward: took the effects']
         for key in ('error', 'monitor_error'):
             page.tab.wait_for_function(
                 f'bench.live.{key} && Math.max(...bench.live.{key}) < {3 * NOISE}')

@@ -35,7 +35,6 @@ from pprs_dynamics.measurement.files.fingerprint import fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.ledger import read_steps
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters, read_parameters
 
@@ -183,22 +182,10 @@ def test_force_overrides_and_is_recorded(files: Files) -> None:
 def synthetic(values: dict[str, Any], **recorded: Any) -> tuple[DriveModel, Recording]:
     """Return a model and a recording of a robot that differs from it."""
     motion = Excitation(DURATION, seed=5).motion(np.arange(0, DURATION, 0.002))
-    forces = build_model({**default_parameters(), **recorded}).drive_forces(motion)
+    forces = DriveModel.from_parameters({**default_parameters(), **recorded}).drive_forces(motion)
     noise = np.random.default_rng(8).normal(0, NOISE, forces.total.shape)
-    return build_model({**default_parameters(), **values}), Recording.from_arrays(
+    return DriveModel.from_parameters({**default_parameters(), **values}), Recording.from_arrays(
         'synthetic', motion.time, forces.mechanism.position, None, forces.total + noise)
-
-
-def test_without_drives_it_goes_where_the_diagnosis_names_it(files: Files) -> None:
-    """An effect scanned alone may pay on drives where what is beside it does the same."""
-    model = DriveModel.load(files.model)
-    told = files.diagnosis.effects[0]
-    assert told.drives != ('slide_3',)
-    elsewhere = replace(files.diagnosis, effects=(replace(told, drives=('slide_3',)),))
-    request = EffectRequest.named(told.name)
-    answers = [adopt(model, request, files.recordings[:1], diagnosis=one)
-               for one in (files.diagnosis, elsewhere)]
-    assert [one.drives for one in answers] == [told.drives, ('slide_3',)]
 
 
 def test_the_right_effect_on_a_wrong_drive_is_refused() -> None:
@@ -229,7 +216,7 @@ def test_where_nothing_is_missing_nothing_is_added() -> None:
     model, recording = synthetic({})
     answer = adopt(model, EffectRequest.of('platform_inertia'), [recording])
     assert not answer.adopted
-    assert 'do not call for platform_inertia' in answer.reason
+    assert 'do not support platform_inertia' in answer.reason
 
 
 @pytest.mark.parametrize('damage', ['cut', 'binary', 'value', 'ledger'])

@@ -5,39 +5,28 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 import scipy.signal
-from made_up_diagnosis import (
-    found_effect,
-    made_up_diagnosis,
-    made_up_residuals,
-    statement,
-)
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.adoption import objections
-from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.regression.joint_fit import JointFit
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
 from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
-from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.form_error import FormErrors
 from pprs_dynamics.inference.search.held_out import BLOCKS, PredictiveGain, predictive_gain
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.physics.model.model_file import build_model
 
 PLAIN = DriveModel.load()
-WITH_EFFECT = build_model({**PLAIN.values, 'effects.active': ['payload_mass'],
-                           'effects.payload_mass.mass': 0.1})
+FRICTION = DriveModel.from_parameters({**PLAIN.values, 'effects.active': ['coulomb_friction'],
+                        'effects.coulomb_friction.lift_2.force': -1.0})
 
 
 def gain(*in_errors: float) -> PredictiveGain:
@@ -48,23 +37,6 @@ def gain(*in_errors: float) -> PredictiveGain:
 
 
 # --- held-out errors ------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(('model', 'asked'), [(PLAIN, 1.0), (WITH_EFFECT, 2.0)])
-def test_held_out_data_must_be_predicted_better_beyond_the_uncertainty(
-        model: Any, asked: float) -> None:
-    given = made_up_residuals()
-
-    def said(*sure: float) -> list[str]:
-        return objections.of_prediction(gain(*sure), given, given, model, 'the recordings')
-
-    assert said(asked + 0.01) == []
-    refused, = said(asked - 0.01)
-    assert 'the error of slide_1 on the recordings does not fall' in refused
-    assert refused.endswith(f'by {asked - 0.01:.2g} standard errors, must be more than {asked:g}')
-    refused, = said(50.0, -9.0)
-    assert refused.startswith('the error of slide_2')
-    assert refused.endswith('is predicted worse by 9 standard errors')
 
 
 def test_the_gain_of_one_drive_is_enough_where_no_other_loses() -> None:
@@ -184,87 +156,6 @@ def test_a_drive_counts_from_a_hundred_samples_on(samples: int) -> None:
     error[:samples] = np.random.default_rng(2).normal(size=(samples, 1))
     found = predictive_gain(residuals_of(error), residuals_of(0.5 * error))
     assert bool(found.gains.sum() > 0) is (samples == 100)
-
-
-# --- what else speaks against an effect -----------------------------------------------------------
-
-
-def fit(effect: str, drives: tuple[str, ...] | None = ('lift_2',), evidence: float = 50.0,
-        feasibility: float = 0.0, model: Any = PLAIN) -> Any:
-    """Return what the gates look at of a fit."""
-    return SimpleNamespace(request=EffectRequest(model.bound(CATALOGUE[effect]), drives),
-                           drives=drives, evidence=evidence,
-                           fitted=SimpleNamespace(terms=CostTerms(feasibility=feasibility)),
-                           model=model, plain=model, nothing_left=())
-
-
-def others(effect: str, diagnosis: Any, **options: Any) -> list[str]:
-    one = fit(effect, **options)
-    return objections.of_other_effects(one.request, one, diagnosis)
-
-
-def test_an_effect_on_the_drives_that_show_it_is_not_objected_to() -> None:
-    found = made_up_diagnosis(effects=(found_effect('coulomb_friction', ('lift_1', 'lift_2')),))
-    assert others('coulomb_friction', found) == []
-    refused, = others('coulomb_friction', found, drives=('lift_2', 'slide_1'))
-    assert refused == 'the recordings show coulomb_friction on lift_1, lift_2, not on slide_1'
-    refused, = others('coulomb_friction', found, evidence=0.0)
-    assert refused.endswith('evidence 0, where 0 is the threshold')
-
-
-def test_an_effect_beside_another_is_told_to_wait_for_it() -> None:
-    found = made_up_diagnosis(effects=(found_effect('drive_spring'),
-                                       found_effect('coulomb_friction')))
-    refused, = others('coulomb_friction', found, evidence=-3.0)
-    assert 'it shows only beside drive_spring: adopt that first (evidence -3 ' in refused
-
-
-def test_a_rival_that_explains_as_much_is_not_objected_to() -> None:
-    found = made_up_diagnosis(effects=(found_effect('coulomb_friction'),),
-                              indistinguishable=(('coulomb_friction', 'hysteresis'),))
-    assert others('hysteresis', found) == []
-    # Nor is one that the diagnosis does not name, if it comes as near: alone the best has 120.
-    assert others('drive_spring', found, evidence=119.0) == []
-    refused, = others('drive_spring', found, evidence=2.0)
-    assert refused == ('coulomb_friction on lift_2 explains these recordings better: evidence '
-                       '120.4 against 2')
-    # Of several reported effects the first is the best.
-    weak = replace(found_effect('viscous_friction'), evidence=10.0)
-    two = made_up_diagnosis(effects=(found_effect('coulomb_friction'), weak))
-    refused, = others('drive_spring', two, evidence=50.0)
-    assert 'coulomb_friction on lift_2 explains these recordings better' in refused
-    structure = made_up_diagnosis(effects=(found_effect('payload_mass', None),))
-    refused, = others('drive_spring', structure)
-    assert refused.startswith('payload_mass explains these recordings better')
-
-
-def test_what_the_recordings_do_not_call_for_is_refused_with_the_reason() -> None:
-    refused, = others('drive_spring', made_up_diagnosis(depends_on=(statement(),)))
-    assert refused.startswith('no effect of the catalogue has the form of the error: slide_1')
-    refused, = others('effort_offset', made_up_diagnosis('adequate'), evidence=0.0)
-    assert refused == ('these recordings do not call for effort_offset: evidence 0, where 0 is the '
-                       'threshold')
-
-
-FRICTION = build_model({**PLAIN.values, 'effects.active': ['coulomb_friction'],
-                        'effects.coulomb_friction.lift_2.force': -1.0})
-
-
-@pytest.mark.parametrize(('push', 'count'), [(0.09, 0), (0.2, 1)])
-def test_friction_must_not_push_in_a_tenth_of_the_moving_time(push: float, count: int) -> None:
-    given = made_up_residuals()
-    begun = np.arange(len(given.time))[:, None] < push * len(given.time)
-    pushed = replace(
-        given, parts={'active_friction': np.where(begun, -2.0, 2.0) * np.ones((1, 6))},
-        variables={**given.variables, 'velocity': np.ones((len(given.time), 6))})
-    one = fit('coulomb_friction', model=FRICTION)
-    assert len(objections.of_constraints(one, pushed, Decisions())) == count
-
-
-@pytest.mark.parametrize(('cost', 'count'), [(9.0, 0), (11.0, 1)])
-def test_values_that_no_machine_has_are_refused(cost: float, count: int) -> None:
-    one = fit('drive_inertia', feasibility=cost)
-    assert len(objections.of_constraints(one, made_up_residuals(), Decisions())) == count
 
 
 # --- lack of fit ----------------------------------------------------------------------------------

@@ -111,9 +111,6 @@ def elsewhere(node: str) -> set[str]:
         found |= {'/feedforward/controller_state'}
     if not importlib.util.find_spec('tf2_msgs'):
         found |= {'/tf'}
-    if not importlib.util.find_spec('std_srvs') and node == 'monitor':
-        found |= {'/monitor/adopt_confirmed', '/monitor/restore', '/feedforward/status',
-                  *allowed(node)['client']}
     return found
 
 

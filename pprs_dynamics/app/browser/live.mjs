@@ -74,7 +74,7 @@ export class Live {
       const took = change === 'live/set' ? 'took the effects' : 'has what it had';
       $('live-nodes').replaceChildren(...Object.entries(nodes).map(([name, said]) =>
         make('li', `${name}: ${said || took}`)));
-      this.server.tell(isSet ? '' : 'Nothing was set: one of the nodes refused.');
+      this.server.tell(isSet ? '' : 'Nothing was set: the node refused.');
     } catch (error) {
       this.server.tell(error.message);
     }

@@ -91,7 +91,6 @@ export const showLedger = (state) => {
     item.title = `${step.date}, held out on ${step.held_out_on}${step.forced ? ', forced' : ''}`;
     return item;
   }));
-  $('undo').disabled = state.steps.length === 0;
   for (const [id, verb, deed] of [['back', 'Undo', state.undoes], ['forward', 'Redo',
                                                                    state.redoes]]) {
     $(id).disabled = !deed;

@@ -315,7 +315,6 @@ for (const link of document.querySelectorAll('a[download]')) {
     }
   });
 }
-on('undo', 'click', () => server.change('undo', {}));
 for (const id of ['back', 'forward']) on(id, 'click', () => server.change(id, {}));
 on('scheme', 'click', switchScheme);
 on('design', 'click', () => server.run('experiment', {

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pprs_dynamics.app.report.charts import extremes
+from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.tick_fits import TickFits
+from pprs_dynamics.app.workbench.ticks import Ticks
 from pprs_dynamics.app.workbench.view_state import Share, ViewState, names_of
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
@@ -25,18 +27,22 @@ MOST_POINTS = 20_000  # of a scatter
 SHORT = 5  # samples between two spans that count as one
 
 
-def span_mask(data: Residuals, start: float, end: float, drives: Sequence[int]) -> Mask:
-    """Return the samples between two times [s] on some drives."""
-    inside = (data.time >= start) & (data.time <= end)
-    return inside[:, None] & _on(data, drives)
+def span_mask(ticks: Ticks, start: float, end: float, drives: Sequence[str] | None = None,
+              ) -> Mask:
+    """Return the samples between two times [s], on some drives or all."""
+    time = ticks.fits.design.residuals.time
+    return ((time >= start) & (time <= end))[:, None] & _on(ticks, drives)
 
 
-def region_mask(x: Array, y: Array, x_range: tuple[float, float], y_range: tuple[float, float],
-                data: Residuals, drive: int) -> Mask:
-    """Return the samples of a drive whose two quantities (M,) lie in ranges."""
-    inside = ((x >= min(x_range)) & (x <= max(x_range)) & (y >= min(y_range))
-              & (y <= max(y_range)))
-    return inside[:, None] & _on(data, [drive])
+def region_mask(ticks: Ticks, x: str, y: str, x_range: tuple[float, float],
+                y_range: tuple[float, float], drive: str) -> Mask:
+    """Return a drive's samples in a region of the scatter of two quantities."""
+    on = _on(ticks, [drive])
+    inside = np.ones(len(ticks.fits.before), bool)
+    for name, span in ((x, x_range), (y, y_range)):
+        values = quantity(ticks.fits, ticks.view, name, int(np.argmax(on)))
+        inside &= (values >= min(span)) & (values <= max(span))
+    return inside[:, None] & on
 
 
 def spans_of(data: Residuals, mask: Mask) -> list[tuple[float, float]]:
@@ -56,7 +62,7 @@ def quantity(fits: TickFits, view: ViewState, name: str, drive: int) -> Array:
     Raises
     ------
     ResidualsError
-        For a name that stands for nothing.
+        For an unknown name.
     """
     data = fits.design.residuals
     table = {'measured': fits.measured, 'error before': fits.before,
@@ -82,7 +88,7 @@ def drawn_samples(x: Array, y: Array) -> NDArray[np.int_]:
 
 
 def shares_in(mask: Mask, fits: TickFits, view: ViewState) -> list[Share]:
-    """Return what every unticked effect explains of the squared error in a mask, the best first.
+    """Return the share of the squared error that each unticked effect explains, largest first.
 
     Raises
     ------
@@ -104,7 +110,9 @@ def shares_in(mask: Mask, fits: TickFits, view: ViewState) -> list[Share]:
     return sorted(shares, key=lambda one: (-one.net, -one.explained))
 
 
-def _on(data: Residuals, drives: Sequence[int]) -> Mask:
-    on = np.zeros(len(data.drives), dtype=bool)
-    on[list(drives)] = True
-    return on[None, :]
+def _on(ticks: Ticks, drives: Sequence[str] | None) -> Mask:
+    known = ticks.fits.drives
+    for name in drives or ():
+        if name not in known:
+            raise SessionError(f'unknown drive {name!r}, must be one of {", ".join(known)}')
+    return np.array([[drives is None or name in drives for name in known]])

@@ -37,20 +37,21 @@ class RobotMotion:
 
 def robot_motion(session: Session) -> RobotMotion:
     """Return the poses of all recordings, one after the other."""
-    model = session.model
-    chosen = np.unique(np.linspace(0, len(session.data) - 1, MOST_POSES).astype(int))
+    ticks = session.ticks
+    data = ticks.fits.design.residuals
+    chosen = np.unique(np.linspace(0, len(data) - 1, MOST_POSES).astype(int))
     found: list[Skeleton] = []
     first = 0
-    for one in session.fits.design.reconstructions:
+    for one in ticks.fits.design.reconstructions:
         starts = one.treat.starts
         here = chosen[(chosen >= first) & (chosen < first + len(starts))] - first
         first += len(starts)
         if len(here):
-            found.append(Skeleton.of(model, one.motion[starts[here]]))
+            found.append(Skeleton.of(ticks.model, one.motion[starts[here]]))
     drawn = replace(found[0], points=np.concatenate([one.points for one in found]))
-    return RobotMotion(session.data.time[chosen], drawn,
-                       _rms_between(session.given_residual, chosen),
-                       _rms_between(session.current_residual, chosen))
+    return RobotMotion(data.time[chosen], drawn,
+                       _rms_between(ticks.fits.before, chosen),
+                       _rms_between(ticks.view.residual, chosen))
 
 
 def _rms_between(error: Array, chosen: np.typing.NDArray[np.int_]) -> Array:

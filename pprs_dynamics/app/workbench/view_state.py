@@ -25,7 +25,7 @@ from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.numbers import finite
 
 # How far a fit has come: at the noise of the fit before; with its own; with its shapes where the
@@ -83,7 +83,7 @@ class ViewState:
     free, found : CandidateSet
         The best fit of the ticked effects; and with what somebody chose, at the same noise.
     residual : (M, D) array
-        What is left [N].
+        With the ticked effects [N].
     estimates : mapping of str to mapping of str to Estimate
         By effect, of the values that are shown; NaN where the deviation is not known yet.
     stage : {'linear', 'fitted', 'refined', 'exact'}
@@ -133,7 +133,7 @@ class ViewState:
 
 
 def without_ticks(fits: TickFits, revision: int) -> ViewState:
-    """Return what is shown of a model as it is."""
+    """Return the view of a model without ticks."""
     return ViewState(revision, {}, fits.none, fits.none, fits.before, {}, FITTED)
 
 
@@ -197,7 +197,7 @@ def _with_chosen(fits: TickFits, free: CandidateSet, ticks: Mapping[str, Tick]) 
     return fits.held(shaped, list(ticks.values()))
 
 
-def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: ForceModel,
+def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: DriveModel,
                    called_for: Set[str] | None) -> dict[str, Any]:
     """Return all that is shown of one effect.
 
@@ -205,7 +205,7 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: ForceM
     ----------
     view : ViewState
     effect : type of CatalogueEffect
-    model : ForceModel
+    model : DriveModel
     called_for : set of str or None
         Effects that the diagnosis calls for; None where there is none yet.
     """
@@ -229,7 +229,7 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: ForceM
         'parameters': _parameters(view, effect, model) if tick else []}
 
 
-def units_to_dict(model: ForceModel) -> dict[str, Any]:
+def units_to_dict(model: DriveModel) -> dict[str, Any]:
     """Return the units of all drives together, and drive by drive."""
     return {'unit': common_effort(model.units), 'units': {
         drive: {'effort': unit.effort, 'position': unit.position, 'velocity': unit.of('m/s'),
@@ -237,7 +237,7 @@ def units_to_dict(model: ForceModel) -> dict[str, Any]:
         for drive, unit in zip(model.drives, model.units, strict=True)}}
 
 
-def _parameters(view: ViewState, effect: type[CatalogueEffect], model: ForceModel,
+def _parameters(view: ViewState, effect: type[CatalogueEffect], model: DriveModel,
                 ) -> list[dict[str, Any]]:
     drives = model.drives
     units = dict(zip(drives, model.units, strict=True))
@@ -283,9 +283,9 @@ def names_of(candidate: EffectCandidate, drives: tuple[str, ...]) -> tuple[str, 
     return None if on is None else tuple(drives[d] for d in on)
 
 
-def errors_of(before: Array, now: Array, noise: Mapping[str, float], drives: tuple[str, ...],
+def errors_of(fits: TickFits, view: ViewState, noise: Mapping[str, float],
               ) -> dict[str, DriveError]:
-    """Return the errors of the drives that were measured."""
-    return {name: DriveError(root_mean_square(before[:, d]), root_mean_square(now[:, d]),
-                             noise.get(name, NOT_KNOWN))
-            for d, name in enumerate(drives) if np.isfinite(before[:, d]).any()}
+    """Return the errors of the measured drives."""
+    return {name: DriveError(root_mean_square(fits.before[:, d]),
+                             root_mean_square(view.residual[:, d]), noise.get(name, NOT_KNOWN))
+            for d, name in enumerate(fits.drives) if np.isfinite(fits.before[:, d]).any()}

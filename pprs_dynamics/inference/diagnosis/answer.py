@@ -62,13 +62,13 @@ from pprs_dynamics.inference.search.noise_floors import noise_floors
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MOST_SETS, MOST_BARRED = 8, 3  # rows and inadmissible sets that are listed
 MOST_AVERAGED = 5  # sets that estimates are averaged over
 
 
-def model_of(fits: FittedSets, fitted: CandidateSet) -> ForceModel:
+def model_of(fits: FittedSets, fitted: CandidateSet) -> DriveModel:
     """Return the model of a set, with the effects that are there at the end and stay.
 
     Raises
@@ -202,8 +202,7 @@ class Answer:
             without.cost - self.table.best.cost, root_mean_square(self.remaining + force),
             root_mean_square(self.remaining), before, after, estimates.at_bound,
             (less - with_force) / max(self.over_noise(self.given.error), 1e-300),
-            float('nan') if gain is None else gain.certainty,
-            self._objection(candidate, less / max(with_force, 1e-300), gain),
+            gain, self._objection(candidate, less / max(with_force, 1e-300), gain),
             self._ranked_set(without), self._in_model(candidate, parameters),
             None if course is None else replace(
                 course, begin=course.begin - begun, end=course.end - begun), estimates.moments)

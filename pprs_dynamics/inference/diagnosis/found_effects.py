@@ -9,12 +9,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.search.candidates import SINCE, Course
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.estimates import Estimate
+from pprs_dynamics.inference.search.held_out import PredictiveGain
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.system.numbers import finite
 
@@ -103,9 +102,9 @@ class FoundEffect(FittedEffect):
     share : float
         By which its force alone lowers the error, over the error of the input model: of the root
         mean square over drives, each in units of its noise.
-    certainty : float
-        Standard errors by which the reported effects predict held-out data better than without
-        it, in units of the noise: see `PredictiveGain`. NaN where that is unknown.
+    gain : PredictiveGain, optional
+        By how much the reported effects predict held-out data better than without it; None where
+        that is unknown.
     objection : str
         Why it is no finding whatever the error does, as a clause; '' where nothing speaks against.
     without : RankedSet, optional
@@ -126,12 +125,17 @@ class FoundEffect(FittedEffect):
     held_out_after: float
     at_bound: tuple[str, ...] = ()
     share: float = 0.0
-    certainty: float = np.nan
+    gain: PredictiveGain | None = None
     objection: str = ''
     without: RankedSet | None = None
     in_model: Mapping[str, float] = field(default_factory=dict)
     course: Course | None = None
     moments: Mapping[str, Estimate] = field(default_factory=dict)
+
+    @property
+    def certainty(self) -> float:
+        """Standard errors of the held-out gain; NaN where that is unknown."""
+        return float('nan') if self.gain is None else self.gain.certainty
 
     @property
     def is_only_refuted(self) -> bool:

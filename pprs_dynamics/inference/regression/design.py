@@ -71,16 +71,13 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
 from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 
 SHARE = 0.1  # of what a model has of an effect that shifts positions, for derivatives
 SIZES = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # of what it usually is, that are tried where none is
 SHAPE_STEP = 1e-3  # amount of movement, for derivatives by shape parameters
-# By how many of its standard deviations a number of an effect may have been fitted wrong as long as
-# another effect was missing.
-LEANING = 10.0
 # A drive hardly moves whose speed is seldom beyond the width in which the model's friction turns
 # over, times the first: in less than the second of the time.
 TURNED, LEAST_MOVING = 2.0, 0.05
@@ -92,7 +89,7 @@ class Design:
 
     Parameters
     ----------
-    given, model : ForceModel
+    given, model : DriveModel
         As the user has it; and around which forces are linear.
     residuals : Residuals
         Whose error is that of the given model, extrapolated linearly from `model`.
@@ -110,14 +107,12 @@ class Design:
         Of `model`, exactly [N].
     point : OperatingPoint, optional
         None: the given model.
-    joining : str
-        See `of`.
     carried : CarriedOver, optional
         Its mean is taken from what was measured, its directions are columns of every fit.
     """
 
-    given: ForceModel
-    model: ForceModel
+    given: DriveModel
+    model: DriveModel
     residuals: Residuals
     recordings: tuple[FullRate, ...]
     base: tuple[BaseColumn, ...]
@@ -128,7 +123,6 @@ class Design:
     reconstructions: tuple[Reconstruction, ...] = field(repr=False)
     forces: Array = field(repr=False)
     point: OperatingPoint | None = None
-    joining: str = ''
     carried: CarriedOver | None = None
     _moved: dict[tuple[Any, ...], tuple[Reconstruction, ...]] = field(
         default_factory=dict, repr=False, compare=False)
@@ -146,20 +140,17 @@ class Design:
 
     @classmethod
     def of(
-        cls, model: ForceModel, recordings: Sequence[Recording],
-        progress: Callable[[float], None] | None = None, joining: str = '',
+        cls, model: DriveModel, recordings: Sequence[Recording],
+        progress: Callable[[float], None] | None = None,
     ) -> Design:
         """Evaluate a model and its sensitivities on recordings; errors as `measure_residuals`.
 
         Parameters
         ----------
-        model : ForceModel
+        model : DriveModel
         recordings : sequence of Recording
         progress : callable, optional
             Called with the share that is done.
-        joining : str, optional
-            Effect that joins the model: the numbers of the others were fitted without it, and are
-            `LEANING` times as uncertain as the file says.
         """
         report = progress or (lambda share: None)
         reconstructions = []
@@ -169,7 +160,7 @@ class Design:
 
             reconstructions.append(reconstruct(model, recording, followed))
         return cls._evaluated(model, model, tuple(reconstructions),
-                              lambda share: report(0.5 + 0.5 * share), joining=joining)
+                              lambda share: report(0.5 + 0.5 * share))
 
     def around(self, point: OperatingPoint, alone: bool = False) -> Design:
         """Return the design of the same recordings around another operating point.
@@ -184,8 +175,7 @@ class Design:
             point.model, self.given, self.reconstructed(point.model), None,
             {effect.effect for effect in point.effects} if alone else None,
             {(column.drive, column.number) for column in self.base
-             if isinstance(column, ReversalShape)},
-            self.joining).beside(self.carried)
+             if isinstance(column, ReversalShape)}).beside(self.carried)
         shift = np.zeros_like(design.residuals.model)
         for column, c in zip(design.base, point.base, strict=True):
             if column.in_model:
@@ -251,7 +241,7 @@ class Design:
                     forces[:, d] += c * row
         return forces
 
-    def reconstructed(self, model: ForceModel) -> tuple[Reconstruction, ...]:
+    def reconstructed(self, model: DriveModel) -> tuple[Reconstruction, ...]:
         """Return the motion of the recordings as a model's encoders tell it."""
         if model.misreadings == self.model.misreadings:
             return self.reconstructions
@@ -263,11 +253,11 @@ class Design:
         return self._moved[key]
 
     @classmethod
-    def _evaluated(cls, model: ForceModel, given: ForceModel,
+    def _evaluated(cls, model: DriveModel, given: DriveModel,
                    reconstructions: tuple[Reconstruction, ...],
                    progress: Callable[[float], None] | None,
                    effects: Container[type[CatalogueEffect]] | None = None,
-                   reversals: Container[tuple[int | None, int]] | None = None, joining: str = '',
+                   reversals: Container[tuple[int | None, int]] | None = None,
                    ) -> Design:
         """Return the design around a model; `reversals` are the widths that are left open there.
 
@@ -303,7 +293,7 @@ class Design:
                            for name in (HOMING, INERTIA))
         design = cls(given, model, residuals, tuple(full), (), structure, homing, inertia,
                      tuple(notes),
-                     reconstructions, residuals.model, joining=joining)
+                     reconstructions, residuals.model)
         base: list[BaseColumn] = [
             ModelNumber(_rows(column), 1.0, number)
             for number, column in zip(sensitivities.numbers, stacked[NUMBERS], strict=True)]
@@ -323,7 +313,8 @@ class Design:
         for effect in given.effects:
             if isinstance(effect, (DriveEffect, StructureEffect)):
                 base += [replace(one, rows=design.present_rows(one))
-                         for one in present_columns(effect, design.uncertainties(effect))]
+                         for one in present_columns(effect, effect_uncertainties(
+                             given.values, effect.name))]
         return replace(design, base=tuple(base))
 
     @cached_property
@@ -361,15 +352,6 @@ class Design:
             return None
         assert isinstance(there, CatalogueEffect)
         return present_values(there, name)
-
-    def uncertainties(self, effect: CatalogueEffect) -> dict[str, float]:
-        """Return the standard deviations of what the given model has of an effect.
-
-        By drive.parameter; beside an effect that joins they are larger, see `of`.
-        """
-        factor = LEANING if self.joining not in ('', effect.name) else 1.0
-        return {key: factor * std for key, std in effect_uncertainties(
-            self.given.values, effect.name).items()}
 
     def known_change(self, term: Term) -> dict[int, Array]:
         """Return what a term changes whatever its coefficients, (M,) by drive.

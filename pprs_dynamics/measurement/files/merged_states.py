@@ -226,7 +226,9 @@ def at_stamps(stamps: Indices, times: Sequence[int] | Indices,
               values: Sequence[float] | Array) -> Array:
     """Return a series at other stamps: exact where they are the same, else between neighbours."""
     if len(times) < 2:
-        return np.full(len(stamps), np.nan)
+        alone = np.full(len(stamps), np.nan)
+        alone[np.isin(stamps, times)] = values
+        return alone
     known, first = np.unique(np.array(times, dtype=np.int64), return_index=True)
     numbers = np.array(values)[first]
     # Counted from the first: seconds since 1970 would lose digits as floats.

@@ -55,23 +55,12 @@ def is_whole(data: bytes, kind: type = MultiDOFJointTrajectory) -> bool:
     if len(data) < HEADER or data[0] or data[1] > 1:
         # Another encoding: its deserialiser has to know.
         return len(data) >= HEADER
-    try:
-        return walked(data, kind).at <= len(data)
-    except struct.error:
-        return False
-
-
-def walked(data: bytes, kind: type) -> Walk:
-    """Go over a message of a kind, and return where its words and numbers stand.
-
-    Raises
-    ------
-    struct.error
-        Where the bytes end before a length word.
-    """
     walk = Walk(data)
-    _WALKS[kind](walk)
-    return walk
+    try:
+        _WALKS[kind](walk)
+    except struct.error:  # the bytes end before a length word
+        return False
+    return walk.at <= len(data)
 
 
 def _trajectory(walk: Walk) -> None:

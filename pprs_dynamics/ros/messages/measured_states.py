@@ -6,22 +6,20 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
-from statistics import median
 from typing import NamedTuple
 
 import numpy as np
 from sensor_msgs.msg import JointState
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.measurement.files.merged_states import LONGEST_STEP
+from pprs_dynamics.measurement.files.merged_states import at_stamps
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS, nanoseconds, read_drives
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
 
 PATIENCE = 1.0  # [s] for messages with the other drives; so far apart may stamps be, too
-STEPS = 15  # of a drive's stream, whose median is its period
+STEPS = 15  # samples before the present one that tell the period of a drive
 
 
 class MeasuredState(NamedTuple):
@@ -32,56 +30,10 @@ class MeasuredState(NamedTuple):
     effort: Array
 
 
-class _Sample(NamedTuple):
-    stamp: int
-    position: float
-    effort: float
-
-
-class _Stream:
-    """What came in of one drive: the sample before the one that is asked for, and all later."""
-
-    def __init__(self) -> None:
-        self._samples: deque[_Sample] = deque()
-        self._steps: deque[int] = deque(maxlen=STEPS)
-
-    @property
-    def newest(self) -> int | None:
-        """Stamp of the newest sample [ns]; None: there is none."""
-        return self._samples[-1].stamp if self._samples else None
-
-    def push(self, sample: _Sample) -> None:
-        if self._samples:
-            self._steps.append(sample.stamp - self._samples[-1].stamp)
-        self._samples.append(sample)
-
-    def at(self, stamp: int) -> tuple[float, float] | None:
-        """Return position and effort at a time [ns] that is not after the newest sample's.
-
-        Exact where there is a sample, else on a straight line between its neighbours; None where
-        these are too far apart. Later calls must ask for later times.
-        """
-        samples = self._samples
-        while len(samples) > 1 and samples[1].stamp <= stamp:
-            samples.popleft()
-        before = samples[0]
-        if before.stamp == stamp:
-            return before.position, before.effort
-        if before.stamp > stamp:
-            return None
-        after = samples[1]
-        step = after.stamp - before.stamp
-        if step > LONGEST_STEP * median(self._steps):
-            return None
-        share = (stamp - before.stamp) / step
-        return (before.position + share * (after.position - before.position),
-                before.effort + share * (after.effort - before.effort))
-
-
 class MeasuredStates:
     """Reads joint states, and merges those that hold some of the drives each by their stamps.
 
-    A message with all drives is a sample as it is. Of others, as of several broadcasters, samples
+    A message with all drives is one sample. Of others, as of several broadcasters, samples
     are at the stamps of the first drive, as `pprs` reads recordings. Messages with no drive at
     all, as of a gripper, are passed over while the drives come in others.
 
@@ -142,38 +94,42 @@ class MeasuredStates:
         return self._completed()
 
     def _forget(self) -> None:
-        self._streams = {joint: _Stream() for joint in self._joints}
-        self._due: deque[int] = deque()
+        # Stamp, position and effort of the last samples of each drive.
+        self._streams: dict[str, list[tuple[int, float, float]]] = {
+            joint: [] for joint in self._joints}
+        self._due: list[int] = []
 
     def _push(self, stamp: int, joint: str, position: float, effort: float) -> None:
-        newest = self._streams[joint].newest
-        if newest is not None and stamp <= newest:  # a new stream
+        stream = self._streams[joint]
+        if stream and stamp <= stream[-1][0]:  # a new stream
             self._forget()
-        for other, stream in self._streams.items():
-            if stream.newest is not None and abs(
-                    stamp - stream.newest) > PATIENCE * NANOSECONDS:
-                apart = (stamp - stream.newest) / NANOSECONDS
+        for other, samples in self._streams.items():
+            apart = (stamp - samples[-1][0]) / NANOSECONDS if samples else 0.0
+            if abs(apart) > PATIENCE:
                 self._forget()
                 raise Rejection('TIME', f'stamps of {joint} are {apart:.6g} s from those of '
                                 f'{other}, must be within {PATIENCE:g} s')
-        self._streams[joint].push(_Sample(stamp, position, effort))
+        self._streams[joint].append((stamp, position, effort))
         if joint == self._joints[0]:
             self._due.append(stamp)
 
     def _completed(self) -> list[MeasuredState]:
         """Return the samples at whose stamps all drives are known by now."""
-        known = [stream.newest for stream in self._streams.values()]
-        if None in known:
+        if not all(self._streams.values()):
             return []
-        latest = min(stamp for stamp in known if stamp is not None)
-        found = []
-        while self._due and self._due[0] <= latest:
-            stamp = self._due.popleft()
-            values = [stream.at(stamp) for stream in self._streams.values()]
-            if None not in values:
-                table = np.array(values, dtype=float)
-                found.append(MeasuredState(stamp, table[:, 0].copy(), table[:, 1].copy()))
-        return found
+        latest = min(samples[-1][0] for samples in self._streams.values())
+        due = np.array([stamp for stamp in self._due if stamp <= latest], dtype=np.int64)
+        if not len(due):
+            return []
+        self._due = self._due[len(due):]
+        position, effort = np.zeros((2, len(due), len(self._joints)))
+        for k, samples in enumerate(self._streams.values()):
+            times, *values = zip(*samples, strict=True)
+            position[:, k], effort[:, k] = (at_stamps(due, times, each) for each in values)
+            older = sum(time < due[-1] for time in times)
+            del samples[:max(older - STEPS, 0)]
+        return [MeasuredState(int(due[row]), position[row], effort[row])
+                for row in range(len(due)) if np.isfinite(position[row]).all()]
 
 
 def _missing(message: JointState, joint: str) -> Rejection:

@@ -6,12 +6,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from builtin_interfaces.msg import Time
 from trajectory_msgs.msg import (
     JointTrajectory,
     MultiDOFJointTrajectory,
@@ -24,20 +21,17 @@ from pprs_dynamics.measurement.files.samples import Indices, Mask
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, position_spline_derivatives
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.pose_spline import FEWEST_POSES, spline_derivatives
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages.conversions import (
     BASE,
     NANOSECONDS,
     PLATFORM,
     RobotNames,
     nanoseconds,
-    write_joint_trajectory,
-    write_trajectory,
 )
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
-from pprs_dynamics.ros.messages.trajectory_bytes import TrajectoryBytes
+from pprs_dynamics.ros.messages.trajectory_bytes import PointLayout, Points
 
 TRAJECTORY, POSES = '~/trajectory', '~/pose_trajectory'
 REJECT, SPLINE = 'reject', 'spline'
@@ -293,32 +287,28 @@ def read_joint_trajectory(
     return _request_of(start, offsets, _joint_motion_of(count, numbers))
 
 
-class RequestReader:
+class RequestReader(NamedTuple):
     """How requests arrive, as bytes.
-
-    What begins like one that was read before is read without message objects.
 
     Parameters
     ----------
     message : type
-    read_message : callable
+    layout : PointLayout
+        Of messages that are read without objects.
+    of_points : callable
+        Points, time of arrival [ns] -> TrajectoryRequest, or None for other names or frames.
+    of_message : callable
         Message, time of arrival [ns] and what to do about missing derivatives -> TrajectoryRequest;
         see `read_trajectory`.
-    known : TrajectoryBytes
-    motion : callable
-        Numbers of points (N, K) -> their times [s] -> motion.
-    order : callable, optional
-        Message -> order of its numbers, see `TrajectoryBytes.learn`.
     """
 
-    def __init__(self, message: type, read_message: Callable[..., TrajectoryRequest],
-                 known: TrajectoryBytes, motion: Callable[[Array], Callable[[Array], Motion]],
-                 order: Callable[[Any], Indices | None] = lambda message: None) -> None:
-        self.message, self._read_message, self._known = message, read_message, known
-        self._motion, self._order = motion, order
+    message: type
+    layout: PointLayout
+    of_points: Callable[[Points, int], TrajectoryRequest | None]
+    of_message: Callable[..., TrajectoryRequest]
 
     def read(self, data: bytes, now: int, missing: str = REJECT) -> TrajectoryRequest:
-        """Return what the bytes of a message ask for.
+        """Return the request in the bytes of a message.
 
         Parameters
         ----------
@@ -331,25 +321,21 @@ class RequestReader:
         Rejection, MotionError
             For a message that breaks a rule.
         """
-        points = self._known.read(data)
-        if points is not None:
-            return _request_of(points.stamp or now, points.offsets, self._motion(points.numbers))
-        message = message_in(data, self.message)
-        request = self._read_message(message, now, missing)
-        self._known.learn(data, self._order(message))
-        return request
+        points = self.layout.read(data)
+        request = None if points is None else self.of_points(points, now)
+        return request or self.of_message(message_in(data, self.message), now, missing)
 
 
-def readers_for(model: ForceModel, names: RobotNames | None = None) -> dict[str, RequestReader]:
+def readers_for(model: DriveModel, names: RobotNames | None = None) -> dict[str, RequestReader]:
     """Return how trajectories for a model arrive, by topic.
 
-    A robot with loops takes the motion of its drives, and beside it that of its tool where the
-    tool's pose determines the drives.
+    A robot with loops takes the motion of its drives, and of its tool if the pose of the tool
+    determines the drives.
     """
     readers = {TRAJECTORY: reader_for(model, names)}
-    if isinstance(model, MechanismModel):
+    if model.moves_joints:
         try:
-            tool = model.tool_pose.structure.tool
+            tool = model.robot.tool_pose.structure.tool
         except ModelError:
             return readers
         readers[POSES] = _poses((names and names.frame) or str(model.values['robot.base']),
@@ -357,59 +343,42 @@ def readers_for(model: ForceModel, names: RobotNames | None = None) -> dict[str,
     return readers
 
 
-def reader_for(model: ForceModel, names: RobotNames | None = None) -> RequestReader:
+def reader_for(model: DriveModel, names: RobotNames | None = None) -> RequestReader:
     """Return how trajectories for a model arrive, by the names of its robot."""
     names = names or RobotNames.of(model)
     return joint_reader(names.joints) if model.moves_joints else _poses(names.frame, PLATFORM)
 
 
 def _poses(frame: str, body: str) -> RequestReader:
-    known = TrajectoryBytes((1, 1, 1), (7, 6, 6))
-    numbers = np.arange(2.0 * 19).reshape(2, 19) / 7
-    numbers[:, 3:7] = 0.0, 0.0, 0.6, 0.8
-    for named in ('', frame):
-        known.expect(numbers, partial(_written_poses, named, body))
+    def of_points(points: Points, now: int) -> TrajectoryRequest | None:
+        if points.frame not in ('', frame) or points.names != [body]:
+            return None
+        return _request_of(points.stamp or now, points.offsets, _motion_of(points.numbers))
+
     return RequestReader(
-        MultiDOFJointTrajectory,
-        lambda message, now, missing: read_trajectory(message, now, missing, frame, body),
-        known, _motion_of)
-
-
-def _written_poses(frame: str, body: str, numbers: Array, offsets: Sequence[int],
-                   ) -> MultiDOFJointTrajectory:
-    motion = PlatformMotion(*(
-        numbers[:, start:end] for start, end in pairwise((0, 3, 7, 10, 13, 16, 19))))
-    message = write_trajectory(motion, Time(), offsets, frame)
-    message.joint_names = [body]
-    return message
+        MultiDOFJointTrajectory, PointLayout((1, 1, 1), (7, 6, 6)), of_points,
+        lambda message, now, missing: read_trajectory(message, now, missing, frame, body))
 
 
 def joint_reader(joints: Sequence[str]) -> RequestReader:
     """Return how joint trajectories arrive, for joints in the model's order."""
-    count, names = len(joints), RobotNames(tuple(joints), '')
-    known = TrajectoryBytes((count,) * 3, (count,) * 3, empty=1)  # without efforts
-    known.expect(
-        np.arange(6.0 * count).reshape(2, -1) / 7,
-        lambda numbers, offsets: write_joint_trajectory(
-            JointMotion(*_joint_fields(count, numbers)), Time(), offsets, names))
+    joints, count = list(joints), len(joints)
 
-    def order(message: JointTrajectory) -> Indices | None:
-        given = list(message.joint_names)
-        if given == list(joints):
+    def of_points(points: Points, now: int) -> TrajectoryRequest | None:
+        if sorted(points.names) != sorted(joints):
             return None
-        places = np.array([given.index(joint) for joint in joints])
-        return np.concatenate([places + k * count for k in range(3)])
+        numbers = points.numbers
+        if points.names != joints:
+            order = np.array([points.names.index(joint) for joint in joints])
+            numbers = numbers[:, np.concatenate([order + k * count for k in range(3)])]
+        return _request_of(points.stamp or now, points.offsets, _joint_motion_of(count, numbers))
 
     return RequestReader(
-        JointTrajectory,
-        lambda message, now, missing: read_joint_trajectory(message, joints, now, missing),
-        known, partial(_joint_motion_of, count), order)
+        JointTrajectory, PointLayout((count,) * 3, (count,) * 3, empty=1),  # without efforts
+        of_points, lambda message, now, missing: read_joint_trajectory(
+            message, joints, now, missing))
 
 
 def _joint_motion_of(count: int, numbers: Array) -> Callable[[Array], Motion]:
-    return lambda time: JointMotion.checked(*_joint_fields(count, numbers), time, count)
-
-
-def _joint_fields(count: int, numbers: Array) -> tuple[Array, Array, Array]:
-    """Return positions, velocities and accelerations, (N, count) each."""
-    return numbers[:, :count], numbers[:, count:2 * count], numbers[:, 2 * count:]
+    position, velocity, acceleration = (numbers[:, k * count:(k + 1) * count] for k in range(3))
+    return lambda time: JointMotion.checked(position, velocity, acceleration, time, count)

@@ -26,7 +26,15 @@ from starlette.routing import Route
 from pprs_dynamics.app.report.page import CURVES, CURVES_STYLE, assets, vendored
 from pprs_dynamics.app.report.page import asset as packaged
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
-from pprs_dynamics.app.workbench.masks import drawn_samples, quantities, quantity, spans_of
+from pprs_dynamics.app.workbench.masks import (
+    drawn_samples,
+    quantities,
+    quantity,
+    region_mask,
+    shares_in,
+    span_mask,
+    spans_of,
+)
 from pprs_dynamics.app.workbench.robot_motion import robot_motion
 from pprs_dynamics.app.workbench.server.access import AccessControl, Keys, TooLongError
 from pprs_dynamics.app.workbench.server.hub import Hub
@@ -37,6 +45,7 @@ from pprs_dynamics.app.workbench.view_state import units_to_dict
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
+from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.system.numbers import finite
 
 UPLOAD = '/api/upload'
@@ -47,16 +56,16 @@ TYPES = {'.mjs': 'text/javascript', '.js': 'text/javascript', '.css': 'text/css'
 
 # What the session is asked to do by POST, with a JSON object; all are answered by the screen.
 CHANGES: dict[str, Callable[[Session, Fields], object]] = {
-    'choose': lambda session, body: session.choose(
+    'choose': lambda session, body: session.ticks.choose(
         body.text('effect'), body.text('key'), body.number('value'), body.revision()),
-    'release': lambda session, body: session.release(body.text('effect'), body.revision()),
-    'adopt': lambda session, body: session.adopt(body.text('effect'), revision=body.revision()),
-    'cancel': lambda session, body: session.cancel(body.text('kind')),
-    'undo': lambda session, body: session.undo(body.revision()),
-    'back': lambda session, body: session.back(body.revision()),
-    'forward': lambda session, body: session.forward(body.revision()),
-    'remove': lambda session, body: session.remove(body.text('name')),
-    'experiment': lambda session, body: session.next_experiment(body.number('duration')),
+    'release': lambda session, body: session.ticks.release(body.text('effect'), body.revision()),
+    'back': lambda session, body: session.ticks.back(body.revision()),
+    'forward': lambda session, body: session.ticks.forward(body.revision()),
+    'remove': lambda session, body: session.recordings.remove(body.text('name')),
+    'adopt': lambda session, body: session.jobs.adopt(
+        body.text('effect'), revision=body.revision()),
+    'cancel': lambda session, body: session.jobs.cancel(body.text('kind')),
+    'experiment': lambda session, body: session.jobs.next_experiment(body.number('duration')),
 }
 
 
@@ -87,7 +96,7 @@ def _status(status: int) -> Callable[[Request, Exception], Response]:
 
 
 def in_thread(work: Callable[[Any], Response]) -> Callable[[Request], Awaitable[Response]]:
-    """Return an endpoint that works beside the loop."""
+    """Return an endpoint that works in a thread."""
     async def endpoint(request: Request) -> Response:
         return await run_in_threadpool(work, request.query_params)
     return endpoint
@@ -162,54 +171,55 @@ class Api:
             known = index_of(str((query or {}).get('since', '')), version + 1)
             changes = hub.log.since(-1 if known is None else known)
             return binary({**changes, 'version': version},
-                          {'now': session.current_residual.T}
+                          {'now': session.ticks.view.residual.T}
                           if session and 'drawn' in changes else {})
 
     def curves(self, query: Any) -> Response:
         """Answer times and the error before."""
-        session = self.hub.the_session
-        with session.steady():
-            data = session.data
+        ticks = self.hub.the_session.ticks
+        with ticks.steady():
+            data = ticks.fits.design.residuals
             # Times of a long recording have more digits than float32: seconds and the rest.
             whole = np.floor(data.time)
             return binary(
-                {'fitted_since': session.fitted_since, 'drives': list(session.drives),
+                {'fitted_since': ticks.fitted_since, 'drives': list(ticks.fits.drives),
                  'quantities': quantities(data)},
                 {'seconds': whole, 'rest': data.time - whole, 'segment': data.segment.astype(float),
-                 'before': session.given_residual.T, 'measured': data.measured.T})
+                 'before': ticks.fits.before.T, 'measured': data.measured.T})
 
     def tick(self, body: Fields) -> Response:
         """Tick or untick an effect."""
         effect, revision = body.text('effect'), body.revision()
         if body.get('is_ticked', True):
-            self.hub.the_session.tick(effect, body.drives(), revision)
+            self.hub.the_session.ticks.tick(effect, body.drives(), revision)
         else:
-            self.hub.the_session.untick(effect, revision)
+            self.hub.the_session.ticks.untick(effect, revision)
         return self.screen(body)
 
     def shares(self, body: Fields) -> Response:
         """Say what unticked effects explain in a brush, and when that was."""
-        session = self.hub.the_session
+        ticks = self.hub.the_session.ticks
         if 'x' in body:
-            mask = session.region(body.text('x'), body.text('y'), body.range('x_range'),
-                                  body.range('y_range'), body.text('drive'))
+            mask = region_mask(ticks, body.text('x'), body.text('y'), body.range('x_range'),
+                               body.range('y_range'), body.text('drive'))
         else:
             drive = body.get('drive')
-            mask = session.span(*body.range('time'), None if drive is None else [str(drive)])
-        return JSONResponse({'shares': [asdict(one) for one in session.shares(mask)],
-                             'before': finite(root_mean_square(session.given_residual[mask])),
-                             'now': finite(root_mean_square(session.current_residual[mask])),
-                             'spans': spans_of(session.data, mask),
-                             'samples': int(mask.sum()), 'revision': session.revision})
+            mask = span_mask(ticks, *body.range('time'), None if drive is None else [str(drive)])
+        fits, view = ticks.fits, ticks.view
+        return JSONResponse({'shares': [asdict(share) for share in shares_in(mask, fits, view)],
+                             'before': finite(root_mean_square(fits.before[mask])),
+                             'now': finite(root_mean_square(view.residual[mask])),
+                             'spans': spans_of(fits.design.residuals, mask),
+                             'samples': int(mask.sum()), 'revision': ticks.revision})
 
     def experiment_file(self, query: Any) -> Response:
         """Answer the poses, or the joints' positions, of the designed motion."""
         session = self.hub.the_session
-        found = session.experiment
+        found = session.jobs.experiment
         if found is None:
             raise SessionError('no experiment is designed yet')
         return self._download('next.csv', 'text/csv', lambda path: write_motion(
-            path, session.drives, found.motion))
+            path, session.ticks.fits.drives, found.motion))
 
     def model(self, query: Any) -> Response:
         """Answer the model file, with what is ticked where that is asked for."""
@@ -219,7 +229,8 @@ class Api:
 
     def ledger(self, query: Any) -> Response:
         """Answer the ledger alone."""
-        steps = [step.to_dict() for step in self.hub.the_session.steps]
+        steps = [step.to_dict() for step in read_steps(
+            self.hub.the_session.ticks.model.values)]
         return attached('ledger.json', 'application/json',
                         json.dumps({'steps': steps}, indent=2).encode())
 
@@ -235,13 +246,13 @@ class Api:
 
     def scatter(self, query: Any) -> Response:
         """Answer two quantities of a drive."""
-        session = self.hub.the_session
-        if query.get('drive') not in session.drives:
-            raise BadRequestError(f'drive must be one of {", ".join(session.drives)}')
-        d = session.drives.index(query['drive'])
-        with session.steady():
-            x, y = (quantity(session.fits, session.view_state, query.get(axis, ''), d)
-                    for axis in ('x', 'y'))
+        ticks = self.hub.the_session.ticks
+        drives = ticks.fits.drives
+        if query.get('drive') not in drives:
+            raise BadRequestError(f'drive must be one of {", ".join(drives)}')
+        with ticks.steady():
+            x, y = (quantity(ticks.fits, ticks.view, query.get(axis, ''),
+                             drives.index(query['drive'])) for axis in ('x', 'y'))
         at = drawn_samples(x, y)
         return binary({}, {'x': x[at], 'y': y[at]})
 
@@ -284,7 +295,7 @@ class Api:
     def live_set(self, body: Fields) -> Response:
         """Set the model with the ticked effects on the running nodes, all or none."""
         return JSONResponse(self._live.set_model(
-            self.hub.the_session.ticked_model(), body.text('confirmed')))
+            self.hub.the_session.ticks.ticked_model(), body.text('confirmed')))
 
     def live_restore(self, body: Fields) -> Response:
         """Set the running nodes back to what they had before."""
@@ -308,7 +319,7 @@ class Api:
         return self.hub.live
 
     async def events(self, request: Request) -> Response:
-        """Tell the page, whenever something changed, the version that it led to."""
+        """Stream the version of the state after each change."""
         async def lines() -> AsyncIterator[bytes]:
             queue = self.hub.subscribe()
             try:

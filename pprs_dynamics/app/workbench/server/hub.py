@@ -24,7 +24,7 @@ from pprs_dynamics.app.workbench.server.offered import ENDINGS, Offered
 from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.app.workbench.session_file import SavedSession
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MOST_UPLOADS, LONGEST_NAME = 20, 80
 NOT_PLAIN = re.compile('[^A-Za-z0-9._-]+')  # in names of files from elsewhere
@@ -45,7 +45,7 @@ class LiveSource(Protocol):
     def machine(self) -> str:
         """Return what would be set, in words, for a person to confirm; '' where no node runs."""
 
-    def set_model(self, model: ForceModel, confirmed: str) -> dict[str, Any]:
+    def set_model(self, model: DriveModel, confirmed: str) -> dict[str, Any]:
         """Set a model on the running nodes, all or none; return what each said."""
 
     def restore(self, confirmed: str) -> dict[str, Any]:
@@ -87,7 +87,7 @@ class Hub:
         self._worker = Thread(target=self._run, name='workbench', daemon=True)
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begin to work; changes are told in this loop."""
+        """Start the worker; changes are announced in this loop."""
         self._loop = loop
         self._worker.start()
 
@@ -101,7 +101,7 @@ class Hub:
         self.is_over = True
         self._work.set()
         if self.session is not None:
-            for job in list(self.session.jobs.values()):
+            for job in list(self.session.jobs.of_kind.values()):
                 job.cancel()
                 with suppress(Exception):  # whatever it ended with
                     job.result(LAST_WORDS)
@@ -112,8 +112,8 @@ class Hub:
 
     @contextmanager
     def steady(self) -> Iterator[None]:
-        """Keep the state as it is while the block lasts, for one who looks at it."""
-        with self._steady, self.session.steady() if self.session else nullcontext():
+        """Prevent changes of the state while the block lasts."""
+        with self._steady, self.session.ticks.steady() if self.session else nullcontext():
             yield
 
     # Those who listen
@@ -129,7 +129,7 @@ class Hub:
         self._waiting.discard(queue)
 
     def notify(self) -> None:
-        """Tell all browsers that something changed."""
+        """Notify all browsers of a change."""
         self.log.count()
         if self._loop is not None and not self._loop.is_closed():
             with suppress(RuntimeError):  # it closes just now
@@ -155,7 +155,7 @@ class Hub:
         Raises
         ------
         PprsError
-            As `Session.add`.
+            As `Recordings.add`.
         """
         with self._opening:
             if self.session is None:
@@ -164,14 +164,14 @@ class Hub:
                                        'not be held out')
                 self._use(Session.of(self.inputs.with_more(path)))
             else:
-                self.session.add(path, is_held_out)
+                self.session.recordings.add(path, is_held_out)
         self._changed()
 
     @contextmanager
     def upload(self, name: str) -> Iterator[Path]:
         """Give the path for an upload, in a folder of its own, with what is plain of its name.
 
-        What raises an error inside leaves nothing behind, and does not count.
+        After an error inside the block nothing remains, and the upload does not count.
 
         Raises
         ------
@@ -199,7 +199,8 @@ class Hub:
     def save(self, path: Path) -> None:
         """Write the session; errors as `Session.save`."""
         session = self.the_session
-        for name in (*session.inputs.recordings, *session.inputs.validation):
+        inputs = session.ticks.inputs
+        for name in (*inputs.recordings, *inputs.validation):
             if Path(name).is_relative_to(self._uploads.name):
                 raise SessionError(f'{Path(name).name} came from the browser and is gone with the '
                                    'server, must be opened from a folder for the session to be '
@@ -208,7 +209,7 @@ class Hub:
 
     def _use(self, session: Session) -> None:
         self.session, self.failure = session, ''
-        session.subscribe(self._changed)
+        session.ticks.subscribe(self._changed)
 
     def _changed(self) -> None:
         self._work.set()
@@ -238,9 +239,9 @@ class Hub:
             session = self.session
             if session is None or self.is_over:
                 continue
-            if not session.view_state.is_settled:
+            if not session.ticks.view.is_settled:
                 try:
-                    session.settle()
+                    session.ticks.settle()
                     self.failure = ''
                 except Exception as error:
                     self._fail(error)
@@ -251,7 +252,7 @@ class Hub:
         if self.session is not None and self._is_unjudged:
             self._is_unjudged = False
             try:
-                self.session.find_mistakes()
+                self.session.recordings.find_mistakes()
             except PprsError as error:
                 self.failure = str(error)
                 self.notify()
@@ -265,7 +266,7 @@ class Hub:
 
     def _diagnose(self) -> None:
         session = self.session
-        if session is not None and session.fits is not self._diagnosed and not any(
-                job.is_running for job in session.jobs.values()):
-            self._diagnosed = session.fits
-            session.diagnose()
+        if session is not None and session.ticks.fits is not self._diagnosed and not any(
+                job.is_running for job in session.jobs.of_kind.values()):
+            self._diagnosed = session.ticks.fits
+            session.jobs.diagnose()
