@@ -16,7 +16,6 @@ import pytest
 import pprs_dynamics
 from pprs_dynamics import MechanismModel
 from pprs_dynamics.errors import MissingLibraryError
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.simulation.drive_control import (
     LONGEST_LATE,
     ControlSettings,
@@ -168,8 +167,7 @@ def test_actuation_delay_makes_efforts_come_late() -> None:
 
 
 def test_stops_end_the_strokes() -> None:
-    plant = Plant(build_model({**MechanismModel.load('config/delta.yaml').values},
-                              MechanismModel.load('config/delta.yaml').source))
+    plant = Plant(MechanismModel.load('config/delta.yaml'))
     robot = SimulatedRobot(plant, sensors=QUIET)
     for _ in range(300):
         robot.command(Setpoint(effort=np.full(len(plant.position), 0.2) * plant.largest))
