@@ -25,13 +25,12 @@ import numpy as np
 from benchmarks.hidden.motions import RandomMotion, draw_motion
 from benchmarks.hidden.off_forms import off_form
 from benchmarks.hidden.strength import Refit, Whitening, sensitivities, tolerated_numbers
-from pprs_dynamics import DriveModel, JointMotion, MechanismModel, PlatformMotion
+from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.drives import CHANNELS
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.differentiation import Stretch, choose_smoothing
 from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.simulation.engine import MechanismEngine
@@ -222,9 +221,9 @@ class Scene:
 
 def simulated(model: DriveModel, robot: Mapping[str, Any],
               drive_width: Sequence[float] = (1.0,) * 6, passive_width: float = 1.0,
-              ) -> MechanismModel:
+              ) -> DriveModel:
     """Return a robot with other numbers than the model's, and widths of reversal over its own."""
-    own = as_mechanism(build_model({**model.values, **robot}))
+    own = as_mechanism(DriveModel.from_parameters({**model.values, **robot}))
     reversal = own.reversal
     return replace(own, reversal=Reversal(
         tuple(np.multiply(drive_width, reversal.velocity).tolist()),
@@ -255,9 +254,10 @@ def driven(model: DriveModel, platform: PlatformMotion) -> JointMotion:
 def tolerant_model(tolerance: float) -> DriveModel:
     """Return the paper's robot, its masses and friction coefficients known to a tolerance."""
     values = default_parameters()
-    model = build_model(values)
+    model = DriveModel.from_parameters(values)
     keys = dict.fromkeys(key for key, _ in tolerated_numbers(model.values))
-    return build_model({**values, **{f'tolerances.{key}': tolerance for key in keys}})
+    return DriveModel.from_parameters(
+        {**values, **{f'tolerances.{key}': tolerance for key in keys}})
 
 
 def noise_settings(noise: float | str, deviation: float) -> SensorSettings:

@@ -40,8 +40,8 @@ from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel, inertial_values
-from pprs_dynamics.physics.model.model_file import build_model, load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.robot_block import inertial_values
 from pprs_dynamics.simulation.engine import MechanismEngine
 from pprs_dynamics.simulation.injected_forms import FORMS, STEEPNESS, JointForm, JointMoment
 from pprs_dynamics.simulation.injection import (
@@ -94,13 +94,13 @@ class Robot:
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
         All that is known of it.
     duration : float
         Of its runs [s].
     """
 
-    def __init__(self, model: MechanismModel, duration: float) -> None:
+    def __init__(self, model: DriveModel, duration: float) -> None:
         self.model, self.duration = model, duration
         self.engine = MechanismEngine(model)
         motion = draw_motion(model, duration, 0)
@@ -171,7 +171,7 @@ class Robot:
             v / np.asarray(self.model.reversal.velocity)[d])
         return change.over_noise * float(self.noise()[d]) / float(root_mean_square(law))
 
-    def _changed(self, change: Change) -> MechanismModel:
+    def _changed(self, change: Change) -> DriveModel:
         """Return the machine after a change of its model's numbers."""
         values = dict(self.model.values)
         for effect, _, key, _, _ in SHARES:
@@ -185,8 +185,7 @@ class Robot:
             point = change.value * np.array([1.0, *np.zeros(9)])
             values.update({key: tuple(map(float, given)) for key, given in inertial_values(
                 robot.with_body(tool, point).inertial).items()})
-        changed = build_model(values, self.model.source)
-        assert isinstance(changed, MechanismModel)
+        changed = DriveModel.from_parameters(values, self.model.source)
         return changed
 
     def record(self, change: Change, seed: int, path: int,
@@ -217,7 +216,7 @@ class Robot:
             self.model.drives), truth
 
 
-def changes(model: MechanismModel, kinds: Sequence[str], effects: int, seeds: int,
+def changes(model: DriveModel, kinds: Sequence[str], effects: int, seeds: int,
             ) -> Iterator[tuple[Change, int]]:
     """Yield changes and seeds."""
     for k in range(effects):
@@ -331,8 +330,7 @@ def main() -> int:
     parser.add_argument('--duration', type=float, default=DURATION)
     parser.add_argument('--file', type=Path)
     options = parser.parse_args()
-    model = load_model(options.model)
-    assert isinstance(model, MechanismModel)
+    model = DriveModel.load(options.model)
     robot = Robot(without_reference(model), options.duration)
     file = options.file or OUTPUT / f'reference_{options.model.stem}.jsonl'
     reference = Reference.of(robot.model, [robot.record(
@@ -347,12 +345,11 @@ def main() -> int:
     return 0
 
 
-def without_reference(model: MechanismModel) -> MechanismModel:
+def without_reference(model: DriveModel) -> DriveModel:
     """Return a model that names no reference run."""
     values = {key: value for key, value in model.values.items()
               if key.partition('_')[0] != 'reference'}
-    plain = build_model(values, model.source)
-    assert isinstance(plain, MechanismModel)
+    plain = DriveModel.from_parameters(values, model.source)
     return plain
 
 

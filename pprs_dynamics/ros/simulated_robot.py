@@ -16,8 +16,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.errors import ModelError, PprsError
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
@@ -80,10 +79,10 @@ class SimulatedRobotNode(ExplainsRefusals):
         super().__init__('simulated_robot', allow_undeclared_parameters=True, **options)
         self._log = ThrottledLog(self)
         node_values = declare_node_parameters(self, PARAMETERS)
-        declare_model(self)
+        declare_model(self, self.arguments)
         values = {name: value for name, value in current_values(self).items()
                   if name not in node_values}
-        self._model = build_model(values)
+        self._model = DriveModel.from_parameters(values)
         self._names = RobotNames.of(self._model)
         self._use_effort = node_values['use_effort']
         self._robot = _simulated(self._model, node_values)
@@ -193,7 +192,7 @@ class SimulatedRobotNode(ExplainsRefusals):
         return (self.get_clock().now().nanoseconds - self._start) / conversions.NANOSECONDS
 
 
-def _simulated(model: ForceModel, values: Mapping[str, Any]) -> SimulatedRobot:
+def _simulated(model: DriveModel, values: Mapping[str, Any]) -> SimulatedRobot:
     """Return the simulated robot of a model with the node's settings."""
     plant = Plant(model, values['hidden_effects'], values['seed'], values['hidden_scale'],
                   values['rate'])

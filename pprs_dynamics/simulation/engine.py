@@ -29,7 +29,7 @@ from pprs_dynamics.physics.mechanism.mjcf import readable_spec
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.robot_block import described_gravity
 from pprs_dynamics.simulation.engine_loops import ClosedMotion, EngineLoops, cross
 from pprs_dynamics.simulation.engine_state import EngineState
@@ -53,7 +53,7 @@ class MechanismEngine:
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
 
     Raises
     ------
@@ -63,7 +63,7 @@ class MechanismEngine:
         Where mujoco is not installed.
     """
 
-    def __init__(self, model: MechanismModel) -> None:
+    def __init__(self, model: DriveModel) -> None:
         self.engine = mujoco = load_engine()
         self.model_file = model
         robot = self.robot = model.robot
@@ -160,7 +160,7 @@ class MechanismEngine:
         self.model.body_iquat[body] = self._quaternion(axes)
         self.engine.mj_setConst(self.model, self.data)
 
-    def _require_agreement(self, model: MechanismModel) -> None:
+    def _require_agreement(self, model: DriveModel) -> None:
         """Raise ModelError where MuJoCo's efforts without friction are others than the model's."""
         structure, random = self.structure, np.random.default_rng(0)
         middle, way = structure.room(WIDEST)

@@ -23,7 +23,7 @@ from pprs_dynamics.physics.mechanism.description import body_at
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.engine import Carried, MechanismEngine
 from pprs_dynamics.simulation.engine_loops import ClosedMotion
 from pprs_dynamics.simulation.injected_forms import (
@@ -83,7 +83,7 @@ class MechanismRun:
     channels: Mapping[str, Array]
 
 
-def draw_motion(model: MechanismModel, duration: float, seed: int, rate: float = RATE,
+def draw_motion(model: DriveModel, duration: float, seed: int, rate: float = RATE,
                 ) -> JointMotion:
     """Return a random Fourier series of all drives within their limits and the workspace.
 
@@ -148,7 +148,7 @@ class PlainRobot:
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
     motion : JointMotion
         Of the drives.
     rounds : int
@@ -157,7 +157,7 @@ class PlainRobot:
         The motion with closed loops, where it is known of a robot of the same kinematics.
     """
 
-    def __init__(self, model: MechanismModel, motion: JointMotion, rounds: int = 1,
+    def __init__(self, model: DriveModel, motion: JointMotion, rounds: int = 1,
                  closed: ClosedMotion | None = None) -> None:
         self.model, self.motion, self.rounds = model, motion, rounds
         self.engine = MechanismEngine(model)
@@ -339,7 +339,7 @@ class Injection:
 
 
 def simulate_mechanism(
-    model: MechanismModel, names: Sequence[str], seed: int, scale: float = 1.0,
+    model: DriveModel, names: Sequence[str], seed: int, scale: float = 1.0,
     noise: float | None = None, duration: float = 40.0, path_seed: int = 0,
     progress: Callable[[float], None] | None = None, thermometers: bool = False,
     link_encoders: bool = False, motion: JointMotion | None = None,
@@ -348,7 +348,7 @@ def simulate_mechanism(
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
         Its added effects are part of the model, not of the simulated robot.
     names : sequence of str
         Of `NAMES`, or 'random'. Drives may follow after a colon: 'coulomb_friction:a,b'.
@@ -572,7 +572,7 @@ def _tool_drag(run: Injection) -> Injected:
     return Injected(None, sizes, 'c v sqrt(1 + (|v| / v_1)^2)')
 
 
-def _require_tool(model: MechanismModel, name: str) -> None:
+def _require_tool(model: DriveModel, name: str) -> None:
     """Raise InjectedEffectError for an axis, which a force across it does not move."""
     if not model.is_described:
         raise InjectedEffectError(f'{name} does not act along a single axis: choose effort_offset')
@@ -586,7 +586,7 @@ def inject_payload(engine: MechanismEngine, share: float, ahead: float) -> Injec
                     if ahead else "a point at the tool's origin")
 
 
-def link_sizes(model: MechanismModel, random: np.random.Generator, scale: float,
+def link_sizes(model: DriveModel, random: np.random.Generator, scale: float,
                first: int = 1) -> dict[str, Any]:
     """Return a random link and a share of its mass; the rods of a 3-PPRS.
 
@@ -816,13 +816,13 @@ CHANGING = {*BODIES}  # effects that change MuJoCo's model
 NOT_IN_DRIVES = {*BODIES, 'coupled_drives', 'time_delay', 'effort_filter', 'eccentric_encoder'}
 
 
-def guides(model: MechanismModel) -> set[str]:
+def guides(model: DriveModel) -> set[str]:
     """Return the drives whose friction follows the load across them."""
     return {name for effect in model.effects if isinstance(effect, ModelJointFriction)
             for name in effect.blocks if name in model.drives}
 
 
-def own_friction(model: MechanismModel, engine: MechanismEngine, motion: JointMotion,
+def own_friction(model: DriveModel, engine: MechanismEngine, motion: JointMotion,
                  rounds: int = 1) -> Array:
     """Return friction, offset and armature as the model file has them, under the true loads."""
     v = motion.velocity
@@ -837,7 +837,7 @@ def own_friction(model: MechanismModel, engine: MechanismEngine, motion: JointMo
     return friction
 
 
-def links_that_weigh(model: MechanismModel, first: int = 1) -> list[int]:
+def links_that_weigh(model: DriveModel, first: int = 1) -> list[int]:
     """Return the links whose mass can be hidden.
 
     What turns about an upright axis shows in no weight, and the last link is the payload's.
@@ -846,14 +846,14 @@ def links_that_weigh(model: MechanismModel, first: int = 1) -> list[int]:
             and (j >= first or model.robot.structure.loops)]
 
 
-def able_joints(name: str, model: MechanismModel, motion: JointMotion) -> list[int]:
+def able_joints(name: str, model: DriveModel, motion: JointMotion) -> list[int]:
     """Return the joints that a hidden force can act in along a motion."""
     turn, stroke = {**FORMS, **UNKNOWN}[name].needs_turn, np.ptp(motion.position, axis=0)
     return [j for j, unit in enumerate(model.units)
             if not turn or (unit.turns and stroke[j] >= turn)]
 
 
-def one_able_joint(name: str, model: MechanismModel, motion: JointMotion,
+def one_able_joint(name: str, model: DriveModel, motion: JointMotion,
                    random: np.random.Generator) -> int:
     """Return one of the joints that a hidden force can act in along a motion."""
     able = able_joints(name, model, motion)

@@ -25,7 +25,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError, WorkspaceError, suggestion
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.drive_control import ControlSettings
 from pprs_dynamics.simulation.engine import SLOWEST, MechanismEngine
 from pprs_dynamics.simulation.injected_forms import (
@@ -81,7 +81,7 @@ class Plant:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
         Its added effects are no part of the plant.
     names : sequence of str
         See `inject`.
@@ -116,7 +116,7 @@ class Plant:
         See `inject`.
     """
 
-    def __init__(self, model: ForceModel, names: Sequence[str] = (), seed: int = 0,
+    def __init__(self, model: DriveModel, names: Sequence[str] = (), seed: int = 0,
                  scale: float = 1.0, rate: float = 500.0) -> None:
         self.time_step = 1 / (rate * math.ceil(1 / (rate * LONGEST_STEP)))
         self.model = as_mechanism(model)

@@ -10,13 +10,10 @@ from functools import cached_property
 from typing import ClassVar
 
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.simulation.export.exported_robot import described, platform_mechanism
 from pprs_dynamics.simulation.export.expressed import MJCF
 from pprs_dynamics.simulation.export.writers import written
@@ -26,7 +23,7 @@ HINGES, BALLS, RODS = (tuple(f'{part}_{n}' for n in CHAINS) for part in ('hinge'
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlatformMechanism(MechanismModel):
+class PlatformMechanism(DriveModel):
     """The 3-PPRS as a tree of bodies with three closures.
 
     Friction of its guides follows the load across them, as in the model of the paper.
@@ -47,7 +44,7 @@ class PlatformMechanism(MechanismModel):
         effects: tuple[Effect, ...] = (AxisFriction(0.0, 0.0), AxisOffset(0.0),
                                        ModelJointFriction(blocks))
         return cls(robot=platform_mechanism(model.robot, model, MJCF), effects=effects,
-                   reversal=model.reversal, values=values)
+                   reversal=model.reversal, limits=model.limits, values=values)
 
     @cached_property
     def mjcf(self) -> str:
@@ -55,16 +52,6 @@ class PlatformMechanism(MechanismModel):
         return written(described(self.block, self.robot), MJCF)
 
 
-def as_mechanism(model: ForceModel) -> MechanismModel:
-    """Return a model as a mechanism.
-
-    Raises
-    ------
-    ModelError
-        If the robot of the model cannot be simulated.
-    """
-    if isinstance(model, DriveModel):
-        return PlatformMechanism.of(model)
-    if not isinstance(model, MechanismModel):
-        raise ModelError('model', model.title, 'be a 3-PPRS, a robot with a description or an axis')
-    return model
+def as_mechanism(model: DriveModel) -> DriveModel:
+    """Return a model as a mechanism."""
+    return model if model.moves_joints else PlatformMechanism.of(model)

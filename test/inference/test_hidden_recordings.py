@@ -18,7 +18,7 @@ from benchmarks.scores import diagnosis, diagnosis_table
 from benchmarks.scores.cases import here, read_outcomes
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.injection import Choice
 from pprs_dynamics.simulation.sensors import EffortNoise
 
@@ -56,7 +56,7 @@ def test_a_robot_with_nothing_hidden_is_explained_by_its_own_numbers(
 ) -> None:
     case = recordings.Case('nothing', (), 3, width=1.0)
     model, recording, truth = recordings.make_case(case)
-    robot = build_model({**model.values, **truth['robot']})
+    robot = DriveModel.from_parameters({**model.values, **truth['robot']})
     found = np.sqrt(np.mean(measure_residuals(robot, [recording])[0].error ** 2))
     assert found < 1.1 * truth['noise_floor']
     for key, value in truth['robot'].items():
@@ -88,7 +88,7 @@ def test_a_play_is_as_strong_as_a_comparison_sees_it() -> None:
     """It shows as bursts of acceleration, a hundred times what it is as an error of position."""
     case = recordings.Case('effects', ('lost_motion',), 4, 3.0)
     model, recording, truth = recordings.make_case(case)
-    robot = build_model({**model.values, **truth['robot']})
+    robot = DriveModel.from_parameters({**model.values, **truth['robot']})
     error = measure_residuals(robot, [recording])[0].error
     over_noise = np.sqrt(np.mean(np.square(error), axis=0)) / truth['noise_by_drive']
     (effect,) = truth['effects']

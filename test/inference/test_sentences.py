@@ -49,7 +49,7 @@ from pprs_dynamics.inference.search.estimates import Calibration
 from pprs_dynamics.inference.search.patterns import OWN, PLATFORM
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 
 VARIABLES = (*OWN, *PLATFORM, 'velocity', 'direction', 'time', 'frequency', 'position of lift_1',
@@ -216,7 +216,7 @@ def test_suspects_ask_for_another_recording() -> None:
 
 
 def test_a_number_within_its_tolerance_is_calibrated_and_one_beyond_is_not() -> None:
-    values = build_model({**default_parameters(), 'tolerances.masses.payload': 0.05})
+    values = DriveModel.from_parameters({**default_parameters(), 'tolerances.masses.payload': 0.05})
     told = [word_diagnosis(made_up_diagnosis('adequate', model=values,
                                              calibrated=(calibration(after),))).calibrated[0]
             for after in (1.02, 1.2)]

@@ -14,9 +14,8 @@ import numpy as np
 import pytest
 import robots_with_loops as robots
 
-from pprs_dynamics import DriveModel, JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.simulation.drive_control import Setpoint
 from pprs_dynamics.simulation.injected_forms import InjectedEffectError, tilted
 from pprs_dynamics.simulation.injection import draw_motion
@@ -29,12 +28,12 @@ QUIET = SensorSettings.with_effort_noise(0.0)
 TICK = 0.002
 
 
-def models(tmp_path: Path) -> dict[str, MechanismModel]:
+def models(tmp_path: Path) -> dict[str, DriveModel]:
     """Return the example robots with friction in every joint, and an arm."""
     return {'platform': as_mechanism(DriveModel.load('config/paper.yaml')),
-            'hexapod': MechanismModel.load('config/hexapod.yaml'),
-            'delta': MechanismModel.load('config/delta.yaml'),
-            'arm': MechanismModel.load(made_up_arm.write_arm(tmp_path, **{
+            'hexapod': DriveModel.load('config/hexapod.yaml'),
+            'delta': DriveModel.load('config/delta.yaml'),
+            'arm': DriveModel.load(made_up_arm.write_arm(tmp_path, **{
                 key.replace('.', '__'): list(value)
                 for key, value in made_up_arm.FRICTION.items()}))}
 
@@ -81,7 +80,7 @@ def test_it_follows_with_the_feedforward_and_applies_what_the_model_says(
 
 def test_the_loop_of_the_drives_is_stable(tmp_path: Path) -> None:
     """After a jump of the setpoint it comes to rest where friction lets it."""
-    plant = Plant(MechanismModel.load('config/hexapod.yaml'))
+    plant = Plant(DriveModel.load('config/hexapod.yaml'))
     robot = SimulatedRobot(plant, control=plant.gains(7.0, 0.9, command_timeout=np.inf),
                            sensors=QUIET)
     goal = plant.position + np.array([3.0, -3.0, 2.0, 0.0, 1.0, -2.0]) * 1e-3
@@ -95,7 +94,7 @@ def test_the_loop_of_the_drives_is_stable(tmp_path: Path) -> None:
 
 
 def test_it_holds_at_home_saturates_and_refuses(tmp_path: Path) -> None:
-    plant = Plant(MechanismModel.load('config/hexapod.yaml'))
+    plant = Plant(DriveModel.load('config/hexapod.yaml'))
     robot = SimulatedRobot(plant, control=plant.gains(7.0, 0.9), sensors=QUIET)
     home = plant.position.copy()
     for _ in range(50):
@@ -110,7 +109,7 @@ def test_it_holds_at_home_saturates_and_refuses(tmp_path: Path) -> None:
 
 
 def test_an_injected_payload_is_moved_by_the_drive_that_carries_it(tmp_path: Path) -> None:
-    model = MechanismModel.load(robots.five_bar().write(tmp_path))
+    model = DriveModel.load(robots.five_bar().write(tmp_path))
     plain, loaded = Plant(model), Plant(model, ['payload_mass'], seed=2)
     mass, masses = loaded.injected[0]['parameters']['mass'], model.robot.masses.sum()
     assert 0.05 * masses <= mass <= 0.12 * masses
@@ -127,7 +126,7 @@ def platform() -> DriveModel:
 def test_a_platform_without_friction_keeps_its_energy(platform: DriveModel) -> None:
     zero = {key: np.multiply(value, 0.0).tolist() for key, value in platform.values.items()
             if key.startswith('friction.') and key.endswith(('viscous', 'coulomb'))}
-    plant = Plant(build_model({**platform.values, **zero}), rate=2000.0)
+    plant = Plant(DriveModel.from_parameters({**platform.values, **zero}), rate=2000.0)
     plant.place(plant.position, np.array([0.1, -0.05, 0.08, 0.05, -0.04, 0.06]))
     effort = plant.holding(plant.position)
 
@@ -161,7 +160,7 @@ def test_effects_change_while_it_runs(platform: DriveModel) -> None:
 
 
 def test_what_cannot_be_injected_is_refused(tmp_path: Path) -> None:
-    model = MechanismModel.load(robots.five_bar().write(tmp_path))
+    model = DriveModel.load(robots.five_bar().write(tmp_path))
     with pytest.raises(InjectedEffectError, match='rod_mass cannot be injected'):
         Plant(model, ['rod_mass'])
 
@@ -191,7 +190,7 @@ def test_a_tilted_base_turns_the_gravity_that_the_robot_has(
     tmp_path: Path, gravity: list[float],
 ) -> None:
     angle = 0.02
-    model = MechanismModel.load(made_up_arm.write_arm(tmp_path))
+    model = DriveModel.load(made_up_arm.write_arm(tmp_path))
     tilt = BaseTilt({'x': angle, 'y': 0.0})
     robot = replace(model.robot, gravity=tuple(gravity))
     assert tilted(np.array(gravity), angle) == pytest.approx(tilt.changed(robot).gravity)

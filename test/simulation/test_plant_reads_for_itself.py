@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import robots_with_loops as robots
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.simulation.engine import MechanismEngine
 
@@ -53,14 +53,14 @@ def described(folder: Path) -> Path:
 
 
 def test_plant_and_model_agree(tmp_path: Path) -> None:
-    MechanismEngine(MechanismModel.load(described(tmp_path)))
+    MechanismEngine(DriveModel.load(described(tmp_path)))
     for robot in (robots.hexapod, robots.delta, robots.five_bar):
-        MechanismEngine(MechanismModel.load(robot().write(tmp_path)))
+        MechanismEngine(DriveModel.load(robot().write(tmp_path)))
     (tmp_path / 'robot.xml').write_text(MJCF)
     path = tmp_path / 'mjcf.yaml'
     path.write_text('/**:\n  ros__parameters:\n    robot: {mjcf: robot.xml, base: plate, tool: l2, '
                     'drives: [j1, j2]}\n')
-    MechanismEngine(MechanismModel.load(path))
+    MechanismEngine(DriveModel.load(path))
 
 
 @pytest.mark.parametrize(('read', 'stands'), [
@@ -70,7 +70,7 @@ def test_another_reading_of_the_description_is_refused(
     tmp_path: Path, read: str, stands: str,
 ) -> None:
     path = described(tmp_path)
-    model, urdf = MechanismModel.load(path), tmp_path / 'robot.urdf'
+    model, urdf = DriveModel.load(path), tmp_path / 'robot.urdf'
     assert read in urdf.read_text()
     urdf.write_text(urdf.read_text().replace(read, stands))
     with pytest.raises(ModelError, match='in MuJoCo'):

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import pprs_dynamics
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.simulation.drive_control import (
     LONGEST_LATE,
@@ -26,7 +26,7 @@ from pprs_dynamics.simulation.plant import Plant
 from pprs_dynamics.simulation.sensors import EffortNoise, Measurement, SensorSettings
 from pprs_dynamics.simulation.simulated_robot import SimulatedRobot
 
-AXIS = MechanismModel.load('config/single_axis.yaml')
+AXIS = DriveModel.load('config/single_axis.yaml')
 QUIET = SensorSettings(quantisation=0.0, true_velocity=True, white_noise=0.0, coloured_noise=0.0)
 RATE = 500.0
 ZERO = np.zeros(1)
@@ -167,7 +167,7 @@ def test_actuation_delay_makes_efforts_come_late() -> None:
 
 
 def test_stops_end_the_strokes() -> None:
-    plant = Plant(MechanismModel.load('config/delta.yaml'))
+    plant = Plant(DriveModel.load('config/delta.yaml'))
     robot = SimulatedRobot(plant, sensors=QUIET)
     for _ in range(300):
         robot.command(Setpoint(effort=np.full(len(plant.position), 0.2) * plant.largest))
@@ -248,8 +248,8 @@ CONTAINERS = (
     'drives', 'physics.mechanism.motion', 'physics.mechanism.joint_motion',
     'physics.mechanism.joint_series', 'physics.mechanism.description', 'physics.mechanism.urdf',
     'physics.mechanism.mjcf', 'physics.mechanism.structure', 'physics.mechanism.tree_equations',
-    'physics.mechanism.passive_joints', 'physics.model.mechanism_model',
-    'physics.model.drive_model', 'physics.model.force_model', 'physics.model.limits',
+    'physics.mechanism.passive_joints', 'physics.model.drive_model',
+    'physics.model.drive_model', 'physics.model.drive_model', 'physics.model.limits',
     'physics.model.robot_block', 'physics.effects.effect', 'physics.effects.laws.axis_friction',
     'physics.effects.laws.joint_friction', 'errors', 'arrays')
 # Of the equations, which are compiled functions over tables, names and kinds of rows alone.

@@ -19,8 +19,6 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.parameter_file import find_file
 
 if TYPE_CHECKING:
@@ -35,7 +33,7 @@ class SimulationResult(Result):
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recording : Recording
         What the sensors said.
     effects : tuple of dict
@@ -47,7 +45,7 @@ class SimulationResult(Result):
     seed : int
     """
 
-    model: ForceModel
+    model: DriveModel
     recording: Recording
     effects: tuple[dict[str, Any], ...]
     motion: PlatformMotion | JointMotion
@@ -108,7 +106,7 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
 
     Parameters
     ----------
-    model : ForceModel or path
+    model : DriveModel or path
     effects : str or sequence of str
         Names of effects, drawn from the seed; 'random' draws the names, too.
     seed : int
@@ -142,10 +140,10 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     from pprs_dynamics.simulation.injection import simulate_mechanism
     from pprs_dynamics.simulation.platform import as_mechanism
 
-    found = model if isinstance(model, ForceModel) else load_model(find_file(model))
+    found = model if isinstance(model, DriveModel) else DriveModel.load(find_file(model))
     names = [effects] if isinstance(effects, str) else list(effects)
     share_done, drives = stage(progress, 'simulating'), None
-    if isinstance(found, DriveModel):
+    if not found.moves_joints:
         if motion is None:
             path = Excitation(duration=duration, seed=path_seed)
             motion = path.motion(np.arange(0.0, path.duration, 1 / RATE))

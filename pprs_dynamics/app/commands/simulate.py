@@ -19,7 +19,7 @@ from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.simulation.injection import NAMES, RANDOM
 
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    model = load_model(find_file(options.model))
+    model = DriveModel.load(find_file(options.model))
     motion = None if model.moves_joints else _motion(options)
     with staged_bar(screen) as progress:
         result = simulate(

@@ -28,7 +28,7 @@ from pprs_dynamics.inference.experiments.climbing import climb
 from pprs_dynamics.inference.fit.bodies import Bodies
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 HARMONICS = 8  # of the duration
 WIDEST = np.pi  # [rad, m]: a joint is not moved further from the middle, whatever its range
@@ -65,12 +65,12 @@ class ArmMotions:
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
     limits : ArmLimits
     duration : float
     """
 
-    def __init__(self, model: MechanismModel, limits: ArmLimits, duration: float) -> None:
+    def __init__(self, model: DriveModel, limits: ArmLimits, duration: float) -> None:
         tree, left = model.robot.structure, 1 - limits.margin
         self.model, self.duration = model, duration
         self.middle, reach = tree.room(WIDEST)
@@ -170,7 +170,7 @@ class ArmExcitation:
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
     series : JointSeries
     determined, total : int
         Combinations of parameters of links, rotors and friction that it determines better than the
@@ -179,7 +179,7 @@ class ArmExcitation:
         Use of each limit, its margin taken off: at most 1.
     """
 
-    model: MechanismModel
+    model: DriveModel
     series: JointSeries
     determined: int
     total: int
@@ -203,13 +203,13 @@ class ArmExcitation:
                 'total': self.total, 'limits': self.limits, 'duration': self.series.duration}
 
 
-def excite_arm(model: MechanismModel, limits: ArmLimits, duration: float, seed: int,
+def excite_arm(model: DriveModel, limits: ArmLimits, duration: float, seed: int,
                progress: Callable[[float], None] | None = None) -> ArmExcitation:
     """Return the most informative motion about an arm's parameters.
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
     limits : ArmLimits
     duration : float
         [s]

@@ -13,7 +13,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import Forces
+from pprs_dynamics.physics.model.forces import Forces
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.passive_friction import IndependentChainsFriction
 
@@ -67,21 +67,22 @@ class MotionLimits:
         (M, L) array
             In the order of `limit_names`.
         """
-        state, limits, left = forces.mechanism, model.limits, 1 - self.margin
+        state, bounds, left = forces.mechanism, model.robot.bounds, 1 - self.margin
+        limits, chains = model.limits, state.links.chains
         lower, upper = limits.strokes
-        sine = limits.rod_sine + self.margin * (1 - limits.rod_sine)
+        sine = bounds.rod_sine + self.margin * (1 - bounds.rod_sine)
         columns = [
             np.abs(2 * state.position - lower - upper) / ((upper - lower) * left),
             np.abs(state.velocity) / (self.velocity * left),
             np.abs(state.acceleration) / (self.acceleration * left),
             (np.abs(forces.total) + self.effort_reserve) / (limits.efforts * left),
-            ((1 - np.abs(state.chains.sin_u)) / (1 - sine)),
+            ((1 - np.abs(chains.sin_u)) / (1 - sine)),
             (state.motion.tilt / (self.tilt * left))[:, None],
-            (condition_number(model.robot.geometry, state.jacobians.J)
-             / (min(limits.condition_number, self.condition_number) * left))[:, None]]
+            (condition_number(model.robot.geometry, state.links.jacobians.J)
+             / (min(bounds.condition_number, self.condition_number) * left))[:, None]]
         if _needs_cosine(model):
-            cosine = limits.rod_cosine + self.margin * (1 - limits.rod_cosine)
-            columns.append((1 - np.abs(state.chains.cos_u)) / (1 - cosine))
+            cosine = bounds.rod_cosine + self.margin * (1 - bounds.rod_cosine)
+            columns.append((1 - np.abs(chains.cos_u)) / (1 - cosine))
         every = np.concatenate(columns, axis=1)
         largest: Array = every.reshape(-1, samples, every.shape[1]).max(axis=1)
         return largest

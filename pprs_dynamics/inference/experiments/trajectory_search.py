@@ -31,7 +31,8 @@ from pprs_dynamics.measurement.motion.treatment import block_length
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.paths import HOME
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import Forces
+from pprs_dynamics.physics.model.forces import Forces
+from pprs_dynamics.physics.three_pprs.robot import SingularityBounds
 
 HARMONICS = 4  # of each degree of freedom
 SLOWEST_TOP = 5  # the highest harmonic of the slowest motions
@@ -107,8 +108,8 @@ class TrajectorySearch:
         self.question, self.limits, self.duration, self.seed = question, limits, duration, seed
         model = question.model
         # Poses near a singularity are compared, not refused, while searching.
-        self._lenient = replace(model, limits=replace(
-            model.limits, condition_number=np.inf, rod_sine=1e-3))
+        self._lenient = replace(model, robot=replace(model.robot, bounds=SingularityBounds(
+            rod_sine=1e-3)))
         self.top = max(HARMONICS + 1, int(HIGHEST_FREQUENCY * duration))
         self.centre = self._centre()
         samples = max(SAMPLES_PER_PERIOD * self.top, LEAST_SAMPLES)
@@ -231,11 +232,11 @@ class TrajectorySearch:
 
     def _centre(self) -> tuple[float, float, float]:
         """Return the home pose, or the middle of the lifts' strokes if home is at a limit."""
-        limits, geometry = self.question.model.limits, self.question.model.robot.geometry
+        geometry, strokes = self.question.model.robot.geometry, self.question.model.strokes
         lean = (geometry.base_radius - geometry.platform_radius * float(np.mean(np.cos(
             np.subtract(geometry.platform_angles, geometry.chain_angles))))) / geometry.rod_length
-        middle = sum(limits.lift_stroke) / 2 + geometry.elbow_sign * geometry.rod_length * float(
-            np.sqrt(max(1 - lean ** 2, 0.0)))
+        rise = geometry.rod_length * float(np.sqrt(max(1 - lean ** 2, 0.0)))
+        middle = float(sum(end[-1] for end in strokes)) / 2 + geometry.elbow_sign * rise
         middle_pose = (0.0, 0.0, middle)
         for centre in (HOME, middle_pose):
             if self._worst(self._standing(centre), self._time_at_rest()) <= 1:

@@ -19,8 +19,6 @@ from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.simulation.engine import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState
 from pprs_dynamics.simulation.export.exported_robot import ExportedRobot
@@ -98,25 +96,23 @@ class Replayed:
                 'effort': root_mean_square(self.effort)}
 
 
-def replay(model: ForceModel, expressed: Expressed, robot: ExportedRobot, text: str, kind: str,
+def replay(model: DriveModel, expressed: Expressed, robot: ExportedRobot, text: str, kind: str,
            ) -> Replayed:
     """Replay a short motion of the model in MuJoCo; see `file_efforts`."""
     state, motion = model.initial_state(), _excitation(model)
     forces = model.measured(model.drive_forces(motion, state), state)
-    reduced: Any = expressed.model  # of the kind that the motion is of
     by_file = file_efforts(robot, text, kind, JointMotion(*forces.drive_motion))
     error, expected, effort = (np.sqrt(np.mean(values ** 2, axis=0)) for values in (
-        forces.total - by_file, forces.total - reduced.drive_forces(motion).total, forces.total))
+        forces.total - by_file, forces.total - expressed.model.drive_forces(motion).total, forces.total))
     return Replayed(model.drives, tuple(unit.effort for unit in model.units), error, expected,
                     effort)
 
 
-def _excitation(model: ForceModel) -> Any:
+def _excitation(model: DriveModel) -> Any:
     time = np.arange(0.0, DURATION, 1 / RATE)
-    if isinstance(model, DriveModel):
-        return Excitation(duration=DURATION).motion(time)
-    assert isinstance(model, MechanismModel)
-    return draw_motion(model, DURATION, 0)
+    if model.moves_joints:
+        return draw_motion(model, DURATION, 0)
+    return Excitation(duration=DURATION).motion(time)
 
 
 def _close(mujoco: Any, spec: Any, robot: ExportedRobot) -> None:
