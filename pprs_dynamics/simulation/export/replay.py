@@ -103,7 +103,8 @@ def replay(model: DriveModel, expressed: Expressed, robot: ExportedRobot, text: 
     forces = model.measured(model.drive_forces(motion, state), state)
     by_file = file_efforts(robot, text, kind, JointMotion(*forces.drive_motion))
     error, expected, effort = (np.sqrt(np.mean(values ** 2, axis=0)) for values in (
-        forces.total - by_file, forces.total - expressed.model.drive_forces(motion).total, forces.total))
+        forces.total - by_file, forces.total - expressed.model.drive_forces(motion).total,
+        forces.total))
     return Replayed(model.drives, tuple(unit.effort for unit in model.units), error, expected,
                     effort)
 
