@@ -18,8 +18,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 NOWHERE = 'The error is not concentrated in any region.'
-FIRST = 3  # statements on the first screen
-MOST_PLACES = 4  # that are shown without --details
+FIRST = 3  # statements on the first screen, and without --details
 EFFORTS = ('rms', 'bias', 'peak', 'noise')
 
 
@@ -50,7 +49,7 @@ def comparison_view(comparison: Comparison, following: tuple[str, str], details:
     beside : Beside, optional
     """
     lines = [f'{number}. {one.text}' for number, one in enumerate(comparison.where, start=1)]
-    shown = lines if details else lines[:MOST_PLACES]
+    shown = lines if details else lines[:FIRST]
     parts = [_drives_table(comparison), escape(comparison.verdict), *map(escape, shown)]
     if not lines:
         parts.append(NOWHERE)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from itertools import accumulate
 from typing import Any
 
 from pprs_dynamics.app.report import diagnosis_figures as figures
@@ -40,7 +41,9 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 
 COLOURS = {'adequate': 'green', 'effect': 'cyan', 'ambiguous': 'yellow', 'unknown': 'magenta'}
 MOST_LISTED = 2  # places of effects whose parameters the sentences give; names in one line
-MOST_EFFECTS, MOST_VALUES = 4, 3  # that are shown without --details
+WIDTH = 80
+LONGEST = 400  # characters of rows, values and the runner-up without --details: five lines
+MOST_EFFECTS = 4  # that are shown without --details
 REFIT = 'its own numbers'  # of the model, fitted beside the effects
 LEAST_REFIT = 0.01  # share of the error, from which these are listed
 EVERYWHERE = 'structure'  # where effects sit that are not on drives
@@ -79,15 +82,19 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     """Yield verdict, fall and next step, in at most 25 lines of 80 columns."""
     yield verdict_panel(diagnosis.verdict, COLOURS[diagnosis.verdict], words.headline)
     yield from (f'[blue]i[/] {escape(text)}' for text in words.reference)
+    second = runner_up(diagnosis)
+    room = max(LONGEST - _room(f'Runner-up {second}') - WIDTH * len(diagnosis.effects), WIDTH)
     if diagnosis.effects:
         yield text_table(_headings(diagnosis), _effect_rows(diagnosis)[:MOST_EFFECTS],
                          right=(2, 3, 4), whole=(0, 2, 3, 4), frame='none')
         lines = [f'  {f"{effect} on {drive}" if drive else effect}: {text}'
                  for effect, drive, text in _joined(fitted_values(diagnosis))]
-        yield from map(escape, lines[:MOST_VALUES])
-        if len(lines) > MOST_VALUES:
-            yield f'  … values of {len(lines) - MOST_VALUES} more: --details'
-    if second := runner_up(diagnosis):
+        shown = [line for line, total in zip(lines, accumulate(map(_room, lines)), strict=True)
+                 if total <= room]
+        yield from map(escape, shown)
+        if len(lines) > len(shown):
+            yield f'  … values of {len(lines) - len(shown)} more: --details'
+    if second:
         yield f'[bold]Runner-up[/] {escape(second)}'
         yield LEGEND
     if diagnosis.verdict == 'adequate' and (seen := word_detectable(diagnosis)):
@@ -96,6 +103,11 @@ def _brief(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
         yield f'[blue]i[/] {escape(words.barred[0])}'
     if words.warnings:
         yield f'[yellow]![/] {escape(words.warnings[0])}'
+
+
+def _room(line: str) -> int:
+    """Return how many characters a line takes, whole lines of the screen."""
+    return -(-len(line) // WIDTH) * WIDTH
 
 
 def _following(words: Sentences) -> Iterator[Any]:
