@@ -26,13 +26,12 @@ import made_up_arm
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pprs_dynamics import DriveModel, MechanismModel, PlatformMotion
+from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect
 from pprs_dynamics.physics.effects.effect import PLATFORM, CatalogueEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.three_pprs.forward_kinematics import (
     solve_forward_kinematics,
 )
@@ -128,8 +127,8 @@ def arm_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, 
         model = made_up_arm.real_arm(Path(folder), **{
             'friction.motors.wrist.turn': 1.0, 'friction.motors.wrist.swing': 1.0})
         motion = made_up_arm.motion(SECONDS, RATE, seed=3)
-        changed = build_model({**model.values, **block(effect, 'swing')}, model.source)
-    assert isinstance(changed, MechanismModel)
+        changed = DriveModel.from_parameters(
+            {**model.values, **block(effect, 'swing')}, model.source)
     plain, at = model.drive_forces(motion), motion
     if changed.misreadings:  # as in `platform_law`
         read = (motion.position + changed.position_error(motion.position)

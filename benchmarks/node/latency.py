@@ -26,10 +26,10 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from benchmarks.node import echo_node
 from benchmarks.node.stream import Stream, feedforward, node_process, served
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.ros.messages.conversions import write_trajectory
-from pprs_dynamics.simulation.mechanism_run import draw_motion
+from pprs_dynamics.simulation.injection import draw_motion
 
 RATES = (500.0, 1000.0)
 ROUNDS = 5
@@ -45,7 +45,7 @@ def trajectory(points: int) -> bytes:
         motion, Time(), [k * 1_000_000 for k in range(points)])))
 
 
-def hexapod_setpoint(model: MechanismModel) -> bytes:
+def hexapod_setpoint(model: DriveModel) -> bytes:
     """Return a serialised setpoint of the drives of a robot with loops, in motion."""
     motion = draw_motion(model, 2.0, 1, RATES[0])
     q, v, a = (values[len(values) // 2].tolist() for values in (
@@ -80,7 +80,7 @@ def run(seconds: float) -> dict[str, Any]:
 
 def hexapod(seconds: float, domain: int) -> dict[str, dict[str, float]]:
     """Return round trips of a 6-UPS at the lower rate, in joints."""
-    setpoint = hexapod_setpoint(MechanismModel.load(HEXAPOD))
+    setpoint = hexapod_setpoint(DriveModel.load(HEXAPOD))
     command = [*feedforward('command_timeout:=0.0'), '--params-file', HEXAPOD]
     with served([sys.executable, echo_node.__file__, 'joints'], '/echo', domain, False,
                 JointTrajectory) as (floor, _), served(

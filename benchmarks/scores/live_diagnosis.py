@@ -25,13 +25,12 @@ from functools import partial
 from operator import itemgetter
 from pathlib import Path
 from resource import RUSAGE_SELF, getrusage
-from typing import Any
 
 import numpy as np
 
 from benchmarks import OUTPUT
-from benchmarks.hidden.prescribed import PrescribedPlant
 from benchmarks.hidden.recordings import (
+    IN_CATALOGUE,
     LEAD,
     NOISE,
     PINK,
@@ -39,7 +38,6 @@ from benchmarks.hidden.recordings import (
     Case,
     Scene,
     _draw,
-    _motion,
     noise_settings,
 )
 from benchmarks.scores.cases import Outcome, here, read_outcomes, run_missing
@@ -48,8 +46,7 @@ from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.held_out import predictive_gain
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.simulation.injected_effects import IN_CATALOGUE
-from pprs_dynamics.simulation.injected_forces import FrictionTemperature
+from pprs_dynamics.simulation.injection import Choice
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 STEPS = ('plain', 'change', 'hidden', 'hidden', 'plain', 'plain')
@@ -80,19 +77,17 @@ class Stream:
         return other
 
 
-def window(place: Scene, seed: int, effects: tuple[Any, ...], moment: float | None,
+def window(place: Scene, seed: int, effects: tuple[Choice, ...], moment: float | None,
            stream: Stream) -> Recording:
     """Return one window along a motion of its own; the effects from a moment on [s], or always."""
-    _, motion = _motion(seed)
-    plant = PrescribedPlant({**place.model.values, **place.robot}, motion, place.settings)
-    read = plant.readings(effects)
-    position, effort = read.position[LEAD:], read.effort[LEAD:]
-    clock = motion.time[LEAD:]
+    there = place.on_motion(seed)
+    run = there.inject(effects)
+    position, effort = run.position[LEAD:], run.efforts[LEAD:]
+    clock = there.time
     if moment is not None:
-        plain = plant.readings([])
         early = (clock < moment)[:, None]
-        position = np.where(early, plain.position[LEAD:], position)
-        effort = np.where(early, plain.effort[LEAD:], effort)
+        position = np.where(early, there.plain.motion.position[LEAD:], position)
+        effort = np.where(early, there.plain.effort[LEAD:], effort)
     return Recording.from_arrays(f'window {seed}', clock, stream.settings.quantised(position),
                                  None, effort + stream.noise.samples(len(clock)))
 
@@ -103,9 +98,9 @@ def changes(name: str, seed: int) -> Outcome:
     place = Scene(seed, 1.0)
     drawn = _draw(case, place, name)
     rng = np.random.default_rng((seed, 5))
-    length = len(place.motion.time[LEAD:]) / RATE
+    length = len(place.time) / RATE
     moment = float(rng.uniform(0.2, 0.8)) * length
-    truth, stream = drawn.effect.truth(), Stream(seed, 0.9, drawn.noise)
+    (truth,), stream = place.inject([drawn.effect]).truths, Stream(seed, 0.9, drawn.noise)
     live, said, start, used = LiveDiagnosis(place.model), [], 0.0, time.process_time()
     for number, what in enumerate(STEPS):
         effects = () if what == 'plain' else (drawn.effect,)
@@ -167,7 +162,7 @@ def cases(mode: str, arguments: list[str]) -> dict[str, Callable[[], Outcome]]:
     """Return what is asked for, by its key in the file of outcomes."""
     if mode == 'changes':
         # The monitor hears no thermometer.
-        every = sorted({*IN_CATALOGUE} - {FrictionTemperature.name})
+        every = sorted({*IN_CATALOGUE} - {'friction_temperature'})
         # Each with a robot, motions and a moment of its own.
         return {f'{name} {seed}': partial(changes, name,
                                           300 + len(every) * seed + every.index(name))

@@ -179,7 +179,7 @@ def _work(pipe: Any) -> None:
     from pprs_dynamics.errors import PprsError
     from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
     from pprs_dynamics.inference.fit.reference_runs import read_reference
-    from pprs_dynamics.physics.model.model_file import build_model
+    from pprs_dynamics.physics.model.drive_model import DriveModel
 
     def said(live: LiveDiagnosis) -> dict[str, Any]:
         return {**live.to_dict(), ADOPTED: live.adopted()}
@@ -192,7 +192,7 @@ def _work(pipe: Any) -> None:
             return
         try:
             if known != (values, source, reference):
-                model = build_model(values, source)
+                model = DriveModel.from_parameters(values, source)
                 live = LiveDiagnosis(model, reference=(
                     read_reference(model, reference) if reference else None))
                 known = values, source, reference

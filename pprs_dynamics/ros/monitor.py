@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import replace
 from typing import Any
 
@@ -81,7 +80,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
     """
 
     def __init__(self, **options: Any) -> None:
-        ManagedNode.__init__(self, 'monitor', allow_undeclared_parameters=True, **options)
+        super().__init__('monitor', allow_undeclared_parameters=True, **options)
         self._log = ThrottledLog(self)
         self._worker = DiagnosisWorker()
         self._publishers_made: list[Any] = []
@@ -100,7 +99,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._counters = self._stream.counters
         self._counters.update(dict.fromkeys(REJECTIONS, 0))
         self._share, self._counted = 1.0, (0, 0)
-        self._files = files_given(options.get('cli_args') or sys.argv)
+        self._files = files_given(self.arguments)
         self._joints = AllJoints()
         self._adoptable: dict[str, Any] = {}  # values of the model with what is claimed
         self._diagnosed = self._settings.model  # the latest window against it

@@ -21,15 +21,14 @@ import pytest
 import pprs_dynamics
 from pprs_dynamics import (
     ComparisonResult,
+    DriveModel,
     Excitation,
     JointMotion,
     PprsError,
     Recording,
     UnreadableFileError,
     adopt,
-    build_model,
     compare,
-    load_model,
     next_experiment,
     simulate,
     write_recording,
@@ -42,8 +41,8 @@ HEAVY = {'numpy', 'scipy', 'pandas', 'rich', 'matplotlib', 'plotly', 'rclpy'}
 
 
 def record(name: str, seed: int, seconds: float = 8.0) -> Recording:
-    given = load_model('config/paper.yaml')
-    robot = build_model({**given.values, 'effects.active': ['viscous_friction'],
+    given = DriveModel.load('config/paper.yaml')
+    robot = DriveModel.from_parameters({**given.values, 'effects.active': ['viscous_friction'],
                          'effects.viscous_friction.slide_2.coefficient': VISCOUS})
     motion = Excitation(seconds, seed).motion(np.arange(0.0, seconds, 0.005))
     forces = robot.drive_forces(motion)
@@ -167,7 +166,7 @@ def test_results_are_frozen(compared: ComparisonResult) -> None:
 def test_recordings_from_memory_and_from_files_are_one(
     compared: ComparisonResult, folder: Path,
 ) -> None:
-    model = load_model('config/paper.yaml')
+    model = DriveModel.load('config/paper.yaml')
     again = compare(model, pprs_dynamics.read_recording(folder / 'run.csv'))
     assert again.rms == pytest.approx(compared.rms, rel=1e-12)
     assert 'RECORDING' in str(again)
@@ -236,14 +235,12 @@ def test_a_simulation_hides_what_it_says_and_is_written(tmp_path: Path) -> None:
     read = pprs_dynamics.read_recording(tmp_path / 'run.csv')
     assert read.effort == pytest.approx(run.recording.effort)
     assert run.to_dict()['samples'] == len(read.time)
-    with pytest.raises(PprsError, match='feedforward'):
-        simulate('config/paper.yaml', feedforward='all')
 
 
 def test_an_effect_of_an_axis_is_found_adopted_and_the_error_falls() -> None:
     """The whole loop in Python, quickly; the notebook of the robot runs before a release."""
-    model = load_model('config/single_axis.yaml')
-    robot = build_model({**model.values, 'effects.active': ['drive_spring'],
+    model = DriveModel.load('config/single_axis.yaml')
+    robot = DriveModel.from_parameters({**model.values, 'effects.active': ['drive_spring'],
                          'effects.drive_spring.axis.stiffness': 300.0,
                          'effects.drive_spring.axis.position': 0.01})
     time = np.arange(0.0, 8.0, 0.005)
@@ -280,7 +277,7 @@ def loop(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         for cell in notebook['cells']:
             if cell['cell_type'] == 'code':
                 exec(compile(''.join(cell['source']), cell['id'], 'exec'), names)
-        names['saved'] = load_model('better.yaml')
+        names['saved'] = DriveModel.load('better.yaml')
     return names
 
 

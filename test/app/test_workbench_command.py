@@ -18,7 +18,7 @@ import pytest
 from workbench_bench import write_hidden
 from workbench_server import workbench
 
-from pprs_dynamics import load_model
+from pprs_dynamics import DriveModel
 from pprs_dynamics.app.commands import workbench as workbench_command
 from pprs_dynamics.app.workbench import Session
 from pprs_dynamics.app.workbench.robot_motion import robot_motion
@@ -118,7 +118,7 @@ def test_a_single_axis_has_the_same_session(tmp_path: Path) -> None:
     position = 0.1 * np.sin(2 * np.pi * 0.4 * time) + 0.03 * np.sin(2 * np.pi * 1.1 * time)
     velocity, acceleration = np.gradient(position, time), np.gradient(
         np.gradient(position, time), time)
-    values = load_model(AXIS).values
+    values = DriveModel.load(AXIS).values
     effort = (values['axis.mass'] * acceleration + values['axis.viscous'] * velocity
               + values['axis.coulomb'] * np.tanh(velocity / values['friction.reversal_velocity'])
               + values['axis.offset'] + SPRING * position

@@ -21,8 +21,8 @@ from workbench_server import Workbench, workbench
 
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench.session_file import SavedSession
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import read_steps
-from pprs_dynamics.physics.model.model_file import load_model
 
 pytestmark = needs_browser
 
@@ -316,7 +316,7 @@ def test_adopt_refuse_export_undo(page: Page, folder: Path) -> None:
     with page.tab.expect_download() as started:
         page.tab.locator('#export').click()
     started.value.save_as(folder / 'model.yaml')
-    assert [step.effect for step in read_steps(load_model(folder / 'model.yaml').values)] == [
+    assert [step.effect for step in read_steps(DriveModel.load(folder / 'model.yaml').values)] == [
         'payload_mass']
     page.tick('coulomb_friction')
     ticked = page.settled()

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from workbench_bench import HIDDEN, write_hidden
 
-from pprs_dynamics import MechanismModel, read_recording
+from pprs_dynamics import DriveModel, read_recording
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench import Session
@@ -41,7 +41,6 @@ from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.ledger import read_steps
-from pprs_dynamics.physics.model.model_file import load_model
 
 FORCE = HIDDEN['effects.coulomb_friction.lift_2.force']
 MASS = HIDDEN['effects.payload_mass.mass']
@@ -252,7 +251,8 @@ def test_an_effect_is_adopted_refused_exported_and_taken_back(
     assert set(session.ticks.view.ticks) == {'coulomb_friction'}
     assert steps_of(session) == ['payload_mass']
     session.export(tmp_path / 'adopted.yaml')
-    assert [step.effect for step in read_steps(load_model(tmp_path / 'adopted.yaml').values)] == [
+    assert [step.effect for step in read_steps(DriveModel.load(
+        tmp_path / 'adopted.yaml').values)] == [
         'payload_mass']
     found = compared(tmp_path, recording, tmp_path / 'adopted.yaml')
     for name, error in session.errors().items():
@@ -473,9 +473,8 @@ def test_a_reference_stays_when_a_recording_goes(tmp_path: Path) -> None:
 def test_a_session_says_since_when(tmp_path: Path) -> None:
     """Of an arm with drag that was always there: only the dry friction has changed."""
     moved = arm.motion(12.0, seed=0)
-    model = load_model(arm.write_arm(tmp_path, **{
+    model = DriveModel.load(arm.write_arm(tmp_path, **{
         key.replace('.', '__'): list(value) for key, value in arm.FRICTION.items()}))
-    assert isinstance(model, MechanismModel)
 
     def write(name: str, seed: int, force: float = 0.0) -> Path:
         clean = arm.record(model, moved, 0.05, seed)
@@ -549,7 +548,7 @@ class TestASavedSession:
             session.resume(saved)
 
     def test_is_not_written_of_what_is_in_no_file(self, recording: Path, tmp_path: Path) -> None:
-        session = Session(load_model('config/paper.yaml'), {'run': read_recording(recording)})
+        session = Session(DriveModel.load('config/paper.yaml'), {'run': read_recording(recording)})
         with pytest.raises(SessionError, match='recording run is in no file'):
             session.save(tmp_path / 'session.json')
         assert not (tmp_path / 'session.json').exists()

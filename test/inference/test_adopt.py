@@ -35,7 +35,6 @@ from pprs_dynamics.measurement.files.fingerprint import fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.ledger import read_steps
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters, read_parameters
 
@@ -183,9 +182,9 @@ def test_force_overrides_and_is_recorded(files: Files) -> None:
 def synthetic(values: dict[str, Any], **recorded: Any) -> tuple[DriveModel, Recording]:
     """Return a model and a recording of a robot that differs from it."""
     motion = Excitation(DURATION, seed=5).motion(np.arange(0, DURATION, 0.002))
-    forces = build_model({**default_parameters(), **recorded}).drive_forces(motion)
+    forces = DriveModel.from_parameters({**default_parameters(), **recorded}).drive_forces(motion)
     noise = np.random.default_rng(8).normal(0, NOISE, forces.total.shape)
-    return build_model({**default_parameters(), **values}), Recording.from_arrays(
+    return DriveModel.from_parameters({**default_parameters(), **values}), Recording.from_arrays(
         'synthetic', motion.time, forces.mechanism.position, None, forces.total + noise)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from made_up_arm import real_arm
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.constrained import (
     Inequalities,
@@ -30,7 +30,6 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.description import pseudo_inertia
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
-from pprs_dynamics.physics.model.model_file import build_model
 
 SPREAD = np.array([0.05, 0.01, 0.01, 0.01, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02])
 
@@ -215,7 +214,7 @@ def test_a_body_of_which_the_fit_says_nothing_is_any(robot: Mechanism) -> None:
 
 # Totals of a drive.
 
-MODEL = MechanismModel.load('config/single_axis.yaml')
+MODEL = DriveModel.load('config/single_axis.yaml')
 TIME = np.arange(0, 8, 0.005)
 
 
@@ -232,7 +231,7 @@ def motion() -> JointMotion:
 def test_no_total_of_a_drive_is_negative_when_one_constraint_moves_another(inertia: float) -> None:
     """Less inertia than none moves the frictions; all are within their bounds afterwards."""
     moved = motion()
-    exact = build_model({**MODEL.values, **dict.fromkeys(
+    exact = DriveModel.from_parameters({**MODEL.values, **dict.fromkeys(
         (f'tolerances.axis.{key}' for key in ('mass', 'viscous', 'coulomb')), 1e-6)})
     effort = exact.drive_forces(moved).total + MODEL.values['axis.mass'] * inertia * (
         moved.acceleration) - 0.99 * MODEL.values['axis.viscous'] * moved.velocity

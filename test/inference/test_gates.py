@@ -23,10 +23,9 @@ from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.form_error import FormErrors
 from pprs_dynamics.inference.search.held_out import BLOCKS, PredictiveGain, predictive_gain
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.physics.model.model_file import build_model
 
 PLAIN = DriveModel.load()
-FRICTION = build_model({**PLAIN.values, 'effects.active': ['coulomb_friction'],
+FRICTION = DriveModel.from_parameters({**PLAIN.values, 'effects.active': ['coulomb_friction'],
                         'effects.coulomb_friction.lift_2.force': -1.0})
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from shared_cases import shared_case
 
-from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, next_step
@@ -23,9 +23,8 @@ from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
-from pprs_dynamics.physics.model.model_file import build_model
 
-MODEL = MechanismModel.load('config/single_axis.yaml')
+MODEL = DriveModel.load('config/single_axis.yaml')
 MASS, VISCOUS, COULOMB = (MODEL.values[f'axis.{key}'] for key in ('mass', 'viscous', 'coulomb'))
 TIME = np.arange(0, 20, 0.005)
 
@@ -60,7 +59,7 @@ def test_no_more_is_taken_away_than_there_is(name: str, names: tuple[str, ...], 
                'coulomb_friction': np.sign(motion().velocity)}[name]
     recording = recorded(MODEL.drive_forces(motion()).total + share * own * columns)
     # The model's own numbers are known, so that what is missing is the effect's alone.
-    exact = build_model({**MODEL.values, **dict.fromkeys(
+    exact = DriveModel.from_parameters({**MODEL.values, **dict.fromkeys(
         (f'tolerances.axis.{key}' for key in ('mass', 'viscous', 'coulomb')), 1e-6)})
     fits = FittedSets(Design.of(exact, [recording]), DECISIONS)
     component = Component.of(catalogue()[name], 0, {}, names)
@@ -76,7 +75,7 @@ def test_no_more_is_taken_away_than_there_is(name: str, names: tuple[str, ...], 
 
 def test_what_can_only_be_nothing_does_not_void_what_is_there() -> None:
     """One direction may have less than nothing by chance; the other is told all the same."""
-    bare = build_model({**MODEL.values, 'axis.coulomb': 0.0})
+    bare = DriveModel.from_parameters({**MODEL.values, 'axis.coulomb': 0.0})
     moved = motion()
     forward = (1 + np.sign(moved.velocity)) / 2
     effort = bare.drive_forces(moved).total + COULOMB * forward + 0.1 * COULOMB * (1 - forward)
@@ -116,7 +115,7 @@ def test_a_ripple_longer_than_the_stroke_is_no_free_curve() -> None:
 
 def test_no_gain_beyond_what_a_drive_may_have_is_reported() -> None:
     """Mass and friction that all are too small explain as well what a gain of 1.9 would."""
-    loose = build_model({**MODEL.values, 'tolerances.effort_gain.gain': 1.0})
+    loose = DriveModel.from_parameters({**MODEL.values, 'tolerances.effort_gain.gain': 1.0})
     found = diagnose(loose, [recorded(1.9 * MODEL.drive_forces(motion()).total)])
     assert found.effects
     assert not [one for one in found.effects if one.name == 'effort_gain']
@@ -152,7 +151,7 @@ def test_a_gain_that_a_drive_may_have_is_one() -> None:
 def test_less_inertia_than_none_is_no_effect() -> None:
     """Efforts that decelerate where they should accelerate, with the friction that there is."""
     moved = motion()
-    light = build_model({**MODEL.values, 'axis.mass': 1e-6})
+    light = DriveModel.from_parameters({**MODEL.values, 'axis.mass': 1e-6})
     effort = light.drive_forces(moved).total - 0.3 * MASS * moved.acceleration
     found = diagnose(MODEL, [recorded(effort)], as_it_is=True)
     assert found.verdict != 'effect'
@@ -165,7 +164,7 @@ def test_an_answer_with_which_the_error_rises_is_none(tmp_path: Path, seed: int)
     real = arm.real_arm(tmp_path)
     run = arm.record(real, arm.motion(12.0, seed=seed), 0.2, seed)
     radians = np.array([np.pi / 180, np.pi / 180, 1.0])
-    found = diagnose(MechanismModel.load(tmp_path / 'arm.yaml'), [Recording.from_arrays(
+    found = diagnose(DriveModel.load(tmp_path / 'arm.yaml'), [Recording.from_arrays(
         'run', run.time, run.position * radians, None, run.effort, run.drives)], as_it_is=True)
     if found.effects:
         assert root_mean_square(found.remaining) < root_mean_square(found.residuals.error)

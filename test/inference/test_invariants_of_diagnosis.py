@@ -13,12 +13,11 @@ import numpy as np
 import pytest
 from planar_arm import planar_arm
 
-from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.inference.adoption.loop import adopt_all
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.model_file import build_model, load_model
 from pprs_dynamics.physics.model.robot_block import AXIS
 
 RATE, DURATION = 200.0, 8.0  # [Hz, s]
@@ -34,9 +33,9 @@ HIDDEN = {
 EFFECTS = [name for name in HIDDEN if name != 'nothing']
 
 
-def axis_model(scale: float = 1.0) -> MechanismModel:
-    model = build_model({**OTHERS, **{key: scale * one for key, one in EFFORTS.items()}})
-    assert isinstance(model, MechanismModel)
+def axis_model(scale: float = 1.0) -> DriveModel:
+    model = DriveModel.from_parameters(
+        {**OTHERS, **{key: scale * one for key, one in EFFORTS.items()}})
     return model
 
 
@@ -44,9 +43,8 @@ def axis_model(scale: float = 1.0) -> MechanismModel:
 def recorded(name: str, seed: int) -> Recording:
     """Return a recording of an axis with an effect, which differs by motion and noise."""
     effect = {f'effects.{name}.{AXIS}.{key}': one for key, one in HIDDEN[name].items()}
-    model = build_model({**EFFORTS, **OTHERS, **effect,
+    model = DriveModel.from_parameters({**EFFORTS, **OTHERS, **effect,
                          'effects.active': [name] if effect else []})
-    assert isinstance(model, MechanismModel)
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, DURATION, 1 / RATE)
     omega = 2 * np.pi * np.array([0.25, 0.5, 1.0])[:, None]
@@ -126,8 +124,8 @@ def test_the_answer_does_not_depend_on_the_order_of_drives(tmp_path: Path, name:
     """One arm and one recording, whose drives are listed from the base and from the tool."""
     planar_arm(tmp_path, 2)
     path = tmp_path / 'arm.yaml'
-    model = load_model(path)
-    hidden = build_model({**model.values, 'effects.active': [name], **{
+    model = DriveModel.load(path)
+    hidden = DriveModel.from_parameters({**model.values, 'effects.active': [name], **{
         f'effects.{name}.j2.{key}': one for key, one in HIDDEN[name].items()}}, model.source)
     time = np.arange(0.0, DURATION, 1 / RATE)
     size, omega = np.array([0.6, 0.8]), 2 * np.pi * np.array([0.5, 0.75])
@@ -140,7 +138,7 @@ def test_the_answer_does_not_depend_on_the_order_of_drives(tmp_path: Path, name:
     for order in ([0, 1], [1, 0]):
         drives = tuple(('j1', 'j2')[k] for k in order)
         path.write_text(path.read_text().replace('[j1, j2]', f'[{", ".join(drives)}]'))
-        found.append(diagnose(load_model(path), [Recording.from_arrays(
+        found.append(diagnose(DriveModel.load(path), [Recording.from_arrays(
             'run', time, moved.position[:, order], None, effort[:, order], drives)]))
     assert answer(found[0]) == answer(found[1])
     assert (name, ('j2',)) in answer(found[0])[1]

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.regression.design import Design
@@ -23,7 +23,6 @@ from pprs_dynamics.inference.search.table import ModelTable
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.robot_block import AXIS
 
 TIME = np.arange(0.0, 8.0, 0.005)
@@ -37,12 +36,11 @@ HIDDEN = {
     'two': {'drive_inertia': {'mass': 3.0}, 'viscous_friction': {'coefficient': 20.0}}}
 
 
-def axis(hidden: dict[str, dict[str, float]]) -> MechanismModel:
+def axis(hidden: dict[str, dict[str, float]]) -> DriveModel:
     """Return an axis with effects."""
     values = {f'effects.{name}.{AXIS}.{key}': value for name, block in hidden.items()
               for key, value in block.items()}
-    model = build_model({**VALUES, 'effects.active': list(hidden), **values})
-    assert isinstance(model, MechanismModel)
+    model = DriveModel.from_parameters({**VALUES, 'effects.active': list(hidden), **values})
     return model
 
 

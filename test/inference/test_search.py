@@ -10,7 +10,7 @@ from itertools import chain, combinations, repeat
 import numpy as np
 import pytest
 
-from pprs_dynamics import DriveModel, MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.regression import design as design_module
 from pprs_dynamics.inference.regression.design import Design
@@ -34,7 +34,6 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.robot_block import AXIS
 
 AXIS_VALUES = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0,
@@ -50,8 +49,7 @@ def axis_recording(hidden: dict[str, dict[str, float]], seed: int, noise: float 
     """Return a recording of an axis that has some effects which its model has not."""
     values = {f'effects.{name}.{AXIS}.{key}': value for name, block in hidden.items()
               for key, value in block.items()}
-    model = build_model({**AXIS_VALUES, 'effects.active': list(hidden), **values})
-    assert isinstance(model, MechanismModel)
+    model = DriveModel.from_parameters({**AXIS_VALUES, 'effects.active': list(hidden), **values})
     rng = np.random.default_rng(seed)
     time = np.arange(0, 20, 0.002)
     omega = 2 * np.pi * np.array([0.21, 0.37, 0.83])[:, None]
@@ -81,7 +79,7 @@ def small_catalogue(monkeypatch: pytest.MonkeyPatch) -> None:
     ({'quadratic_friction': {'coefficient': 30.0}, 'drive_spring': {
         'stiffness': 20.0, 'position': -0.05}}, 4)])
 def test_the_search_ends_at_the_best_of_all_sets(hidden: dict, seed: int) -> None:
-    design = Design.of(build_model(AXIS_VALUES), [axis_recording(hidden, seed)])
+    design = Design.of(DriveModel.from_parameters(AXIS_VALUES), [axis_recording(hidden, seed)])
     search = Search(FittedSets(design, DECISIONS))
     found = search.run()
     exhaustive = FittedSets(design, DECISIONS)
@@ -105,7 +103,7 @@ def test_the_search_ends_at_the_best_of_all_sets(hidden: dict, seed: int) -> Non
 @pytest.mark.usefixtures('small_catalogue')
 def test_what_does_not_pay_in_a_set_is_pruned() -> None:
     recording = axis_recording({'drive_spring': {'stiffness': 30.0, 'position': 0.02}}, 1)
-    fits = FittedSets(Design.of(build_model(AXIS_VALUES), [recording]), DECISIONS)
+    fits = FittedSets(Design.of(DriveModel.from_parameters(AXIS_VALUES), [recording]), DECISIONS)
     spring, drag, gain = (EffectCandidate.of([Component.of(
         CATALOGUE[name], 0, {}, CATALOGUE[name].variants[0])])
         for name in ('drive_spring', 'quadratic_friction', 'effort_gain'))
@@ -122,7 +120,7 @@ def recording_of(effects: dict[str, dict], noise: float = 0.08, seed: int = 0) -
                 values |= {f'effects.{name}.{key}.{p}': v for p, v in value.items()}
             else:
                 values[f'effects.{name}.{key}'] = value
-    model = build_model({**MODEL.values, 'effects.active': list(effects), **values})
+    model = DriveModel.from_parameters({**MODEL.values, 'effects.active': list(effects), **values})
     forces = model.drive_forces(Excitation().motion(TIME).with_time(TIME))
     said = model.measured(forces)
     rng = np.random.default_rng(seed)
@@ -218,7 +216,7 @@ def test_a_small_effect_beside_a_large_one_is_the_form_error_of_that() -> None:
 def test_a_wrench_on_guides_that_feel_it_hides_no_effect_and_makes_none() -> None:
     wrench = {'force_x': 6.0, 'force_y': -4.0, 'force_z': 5.0, 'moment_x': 0.1, 'moment_y': 0.1,
               'moment_z': 0.0}
-    model = build_model({**MODEL.values, 'effects.active': ['external_wrench'],
+    model = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['external_wrench'],
                          **{f'effects.external_wrench.{k}': v for k, v in wrench.items()}})
     forces = model.drive_forces(Excitation().motion(TIME).with_time(TIME))
     total = forces.total

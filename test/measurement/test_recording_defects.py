@@ -422,6 +422,40 @@ def test_an_effort_that_stands_still_while_its_drive_moves_is_told() -> None:
     assert judged(arrays).findings == ()
 
 
+@pytest.mark.parametrize('quantity', ['position', 'effort'])
+@pytest.mark.parametrize('count', [4, 10])
+def test_values_that_a_slower_source_repeats_are_used_once(quantity: str, count: int) -> None:
+    arrays = measured()
+    held = np.arange(len(arrays['time'])) // count * count
+    arrays[quantity] = arrays[quantity][held]
+    recording = judged(arrays)
+    assert f'{500 / count:.3g} new ones a second' in the(recording, {
+        'position': 'held_position', 'effort': 'held_effort'}[quantity]).text
+    used = recording.position if quantity == 'position' else recording.effort
+    assert np.isfinite(used).all(axis=1).sum() == len(held) // count
+
+
+def test_steps_of_a_coarse_encoder_are_no_held_values() -> None:
+    arrays = measured()
+    arrays['position'] = np.round(arrays['position'][:, :1] * 0 + 1e-3 * (
+        np.arange(len(arrays['time'])) // 3)[:, None], 6) + np.zeros(6)
+    assert 'held_position' not in kinds(judged(arrays))
+
+
+@pytest.mark.parametrize('both', [False, True])
+def test_efforts_that_are_cut_off_are_left_out(both: bool) -> None:
+    arrays = measured()
+    limit = float(np.quantile(arrays['effort'][:, 1], 0.9))
+    low = -limit if both else -np.inf
+    arrays['effort'][:, 1] = np.clip(arrays['effort'][:, 1], low, limit)
+    recording = judged(arrays)
+    finding = the(recording, 'saturated_effort')
+    assert f'cut off at {abs(limit):.4g}' in finding.text
+    assert finding.drives == ('slide_2',)
+    known = recording.effort[np.isfinite(recording.effort[:, 1]), 1]
+    assert known.max() < limit
+
+
 def test_repeated_messages_are_told() -> None:
     arrays = measured()
     for name in QUANTITIES:
@@ -489,7 +523,8 @@ def test_every_defect_of_the_policy_is_planted_in_a_test() -> None:
         text += (folder / name).read_text()
     planted = {kind for kind in POLICY
                if re.search(rf"(the|the_one)\([^'\n]*'{kind}'\)|'{kind}' in kinds", text)}
-    planted |= {f'constant_{quantity}' for quantity in QUANTITIES} | {'short_segment'}
+    planted |= {f'constant_{quantity}' for quantity in QUANTITIES} | {
+        'short_segment', 'held_position', 'held_effort'}
     assert planted == set(POLICY)
 
 

@@ -28,12 +28,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.monitor import MonitorNode
-from pprs_dynamics.ros.play_trajectory import PlayTrajectoryNode
-from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
 
 pytestmark = pytest.mark.nodes
 
@@ -86,7 +82,7 @@ def test_effects_come_and_go_with_their_topics_while_running(caller: Caller) -> 
               'effects.stribeck_friction.lift_1.force': 1.2,
               'effects.stribeck_friction.lift_1.velocity': 0.01,
               'effects.effort_offset.slide_3.force': -0.7}
-    expected = build_model(values).drive_forces(MOTION)
+    expected = DriveModel.from_parameters(values).drive_forces(MOTION)
     topic = '/feedforward/effort/effort_offset'
     part = node.bench.listen(JointState, topic)
     assert node.bench.spin_until(lambda: node.node.count_subscribers(topic))
@@ -109,22 +105,6 @@ def test_an_effect_of_measurement_enters_no_command(caller: Caller) -> None:
     assert result.successful, result.reason
     assert caller.node.answer(MESSAGE) == plain
     assert not caller.bench.probe.count_publishers('/feedforward/effort/effort_gain')
-
-
-def test_many_parameters_change_at_once_or_not_at_all(caller: Caller) -> None:
-    plain = caller.node.answer(MESSAGE)
-    half = {'masses.payload': 2.0, 'friction.approach': 'a_third_one'}
-    result = caller.set_at_once(half)
-    assert not result.successful
-    assert 'friction.approach' in result.reason
-    assert caller.node.answer(MESSAGE) == plain
-    whole = {'masses.payload': 2.0, 'friction.approach': 'independent_chains', 'max_age': 3.0,
-             'limits.rod_cosine': 0.001}
-    assert caller.set_at_once(whole).successful
-    values = {**DriveModel.load().values, **whole}
-    values.pop('max_age')
-    np.testing.assert_allclose(caller.node.answer(MESSAGE),
-                               build_model(values).drive_forces(MOTION).total[0], atol=EQUAL)
 
 
 REFUSED = [
@@ -195,23 +175,6 @@ def test_whole_numbers_and_empty_lists_keep_the_declared_type(caller: Caller) ->
     assert types(caller, *names) == wanted
 
 
-def test_whole_numbers_at_the_start_are_decimal_ones() -> None:
-    given = {'masses__payload': 2, 'effort_limits': [20] * 6, 'feedforward_scale': 1,
-             'effects__effort_offset__lift_1__force': 1}
-    with feedforward_bench(**given) as node:
-        for name in given:
-            kind = node.node.get_parameter(name.replace('__', '.')).type_
-            assert kind in (Parameter.Type.DOUBLE, Parameter.Type.DOUBLE_ARRAY), name
-
-
-def test_a_list_of_whole_and_decimal_numbers_gets_the_hint(caller: Caller) -> None:
-    # `ros2 param set` sends such a list as the word that it was typed as.
-    for name, word in (('gravity', '[0, 0.0, -9.81]'), ('effort_limits', '[1, 2.0]')):
-        result = caller.set(name, word)
-        assert not result.successful
-        assert 'write 0.0, not 0' in result.reason
-
-
 def test_the_ledger_of_a_model_is_no_parameter() -> None:
     with feedforward_bench(history__step_01__effect='coulomb_friction',
                            history__step_01__error_before=1.0) as node:
@@ -230,32 +193,6 @@ def test_topics_have_the_qos_that_is_asked_for() -> None:
         assert status.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
         others, = node.bench.probe.get_publishers_info_by_topic('/feedforward/joint_command')
         assert others.qos_profile.reliability == ReliabilityPolicy.RELIABLE
-
-
-def test_a_qos_that_is_none_is_one_sentence() -> None:
-    override = {'qos_overrides./feedforward/commands.publisher.reliability': 'hopeful'}
-    with pytest.raises(ModelError, match='hopeful'), feedforward_bench(**override):
-        pass
-
-
-@pytest.mark.parametrize(('factory', 'topic', 'entity'), [
-    (MonitorNode, '/monitor/error', 'publisher'),
-    (MonitorNode, '/joint_states', 'subscription'),
-    (SimulatedRobotNode, '/joint_states', 'publisher'),
-    (SimulatedRobotNode, '/simulated_robot/commands', 'subscription'),
-    (PlayTrajectoryNode, '/feedforward/trajectory', 'publisher'),
-    (FeedforwardNode, '/diagnostics', 'publisher'),
-], ids=lambda value: getattr(value, '__name__', value))
-def test_every_topic_of_every_node_has_the_qos_that_is_asked_for(
-    factory: Any, topic: str, entity: str,
-) -> None:
-    with bench() as running:
-        running.add(factory, parameter_overrides=overrides(
-            **{f'qos_overrides.{topic}.{entity}.reliability': 'best_effort'}))
-        look = getattr(running.probe, f'get_{entity}s_info_by_topic')
-        assert running.spin_until(lambda: look(topic))
-        info, = look(topic)
-        assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
 
 
 def test_a_qos_that_does_not_fit_is_told_with_the_resolved_topic(

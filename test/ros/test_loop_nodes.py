@@ -23,7 +23,7 @@ from trajectory_msgs.msg import (
     MultiDOFJointTrajectory,
 )
 
-from pprs_dynamics import JointMotion, MechanismModel, PlatformMotion
+from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.ros.messages import conversions
@@ -51,7 +51,7 @@ def node() -> Iterator[FeedforwardBench]:
         yield running
 
 
-def drives_message(model: MechanismModel, position: np.ndarray) -> JointTrajectory:
+def drives_message(model: DriveModel, position: np.ndarray) -> JointTrajectory:
     zero = np.zeros(len(position)).tolist()
     return JointTrajectory(joint_names=list(model.drives), points=[JointTrajectoryPoint(
         positions=position.tolist(), velocities=zero, accelerations=zero,
@@ -59,7 +59,7 @@ def drives_message(model: MechanismModel, position: np.ndarray) -> JointTrajecto
 
 
 def test_efforts_are_the_models_and_what_cannot_be_is_refused(node: FeedforwardBench) -> None:
-    model = MechanismModel.load(FILE)
+    model = DriveModel.load(FILE)
     home = model.robot.structure.home[model.robot.structure.tables.drives]
     near = home + 0.01 * np.arange(6)
     rest = np.zeros((1, 6))
@@ -84,7 +84,7 @@ def poses(rng: np.random.Generator, points: int = 1) -> PlatformMotion:
 
 
 def test_poses_of_the_tool_are_answered_or_refused_as_those_of_a_platform() -> None:
-    model, motion = MechanismModel.load(FILE), poses(np.random.default_rng(4), 3)
+    model, motion = DriveModel.load(FILE), poses(np.random.default_rng(4), 3)
     forces = model.drive_forces(motion)
     with feedforward_bench(MultiDOFJointTrajectory, 'pose_trajectory', **parameters()) as node:
         np.testing.assert_allclose(node.answer(message_of(motion)), forces.total[0], rtol=0,
@@ -123,7 +123,7 @@ def given(**own: Any) -> list[Parameter]:
 
 def test_the_simulated_robot_holds_moves_and_refuses() -> None:
     """How it follows a whole path is tested in simulated time."""
-    model = MechanismModel.load(FILE)
+    model = DriveModel.load(FILE)
     home, _ = model.robot.structure.room(np.pi)
     with bench() as running:
         states = running.listen(JointState, '/joint_states', 1000)
@@ -154,7 +154,7 @@ def test_the_simulated_robot_holds_moves_and_refuses() -> None:
 
 
 def test_the_path_is_an_excitation_of_the_drives_from_rest_to_rest() -> None:
-    model = MechanismModel.load(FILE)
+    model = DriveModel.load(FILE)
     home, room = model.robot.structure.room(np.pi)
     with bench() as running:
         heard = running.listen(JointTrajectory, '/feedforward/trajectory', 1000)
@@ -177,7 +177,7 @@ def test_the_path_is_an_excitation_of_the_drives_from_rest_to_rest() -> None:
 
 def test_the_platform_is_on_tf_while_somebody_draws_the_robot() -> None:
     tf = pytest.importorskip('tf2_msgs.msg', reason='tf2_msgs comes with a ROS 2 installation only')
-    model, motion = MechanismModel.load(FILE), poses(np.random.default_rng(5))
+    model, motion = DriveModel.load(FILE), poses(np.random.default_rng(5))
     position = model.drive_forces(motion).mechanism.position[0]
     with bench() as running:
         running.add(MonitorNode, parameter_overrides=overrides(**parameters()))

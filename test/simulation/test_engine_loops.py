@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 import robots_with_loops as robots
 
-from pprs_dynamics import JointMotion, MechanismModel, WorkspaceError
+from pprs_dynamics import DriveModel, JointMotion, WorkspaceError
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
-from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
-from pprs_dynamics.simulation.mechanism_run import draw_motion
+from pprs_dynamics.simulation.engine import MechanismEngine
+from pprs_dynamics.simulation.injection import draw_motion
 
 ROBOTS = {'hexapod': robots.hexapod, 'delta': robots.delta, 'five_bar': robots.five_bar,
           'three_rrr': robots.three_rrr}
 
 
-def rubbing(name: str, folder: Path) -> MechanismModel:
+def rubbing(name: str, folder: Path) -> DriveModel:
     """Return a robot all of whose passive joints rub, with their loads and without."""
-    names = friction_rows(MechanismModel.load(ROBOTS[name]().write(folder)).robot.structure)
-    return MechanismModel.load(ROBOTS[name]().write(folder, {'joints': {
+    names = friction_rows(DriveModel.load(ROBOTS[name]().write(folder)).robot.structure)
+    return DriveModel.load(ROBOTS[name]().write(folder, {'joints': {
         one: {'viscous': 0.1, 'torque': 0.1, 'coulomb': 0.2, 'radius': 0.02} for one in names}}))
 
 

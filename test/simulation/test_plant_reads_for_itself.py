@@ -5,19 +5,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import robots_with_loops as robots
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism import structure
 from pprs_dynamics.physics.model import robot_block
-from pprs_dynamics.simulation import mechanism_engine
-from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
+from pprs_dynamics.simulation import engine
+from pprs_dynamics.simulation.engine import MechanismEngine
 
 BODY = ('<inertial><origin xyz="0.2 0.02 0.1"/><mass value="{}"/><inertia ixx="0.03" iyy="0.04" '
         'izz="0.02" ixy="0.001" ixz="0.002" iyz="-0.001"/></inertial>')
@@ -58,21 +57,14 @@ def described(folder: Path) -> Path:
 
 
 def test_plant_and_model_agree(tmp_path: Path) -> None:
-    MechanismEngine(MechanismModel.load(described(tmp_path)))
+    MechanismEngine(DriveModel.load(described(tmp_path)))
     for robot in (robots.hexapod, robots.delta, robots.five_bar):
-        MechanismEngine(MechanismModel.load(robot().write(tmp_path)))
+        MechanismEngine(DriveModel.load(robot().write(tmp_path)))
     (tmp_path / 'robot.xml').write_text(MJCF)
     path = tmp_path / 'mjcf.yaml'
     path.write_text('/**:\n  ros__parameters:\n    robot: {mjcf: robot.xml, base: plate, tool: l2, '
                     'drives: [j1, j2]}\n')
-    engine = MechanismEngine(MechanismModel.load(path))
-    engine.add_payload(1.0, np.array([0.0, 0.1, 0.2]))
-    engine.add_to_link(0, 0.5)
-    engine._require_agreement(_loaded(path, engine))
-
-
-def _loaded(path: Path, engine: MechanismEngine) -> MechanismModel:
-    return replace(MechanismModel.load(path), robot=engine.robot)
+    MechanismEngine(DriveModel.load(path))
 
 
 def locked_at_zero(self: object, joint: object) -> float:
@@ -105,8 +97,8 @@ def test_faults_of_the_model_are_seen(tmp_path: Path, fault: str,
             return (0.0, 0.0, -9.81)
 
         monkeypatch.setattr(robot_block, 'described_gravity', as_standard)
-        monkeypatch.setattr(mechanism_engine, 'described_gravity', as_standard)
+        monkeypatch.setattr(engine, 'described_gravity', as_standard)
     robot_block._structure.cache_clear()
     with pytest.raises(ModelError, match='in MuJoCo'):
-        MechanismEngine(MechanismModel.load(described(tmp_path)))
+        MechanismEngine(DriveModel.load(described(tmp_path)))
     robot_block._structure.cache_clear()

@@ -23,7 +23,7 @@ from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.inference.fit.base_fit import Refit, refit_base, require_open_numbers
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class AdoptionResult(Result):
         return self.adoption.reason
 
     @cached_property
-    def model(self) -> ForceModel:
+    def model(self) -> DriveModel:
         """The model with the effect and its entry in the ledger; as given, where it is refused."""
         return self.inputs.ledger.entered(self.adoption) if self.adopted else self.inputs.model
 
@@ -86,7 +86,7 @@ class AdoptionResult(Result):
         """Return what the terminal shows."""
         from pprs_dynamics.app.report.adoption_report import adoption_view
 
-        return adoption_view(self.adoption, details)
+        return adoption_view(self.adoption)
 
     def page(self, saved_as: str = 'better.yaml') -> Page:
         """Return the page of `pprs adopt --report`; its next command names the file of `save`."""
@@ -126,7 +126,7 @@ class AdoptionRunResult(Result):
     refit: Refit | None = None
 
     @property
-    def model(self) -> ForceModel:
+    def model(self) -> DriveModel:
         """The model with all that was adopted, and its ledger."""
         if self.refit is not None and self.refit.taken:
             return self.refit.fit.model
@@ -200,7 +200,7 @@ def adopt(model: Model, effect: str, recordings: Recordings, validate: Recording
 
     Parameters
     ----------
-    model : ForceModel or path
+    model : DriveModel or path
     effect : str
         Its name, on the drives that the recordings call for; or 'EFFECT:drive,drive'; or
         'measured_curve:DRIVE@VARIABLE'.

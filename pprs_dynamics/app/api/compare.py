@@ -24,8 +24,7 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.inference.search.noise_floors import measure_columns, noise_floors
-from pprs_dynamics.physics.model.model_file import load_model
-from pprs_dynamics.system.output_files import write_text
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
@@ -91,38 +90,17 @@ class ComparisonResult(Result):
         return comparison_page(self.inputs.model, self.inputs.fitted, self.residuals,
                                self.comparison, self.notes, self._next, self.beside)
 
-    def write_bag(self, path: str | PathLike[str], progress: Progress | None = None) -> list[Path]:
-        """Write measured effort, model, parts and residual as a bag, and layouts that open it.
-
-        Parameters
-        ----------
-        path : path
-            .mcap or .db3.
-        progress : callable, optional
-
-        Returns
-        -------
-        list of Path
-            The bag, and beside it the layouts of PlotJuggler (.plotjuggler.xml) and Foxglove
-            (.foxglove.json).
+    def write_bag(self, path: str | PathLike[str], progress: Progress | None = None) -> None:
+        """Write measured effort, model, parts and residual as a bag, .mcap or .db3.
 
         Raises
         ------
         PprsError
             Where it cannot be written.
         """
-        from pprs_dynamics.app.report.layouts import foxglove_layout, plotjuggler_layout
-
-        bag = Path(path)
-        write_comparison(bag, self.inputs.model, self.inputs.fitted,
+        write_comparison(Path(path), self.inputs.model, self.inputs.fitted,
                          [self.verdict, *(statement.text for statement in self.where)],
                          stage(progress, 'bag'))
-        written = [bag]
-        for suffix, layout in (('.plotjuggler.xml', plotjuggler_layout),
-                               ('.foxglove.json', foxglove_layout)):
-            written.append(bag.with_suffix(suffix))
-            write_text(written[-1], layout(self.residuals.drives))
-        return written
 
     def table(self) -> DataFrame:
         """Return a row per drive: rms, bias, peak, noise [N], relative error and grade."""
@@ -167,7 +145,7 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
 
     Parameters
     ----------
-    model : ForceModel or path
+    model : DriveModel or path
     recordings : path, Recording, or a sequence of them
         A path is read, and its units and signs are checked; a Recording is taken as it is.
     topic : str, optional
@@ -210,7 +188,7 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
 
 def _beside(inputs: Inputs, path: Path) -> Beside:
     """Return the errors of another model on the same recordings."""
-    other = load_model(path)
+    other = DriveModel.load(path)
     if other.drives != inputs.model.drives:
         raise ModelError('--beside', displayed(path), 'have the drives of the model: '
                          f'{", ".join(inputs.model.drives)}')

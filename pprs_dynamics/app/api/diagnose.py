@@ -26,7 +26,7 @@ from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure, Page
@@ -58,7 +58,7 @@ class DiagnosisResult(Result):
         return self.diagnosis.effects
 
     @property
-    def fitted(self) -> ForceModel:
+    def fitted(self) -> DriveModel:
         """The model with what is missing, not checked as `adopt` does."""
         return self.diagnosis.adopted
 
@@ -114,7 +114,7 @@ def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,
 
     Parameters
     ----------
-    model : ForceModel or path
+    model : DriveModel or path
     recordings : path, Recording, or a sequence of them
         To fit to.
     validate : path, Recording, or a sequence of them, optional

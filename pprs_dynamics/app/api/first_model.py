@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -50,13 +50,12 @@ from pprs_dynamics.physics.mechanism.description import (
     Description,
 )
 from pprs_dynamics.physics.mechanism.urdf import expanded, read_urdf
-from pprs_dynamics.physics.model.model_file import Model, build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import parse_parameters
 from pprs_dynamics.physics.model.recorded_names import EFFORT_KINDS
 from pprs_dynamics.physics.model.robot_block import coupled
 from pprs_dynamics.system.plain_yaml import scalar
 
-Ask = Callable[[str, Sequence[str]], int]
 FILE_TIME = 'time'
 SETTLED = ('position', 'velocity', 'effort', 'current')
 SCALE_KEYS = {POSITION: 'position_scale', VELOCITY: 'velocity_scale', EFFORT: 'effort_scale',
@@ -97,7 +96,7 @@ class FirstModel:
         Where it will stand, from which the description's path counts.
     text : str
         Its content, with comments.
-    model : Model
+    model : DriveModel
         The same, built.
     notes : tuple of str
         What was guessed, and what could not be known.
@@ -110,7 +109,7 @@ class FirstModel:
 
     path: Path
     text: str
-    model: Model
+    model: DriveModel
     notes: tuple[str, ...]
     recordings: tuple[Path, ...]
     has_efforts: bool
@@ -120,7 +119,7 @@ class FirstModel:
 def first_model(
     robot: str | os.PathLike[str], recordings: Sequence[str | os.PathLike[str]] = (),
     output: str | os.PathLike[str] = 'robot.yaml', *, base: str = '', tool: str = '',
-    drives: Sequence[str] = (), rate: float | None = None, ask: Ask | None = None,
+    drives: Sequence[str] = (), rate: float | None = None,
 ) -> FirstModel:
     """Return a first model file of a robot.
 
@@ -139,8 +138,6 @@ def first_model(
         Driven joints; without, those of the recording, or all up to the tool.
     rate : float, optional
         Samples per second of tables without times [Hz].
-    ask : callable, optional
-        Given a question and its answers, returns which; without, the first is taken.
 
     Raises
     ------
@@ -156,7 +153,7 @@ def first_model(
                if joint.kind not in (FIXED, FLOATING) and joint.mimic is None]
     names = _names(contents, movable) if contents is not None and not files else Names()
     recorded = set(names.joints) | (_mentioned(contents, movable) if contents else set())
-    branch, notes = _branch(description, tool, recorded, ask)
+    branch, notes = _branch(description, tool, recorded)
     notes += description.remarks
     chosen = _drives(description, path, is_mjcf, branch, drives, recorded)
     shared = [name for each in coupled(description) for name in each.joints if name in chosen]
@@ -180,11 +177,11 @@ def first_model(
             questions += error.lines
         notes += guessed
 
-    def written() -> tuple[str, Model]:
+    def written() -> tuple[str, DriveModel]:
         text = _text(path, Path(output), is_mjcf, description, base or root_of(description),
                      branch, chosen, names, columns, guessed, [one.name for one in given],
                      CURRENT in found, questions)
-        return text, build_model(parse_parameters(text, output), source=str(output))
+        return text, DriveModel.from_parameters(parse_parameters(text, output), source=str(output))
 
     has_efforts = bool({EFFORT, CURRENT} & {*found})
     text, model = written()
@@ -208,7 +205,7 @@ def first_model(
 # ---------------------------------------------------------------------------------- readings
 
 
-def _corrections(model: Model, path: Path, corrected: set[str],
+def _corrections(model: DriveModel, path: Path, corrected: set[str],
                  ) -> tuple[Scales, list[str], list[str]]:
     """Return factors with which a recording is read surely, why, and what is not sure.
 
@@ -264,7 +261,7 @@ def _description(path: Path, is_mjcf: bool) -> Description:
     return read_mjcf(str(path))
 
 
-def _branch(description: Description, tool: str, recorded: Collection[str], ask: Ask | None,
+def _branch(description: Description, tool: str, recorded: Collection[str],
             ) -> tuple[Branch, list[str]]:
     """Return what is between base and tool, and what was not clear about it."""
     if tool:
@@ -276,9 +273,6 @@ def _branch(description: Description, tool: str, recorded: Collection[str], ask:
         raise FirstModelError(f'{description.path}: no joint of it moves, must have one that does')
     if len(likely) == 1:
         return likely[0], []
-    answers = [f'{one.tool} (after {", ".join(one.names)})' for one in likely]
-    if ask is not None:
-        return likely[ask('Which link carries the load?', answers)], []
     return likely[0], [f'the load may be on {" or ".join(one.tool for one in likely)}: '
                        f'{likely[0].tool} was taken, --tool LINK takes another']
 

@@ -18,8 +18,7 @@ from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_me
 from pprs_dynamics.measurement.files.fingerprint import fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
 from pprs_dynamics.physics.model.reference_keys import reference_files
 from pprs_dynamics.system.plain_text import displayed
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from pprs_dynamics.inference.fit.reference import Reference
 
 File = str | PathLike[str]
-Model = ForceModel | File
+Model = DriveModel | File
 Progress = Callable[[str, float], None]  # what is being done, and the share of it that is done
 # Every recording is evidence once.
 ONCE = 'every recording may be given once'
@@ -52,7 +51,7 @@ class Inputs:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings, validation : mapping of str to Recording
         To fit to, and never fitted; by path, or by name where they came from no file.
     paths : frozenset of str
@@ -71,7 +70,7 @@ class Inputs:
         Its files; none of them: those that the model file names.
     """
 
-    model: ForceModel
+    model: DriveModel
     recordings: Mapping[str, Recording]
     validation: Mapping[str, Recording]
     paths: frozenset[str] = frozenset()
@@ -114,10 +113,10 @@ class Inputs:
              topic: str | None = None, progress: Progress | None = None) -> Inputs:
         """Read as `of`, but units and signs are not looked at yet."""
         _require_kinds(recordings, validate)
-        found = model if isinstance(model, ForceModel) else load_model(find_file(model))
+        found = model if isinstance(model, DriveModel) else DriveModel.load(find_file(model))
         base = Path(found.source) if found.source and Path(found.source).is_file() else None
         shipped = base is not None and base == find_file(DEFAULT_MODEL)
-        given = base or '' if isinstance(model, ForceModel) else model
+        given = base or '' if isinstance(model, DriveModel) else model
         name = '' if shipped else str(given)
         # Before anything is read, which may take minutes.
         _refuse_same_paths(listed_recordings(recordings), [], ONCE)
@@ -190,7 +189,7 @@ class Inputs:
         return replace(self, recordings=fewer, validation=held_out,
                        paths=self.paths - {name}).require_recordings()
 
-    def since(self, reference: Given | None, model: ForceModel | None = None) -> Inputs:
+    def since(self, reference: Given | None, model: DriveModel | None = None) -> Inputs:
         """Return this with reference runs, () for the model's own; as it is for None.
 
         They are fitted to the model, or to another one that is given.
@@ -271,13 +270,13 @@ Given = File | Recording | Sequence[File | Recording]
 Recordings = Given | Inputs
 
 
-def read_checked(model: ForceModel, path: File, topic: str | None = None,
+def read_checked(model: DriveModel, path: File, topic: str | None = None,
                  progress: Progress | None = None) -> Recording:
     """Read a recording of a model's drives; what its numbers rather mean is in its findings."""
     return with_mistakes(model, _read(model, path, topic, progress))
 
 
-def _read(model: ForceModel, path: File, topic: str | None, progress: Progress | None,
+def _read(model: DriveModel, path: File, topic: str | None, progress: Progress | None,
           ) -> Recording:
     report = stage(progress, f'reading {displayed(path)}')
     return read_recording(path, model.recorded, topic,
@@ -290,7 +289,7 @@ class _Read(NamedTuple):
     is_path: bool
 
 
-def _read_all(model: ForceModel, given: Given, topic: str | None, progress: Progress | None,
+def _read_all(model: DriveModel, given: Given, topic: str | None, progress: Progress | None,
               ) -> list[_Read]:
     return [_Read(one.name, one, False) if isinstance(one, Recording)
             else _Read(str(one), _read(model, one, topic, progress), True)

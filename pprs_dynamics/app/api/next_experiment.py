@@ -27,7 +27,6 @@ from pprs_dynamics.inference.experiments.next_experiment import next_experiment 
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure, Page
@@ -123,7 +122,7 @@ def next_experiment(
 
     Parameters
     ----------
-    model : ForceModel or path
+    model : DriveModel or path
     recordings : path, Recording, or a sequence of them
     purpose : {'separate', 'commission'}
         What the recordings leave open; or a first motion of a new robot, without recordings.
@@ -163,7 +162,7 @@ def next_experiment(
     if limits is not None and not isinstance(limits, kind):
         raise InputError(f'limits are {type(limits).__name__}, must be {kind.__name__} for '
                          f'{found.title}')
-    if isinstance(found, MechanismModel) and purpose == 'commission':
+    if found.moves_joints and purpose == 'commission':
         designed = excite_arm(found, limits if isinstance(limits, ArmLimits) else ArmLimits(),
                               duration, seed, share_done)
     else:

@@ -14,8 +14,8 @@ from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import read_steps, without_last_step
-from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import find_file
 
@@ -39,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
     from pprs_dynamics.app.report.history_report import history_page, history_view
 
     base = find_file(options.file)
-    model = load_model(base)
+    model = DriveModel.load(base)
     steps, unit = read_steps(model.values), common_effort(model.units)
     if options.undo and not steps:
         print(f'pprs history: {options.file} holds no step that could be taken back',

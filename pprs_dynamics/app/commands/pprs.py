@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import io
 import os
 import re
 import signal
@@ -31,9 +32,8 @@ from pprs_dynamics.app.commands.arguments import (
     check_files,
     output_file,
 )
-from pprs_dynamics.app.commands.streams import lasting_output
 from pprs_dynamics.errors import MisreadError, PprsError, suggestion
-from pprs_dynamics.system.plain_text import displayed
+from pprs_dynamics.system.plain_text import PLAIN, displayed
 from pprs_dynamics.system.threads import use_one_thread
 
 # Each a module of this folder with a docstring, EXAMPLE, add_arguments and run.
@@ -61,14 +61,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else list(arguments)
     if '_ARGCOMPLETE' in os.environ:
         _complete()
-    with lasting_output() as output, warnings.catch_warnings(), _cleaned_up():
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors=PLAIN)
+    with warnings.catch_warnings(), _cleaned_up():
         warnings.showwarning = _show_warning
-        status = _ended(given)
-    if output.error is None or isinstance(output.error, BrokenPipeError):
-        # A reader of our output that went away, e.g. `head`, had enough of it.
-        return status
-    _say(f'output: {output.error.strerror or output.error}', given)
-    return 2
+        return _ended(given)
 
 
 def _complete() -> None:

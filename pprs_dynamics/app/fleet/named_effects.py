@@ -26,10 +26,10 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 
-def fit_named_effects(model: ForceModel, recording: Recording,
+def fit_named_effects(model: DriveModel, recording: Recording,
                       requests: Sequence[EffectRequest],
                       ) -> tuple[list[dict[str, Any]], Residuals, dict[str, float]]:
     """Return the values of named effects and of the model's numbers.

@@ -22,7 +22,6 @@ from pprs_dynamics.app.report.terminal import (
     PlainTable,
     escape,
     stacked,
-    titled_table,
     verdict_panel,
 )
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
@@ -32,27 +31,28 @@ from pprs_dynamics.inference.diagnosis.sentences import sure_moments
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.system.plain_text import counted
 
 MOST_SHOWN = 6  # values without --details
 MOST_REMARKS = 2
 
 
-def adoption_view(answer: Adoption, details: bool = False) -> Any:
-    """Return what the terminal shows, most important first; all there is with `details`."""
-    return stacked(*(_parts if details else _brief)(answer))
-
-
 def run_view(run: AdoptionRun, details: bool = False) -> Any:
-    """Return what was adopted and refused, a line each, or all of each, and why it ended."""
-    steps = [adoption_view(step, True) if details else escape(headline(step))
-             for step in run.steps]
+    """Return the adopted and refused effects, a line or all values of each, and the reason to end.
+    """
+    steps = [adoption_view(step) if details else escape(headline(step)) for step in run.steps]
     return stacked(*steps, f'[bold]{run.ended}[/]: {escape(run.reason)}')
 
 
-def _brief(answer: Adoption) -> Iterator[Any]:
-    """Yield the answer, the fall of the error and the first values, in at most 20 lines."""
-    yield _verdict(answer)
+def adoption_view(answer: Adoption) -> Any:
+    """Return the answer for the terminal, in at most 20 lines."""
+    return stacked(*_parts(answer))
+
+
+def _parts(answer: Adoption) -> Iterator[Any]:
+    """Yield the answer, the fall of the error and the first values."""
+    word, colour = (('refused', 'red') if not answer.adopted else
+                    ('forced', 'yellow') if answer.forced else ('adopted', 'green'))
+    yield verdict_panel(word, colour, headline(answer))
     held = 'held-out recordings' if answer.held_out_on == VALIDATION else 'held-out blocks'
     for label, before, after in (('recordings', answer.error_before, answer.error_after),
                                  (held, answer.held_out_before, answer.held_out_after)):
@@ -62,15 +62,9 @@ def _brief(answer: Adoption) -> Iterator[Any]:
     for key, text in rows[:MOST_SHOWN]:
         yield f'  {escape(key)} = {escape(text)}'
     if len(rows) > MOST_SHOWN:
-        yield f'  … and {len(rows) - MOST_SHOWN} more, with --details'
+        yield f'  … and {len(rows) - MOST_SHOWN} more, with --json or --report'
     for remark in answer.remarks[:MOST_REMARKS]:
         yield f'[yellow]![/] {escape(remark)}'
-
-
-def _verdict(answer: Adoption) -> Any:
-    word, colour = (('refused', 'red') if not answer.adopted else
-                    ('forced', 'yellow') if answer.forced else ('adopted', 'green'))
-    return verdict_panel(word, colour, headline(answer))
 
 
 def headline(answer: Adoption) -> str:
@@ -107,23 +101,6 @@ def errors_table(answer: Adoption, first: str) -> PlainTable:
         for label, before, after in (
             ('recordings', answer.error_before, answer.error_after),
             (held, answer.held_out_before, answer.held_out_after))]
-
-
-def _parts(answer: Adoption) -> Iterator[Any]:
-    yield _verdict(answer)
-    yield titled_table('Error, rms over samples and drives', errors_table(answer, 'on'),
-                       caption=f'the noise is {in_unit(answer.noise_floor, answer.unit)}')
-    rows = parameter_rows(answer)
-    if rows:
-        yield titled_table(f'{answer.effect}, ± two standard deviations',
-                           (('parameter', 'value'), rows))
-    if answer.adopted and answer.calibrated:
-        clear = [one for one in answer.calibrated if abs(one.after - one.before) > 2 * one.std]
-        told = f', clearly {", ".join(one.label for one in clear)}' if clear else ''
-        yield escape(f'{counted(len(answer.calibrated), "number of the model")} moved as well'
-                     f'{told}')
-    for remark in answer.remarks:
-        yield f'[yellow]![/] {escape(remark)}'
 
 
 def adoption_page(answer: Adoption, recordings: Sequence[Recording],

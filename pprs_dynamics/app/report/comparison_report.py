@@ -16,7 +16,7 @@ from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.quantities import percent, plain, rounded_as, sentence
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 NOWHERE = 'No place stands out: the error lies nowhere in particular.'
 FIRST = 3  # statements on the first screen
@@ -94,7 +94,7 @@ def _drives_table(comparison: Comparison) -> Any:
 
 
 def comparison_page(
-    model: ForceModel, recordings: Sequence[Recording], residuals: Residuals,
+    model: DriveModel, recordings: Sequence[Recording], residuals: Residuals,
     comparison: Comparison, notes: Sequence[str], following: tuple[str, str] = ('', ''),
     beside: Beside | None = None,
 ) -> Page:
@@ -102,7 +102,7 @@ def comparison_page(
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings : sequence of Recording
     residuals : Residuals
     comparison : Comparison

@@ -92,8 +92,8 @@ def experiment_page(experiment: Experiment, motion: Motion) -> Page:
         page.figure(_drives(experiment, motion),
                     'Position, velocity, acceleration and effort of every drive.', over_time=True)
     with page.fold('Use of the limits'):
-        page.figure(_limits(experiment), 'Use of every limit, of what the margin leaves of it; '
-                    'checked at 500 Hz. Dashed: all of it.')
+        page.table(('limit', 'use'), limit_rows(experiment),
+                   caption='Of what the margin leaves of each limit; checked at 500 Hz.')
     if experiment.accuracies:
         with page.fold('How well numbers would be known'):
             page.table(*accuracies_table(experiment), caption='Standard '
@@ -145,15 +145,4 @@ def _stacked(motion: Motion, rows: tuple[tuple[str, tuple[tuple[str, Array], ...
             figure.add_trace(charts.trace(time, shown, name, colour, legendgroup=name,
                                           showlegend=is_new), row=row, col=1)
         figure.update_yaxes(title_text=label, row=row, col=1)
-    return figure
-
-
-def _limits(experiment: Experiment) -> Any:
-    rows = limit_rows(experiment)[::-1]
-    figure = charts.figure([charts.plotly_objects().Bar(
-        x=[100 * experiment.limits[name] for name, _ in rows], y=[name for name, _ in rows],
-        orientation='h', marker_color=charts.LINES[0], hovertemplate='%{y}: %{x:.0f} %')],
-        70 + 20 * len(rows), xaxis_title='use [%]', yaxis={'automargin': True, 'dtick': 1},
-        margin={'l': 10, 'r': 20, 't': 20, 'b': 45})
-    figure.add_vline(x=100, line={'color': charts.LINES[1], 'dash': 'dash'})
     return figure

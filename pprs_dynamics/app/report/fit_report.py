@@ -14,14 +14,14 @@ from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import PlainTable, escape, plain_rows, stacked, text_table
 from pprs_dynamics.inference.diagnosis.quantities import plain, sentence, word_little
 from pprs_dynamics.inference.fit.base_fit import HALVES, RECORDINGS, VALIDATION, BaseFit
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 HELD_OUT = {RECORDINGS: 'each recording predicted from the others',
             HALVES: 'each half of the recording predicted from the other',
             VALIDATION: 'the validation recordings'}
 
 
-def errors_table(model: ForceModel, fit: BaseFit) -> PlainTable:
+def errors_table(model: DriveModel, fit: BaseFit) -> PlainTable:
     """Return drives, units, errors before, after and held out."""
     return ('drive', 'unit', 'before', 'after', 'held out'), [
         (drive, unit.effort, plain(fit.before[drive]), plain(fit.after[drive]),
@@ -36,7 +36,7 @@ def numbers_table(fit: BaseFit) -> PlainTable:
          plain(2 * one.std) if isfinite(one.std) else '', one.unit) for one in fit.numbers]
 
 
-def fit_view(model: ForceModel, fit: BaseFit, details: bool = False) -> Any:
+def fit_view(model: DriveModel, fit: BaseFit, details: bool = False) -> Any:
     """Return what the terminal shows: errors and notes; with `details` every number."""
     errors = text_table(*plain_rows(errors_table(model, fit)), right=(2, 3, 4),
                         title=f'Error, rms; held out: {HELD_OUT[fit.held_out_on]}')
@@ -45,13 +45,13 @@ def fit_view(model: ForceModel, fit: BaseFit, details: bool = False) -> Any:
     return stacked(*headline, errors, *map(escape, fit.told), *numbers)
 
 
-def fit_page(model: ForceModel, fit: BaseFit, recordings: Sequence[str],
+def fit_page(model: DriveModel, fit: BaseFit, recordings: Sequence[str],
              validate: Sequence[str]) -> Page:
     """Return the page of one fit.
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
         As it was.
     fit : BaseFit
     recordings, validate : sequence of str

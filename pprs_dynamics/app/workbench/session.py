@@ -23,7 +23,7 @@ from pprs_dynamics.inference.diagnosis.quantities import word_little
 from pprs_dynamics.inference.diagnosis.sentences import word_reference
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.system.numbers import finite
@@ -37,7 +37,7 @@ class Session:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings : mapping of str to Recording
         To fit to, by name.
     inputs : Inputs, optional
@@ -55,7 +55,7 @@ class Session:
         As `measure_residuals`.
     """
 
-    def __init__(self, model: ForceModel, recordings: Mapping[str, Recording],
+    def __init__(self, model: DriveModel, recordings: Mapping[str, Recording],
                  inputs: Inputs | None = None) -> None:
         if not recordings:
             raise SessionError('no recording is given, must be at least one')

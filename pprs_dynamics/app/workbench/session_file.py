@@ -20,8 +20,7 @@ from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.fingerprint import fingerprint
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.bounded_yaml import read_text
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
@@ -56,13 +55,13 @@ class SavedSession:
     ----------
     inputs : Inputs
         Recordings, and the model as it was given.
-    model : ForceModel
+    model : DriveModel
         With what was adopted.
     ticks : tuple of SavedTick
     """
 
     inputs: Inputs
-    model: ForceModel
+    model: DriveModel
     ticks: tuple[SavedTick, ...]
 
     def write(self, path: str | PathLike[str]) -> None:
@@ -115,7 +114,7 @@ class SavedSession:
             raise UnreadableFileError(path, f'is no session, must have the format {FORMAT!r}, as '
                                       'the workbench saves it')
         try:
-            given, now = (replace(build_model(found['model'][which]),
+            given, now = (replace(DriveModel.from_parameters(found['model'][which]),
                                   source=str(found['model']['source']))
                           for which in ('given', 'now'))
             recordings, held_out = (dict(found[which]) for which in ('recordings', 'held_out'))

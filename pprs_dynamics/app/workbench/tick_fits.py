@@ -33,7 +33,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 Place = tuple[int | None, str]
 """Drive, None in the structure, and name of a parameter."""
@@ -85,14 +85,14 @@ class Exact:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     residual : (M, D) array
         Measured minus model [N].
     parameters : dict of str to dict of str to Estimate, optional
         By effect, where they were found around the fitted model.
     """
 
-    model: ForceModel
+    model: DriveModel
     residual: Array = field(repr=False)
     parameters: dict[str, dict[str, Estimate]] | None = None
 
@@ -102,7 +102,7 @@ class TickFits:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
         As it is; its numbers count from where its ledger says they began.
     recordings : sequence of Recording
     reference : Reference, optional
@@ -121,7 +121,7 @@ class TickFits:
         As `measure_residuals` and `Regression`.
     """
 
-    def __init__(self, model: ForceModel, recordings: Sequence[Recording],
+    def __init__(self, model: DriveModel, recordings: Sequence[Recording],
                  reference: Reference | None = None) -> None:
         self.model, self.recordings = model, tuple(recordings)
         start = original(model)

@@ -25,7 +25,7 @@ from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.numbers import finite
 
 # How far a fit has come: at the noise of the fit before; with its own; with its shapes where the
@@ -197,7 +197,7 @@ def _with_chosen(fits: TickFits, free: CandidateSet, ticks: Mapping[str, Tick]) 
     return fits.held(shaped, list(ticks.values()))
 
 
-def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: ForceModel,
+def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: DriveModel,
                    called_for: Set[str] | None) -> dict[str, Any]:
     """Return all that is shown of one effect.
 
@@ -205,7 +205,7 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: ForceM
     ----------
     view : ViewState
     effect : type of CatalogueEffect
-    model : ForceModel
+    model : DriveModel
     called_for : set of str or None
         Effects that the diagnosis calls for; None where there is none yet.
     """
@@ -229,7 +229,7 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: ForceM
         'parameters': _parameters(view, effect, model) if tick else []}
 
 
-def units_to_dict(model: ForceModel) -> dict[str, Any]:
+def units_to_dict(model: DriveModel) -> dict[str, Any]:
     """Return the units of all drives together, and drive by drive."""
     return {'unit': common_effort(model.units), 'units': {
         drive: {'effort': unit.effort, 'position': unit.position, 'velocity': unit.of('m/s'),
@@ -237,7 +237,7 @@ def units_to_dict(model: ForceModel) -> dict[str, Any]:
         for drive, unit in zip(model.drives, model.units, strict=True)}}
 
 
-def _parameters(view: ViewState, effect: type[CatalogueEffect], model: ForceModel,
+def _parameters(view: ViewState, effect: type[CatalogueEffect], model: DriveModel,
                 ) -> list[dict[str, Any]]:
     drives = model.drives
     units = dict(zip(drives, model.units, strict=True))

@@ -27,8 +27,7 @@ from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.uncertainties import UNCERTAINTIES, with_uncertainties
 
 SURE = 2.0  # standard deviations by which a number must differ from 0
@@ -108,7 +107,7 @@ class RequestedModel:
         return next(effect for effect in self.answer.effects if effect.name == self.request.name)
 
     @cached_property
-    def model(self) -> ForceModel:
+    def model(self) -> DriveModel:
         """The model with the effect alone; other effects of the row are left out.
 
         Raises
@@ -169,18 +168,18 @@ class RequestedModel:
         return tuple(found)
 
 
-def _with_uncertainties(model: ForceModel, known: Mapping[str, Mapping[str, Estimate]],
-                        ) -> ForceModel:
+def _with_uncertainties(model: DriveModel, known: Mapping[str, Mapping[str, Estimate]],
+                        ) -> DriveModel:
     """Return a model with the uncertainties of its effects' parameters."""
     values = dict(model.values)
     for name, parameters in known.items():
         values = with_uncertainties(values, name, {
             key: float(f'{number.std:.3g}') for key, number in parameters.items()
             if np.isfinite(number.std) and number.std > 0 and f'effects.{name}.{key}' in values})
-    return replace(build_model(values), source=model.source)
+    return replace(DriveModel.from_parameters(values), source=model.source)
 
 
-def _without(model: ForceModel, name: str, places: Sequence[str]) -> ForceModel:
+def _without(model: DriveModel, name: str, places: Sequence[str]) -> DriveModel:
     """Return a model without an effect in some places; without all of it where none is left."""
     if not places:
         return model
@@ -189,4 +188,4 @@ def _without(model: ForceModel, name: str, places: Sequence[str]) -> ForceModel:
     values = {key: value for key, value in model.values.items() if not key.startswith(gone)}
     if not any(key.startswith(f'effects.{name}.') for key in values):
         values['effects.active'] = [other for other in values['effects.active'] if other != name]
-    return replace(build_model(values), source=model.source)
+    return replace(DriveModel.from_parameters(values), source=model.source)

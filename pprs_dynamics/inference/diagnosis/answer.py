@@ -62,13 +62,13 @@ from pprs_dynamics.inference.search.noise_floors import noise_floors
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MOST_SETS, MOST_BARRED = 8, 3  # rows and inadmissible sets that are listed
 MOST_AVERAGED = 5  # sets that estimates are averaged over
 
 
-def model_of(fits: FittedSets, fitted: CandidateSet) -> ForceModel:
+def model_of(fits: FittedSets, fitted: CandidateSet) -> DriveModel:
     """Return the model of a set, with the effects that are there at the end and stay.
 
     Raises

@@ -20,11 +20,11 @@ from pprs_dynamics.inference.search.table import input_model_alone, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.measurement.motion.stick_slip import StickSlip, sticking_drives
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 
 def diagnose(
-    model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
+    model: DriveModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
     progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
     as_it_is: bool = False, reference: Reference | None = None,
 ) -> Diagnosis:
@@ -32,7 +32,7 @@ def diagnose(
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings : sequence of Recording
         To fit to.
     validate : sequence of Recording, optional
@@ -73,7 +73,7 @@ def diagnose(
 
 @outside_cost('efforts that are no measurement, and stick-slip, end the diagnosis before the '
               'search: `unknown`')
-def _gate(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
+def _gate(model: DriveModel, recordings: Sequence[Recording], decisions: Decisions,
           reference: Reference | None) -> tuple[dict[str, NoMeasurement], dict[str, StickSlip]]:
     """Return the drives whose efforts are no measurement, and those that stick and slip."""
     other = looks_like(model, recordings)

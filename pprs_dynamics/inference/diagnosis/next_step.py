@@ -21,7 +21,7 @@ from pprs_dynamics.physics.model.reference_keys import reference_files
 if TYPE_CHECKING:  # naming files needs no diagnosis
     from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
     from pprs_dynamics.inference.readings.findings import NoMeasurement
-    from pprs_dynamics.physics.model.force_model import ForceModel
+    from pprs_dynamics.physics.model.drive_model import DriveModel
 
 OWN_FRICTION = ('friction.viscous', 'friction.coulomb')  # of an arm's model file
 SECOND = 'SECOND_RECORDING'  # that is still to be made
@@ -88,7 +88,7 @@ class GivenFiles:
 PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made without files
 
 
-def first_step(model: ForceModel, files: GivenFiles) -> tuple[str, str]:
+def first_step(model: DriveModel, files: GivenFiles) -> tuple[str, str]:
     """Return what to do first where a model explains little, and the command.
 
     A description alone, without friction and with the maker's masses, is fitted first.
@@ -102,7 +102,7 @@ def first_step(model: ForceModel, files: GivenFiles) -> tuple[str, str]:
     return words, files.command('fit', '--output', files.output('base.yaml'))
 
 
-def _has_no_friction(model: ForceModel) -> bool:
+def _has_no_friction(model: DriveModel) -> bool:
     return model.is_described and not reference_files(model.values, model.source) and not any(
         np.any(model.values[key]) for key in OWN_FRICTION)
 

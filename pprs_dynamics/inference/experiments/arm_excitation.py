@@ -17,7 +17,7 @@ from pprs_dynamics.inference.experiments.motion_limits import ArmLimits
 from pprs_dynamics.inference.fit.bodies import Bodies
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 HARMONICS = 8  # of the duration
 SAMPLES = 150  # of a motion, for its information
@@ -30,7 +30,7 @@ class ArmExcitation:
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
     series : JointSeries
     determined, total : int
         Combinations of parameters of links, rotors and friction: those that it determines better
@@ -39,7 +39,7 @@ class ArmExcitation:
         Use of each limit, its margin taken off: at most 1.
     """
 
-    model: MechanismModel
+    model: DriveModel
     series: JointSeries
     determined: int
     total: int
@@ -62,13 +62,13 @@ class ArmExcitation:
                 'total': self.total, 'limits': self.limits, 'duration': self.series.duration}
 
 
-def excite_arm(model: MechanismModel, limits: ArmLimits, duration: float, seed: int,
+def excite_arm(model: DriveModel, limits: ArmLimits, duration: float, seed: int,
                progress: Callable[[float], None] | None = None) -> ArmExcitation:
     """Return the most informative motion about an arm's parameters.
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
     limits : ArmLimits
     duration : float
         [s]

@@ -40,7 +40,8 @@ from pprs_dynamics.inference.search.body_centres import about_centre
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
-from pprs_dynamics.physics.model.force_model import ForceModel, Forces
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.forces import Forces
 
 HOMING_SAMPLES = 100  # of a motion, at which columns of wrong zeros are computed; they are slow
 Columns = Mapping[int, tuple[np.typing.NDArray[np.int_], Array]]
@@ -135,15 +136,15 @@ class ColumnPlan:
 
     Parameters
     ----------
-    given, model : ForceModel
+    given, model : DriveModel
         As the user has it; and around which forces are linear.
     base : tuple of BaseColumn
         As the design has them; their rows are those of the recordings, if any.
     terms : tuple of FittedTerm
     """
 
-    given: ForceModel
-    model: ForceModel
+    given: DriveModel
+    model: DriveModel
     base: tuple[BaseColumn, ...]
     terms: tuple[FittedTerm, ...]
 

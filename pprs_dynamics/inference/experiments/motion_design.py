@@ -28,7 +28,7 @@ from pprs_dynamics.inference.experiments.motion_limits import ArmLimits, MotionL
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.paths import HOME
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.three_pprs.robot import SingularityBounds
 
 DRAWS, STEPS = 40, 160  # random motions, and steps from the best
 FIRST, LAST = 0.3, 0.03  # size of the steps, relative to the largest coefficient
@@ -173,8 +173,8 @@ class PlatformMotions:
     def __init__(self, model: DriveModel, limits: MotionLimits, duration: float) -> None:
         self.limits, self.duration = limits, duration
         # Poses near a singularity are compared, not refused, while searching.
-        self.model = replace(model, limits=replace(
-            model.limits, condition_number=np.inf, rod_sine=1e-3))
+        self.model = replace(model, robot=replace(model.robot, bounds=SingularityBounds(
+            rod_sine=1e-3)))
         self._strict = model
         self.top = max(self.HARMONICS + 1, int(self.HIGHEST_FREQUENCY * duration))
         self.centre = self._centre()
@@ -210,8 +210,9 @@ class PlatformMotions:
         geometry = self.model.robot.geometry
         lean = (geometry.base_radius - geometry.platform_radius * float(np.mean(np.cos(
             np.subtract(geometry.platform_angles, geometry.chain_angles))))) / geometry.rod_length
-        middle = sum(self.model.limits.lift_stroke) / 2 + (
-            geometry.elbow_sign * geometry.rod_length * float(np.sqrt(max(1 - lean ** 2, 0.0))))
+        rise = geometry.rod_length * float(np.sqrt(max(1 - lean ** 2, 0.0)))
+        middle = (float(sum(end[-1] for end in self.model.strokes)) / 2
+                  + geometry.elbow_sign * rise)
         reason = ''
         for centre in (HOME, (0.0, 0.0, middle)):
             standing = FourierPath.at_rest(self.duration, np.tile((1, 2), (FREEDOMS, 1)), centre)
@@ -235,7 +236,7 @@ class ArmMotions:
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
     limits : ArmLimits
         In addition to those of the URDF.
     duration : float
@@ -250,7 +251,7 @@ class ArmMotions:
     WIDEST = np.pi  # [rad, m], excursion of a joint, whatever its range
     scales = (0.02, 1.0)
 
-    def __init__(self, model: MechanismModel, limits: ArmLimits, duration: float,
+    def __init__(self, model: DriveModel, limits: ArmLimits, duration: float,
                  highest: tuple[int, ...] = (4, 8, 16), smallest: float = 0.2) -> None:
         tree, left = model.robot.structure, 1 - limits.margin
         self.model, self.duration, self.highest = model, duration, highest

@@ -12,7 +12,7 @@ import numpy as np
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import Forces
+from pprs_dynamics.physics.model.forces import Forces
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.passive_friction import IndependentChainsFriction
 
@@ -52,9 +52,10 @@ class MotionLimits:
 
     def uses(self, model: DriveModel, forces: Forces) -> dict[str, float]:
         """Return how much of each limit, its margin taken off, a motion uses: 1 is all of it."""
-        state, limits, left = forces.mechanism, model.limits, 1 - self.margin
+        state, bounds, left = forces.mechanism, model.robot.bounds, 1 - self.margin
+        limits, chains = model.limits, state.links.chains
         lower, upper = limits.strokes
-        sine = limits.rod_sine + self.margin * (1 - limits.rod_sine)
+        sine = bounds.rod_sine + self.margin * (1 - bounds.rod_sine)
         shares = {
             'stroke': np.abs(2 * state.position - lower - upper) / ((upper - lower) * left),
             'velocity': np.abs(state.velocity) / (self.velocity * left),
@@ -62,16 +63,16 @@ class MotionLimits:
             'effort': (np.abs(forces.total) + self.effort_reserve) / (limits.efforts * left)}
         found = {f'{name} of {drive}': share[:, d] for name, share in shares.items()
                  for d, drive in enumerate(DRIVES)}
-        chains = {'rod angle of chain': (1 - np.abs(state.chains.sin_u)) / (1 - sine)}
+        angles = {'rod angle of chain': (1 - np.abs(chains.sin_u)) / (1 - sine)}
         if any(isinstance(effect, IndependentChainsFriction) for effect in model.effects):
-            cosine = limits.rod_cosine + self.margin * (1 - limits.rod_cosine)
-            chains['cosine of rod angle'] = (1 - np.abs(state.chains.cos_u)) / (1 - cosine)
-        found |= {f'{name} {k + 1}': share[:, k] for name, share in chains.items()
+            cosine = bounds.rod_cosine + self.margin * (1 - bounds.rod_cosine)
+            angles['cosine of rod angle'] = (1 - np.abs(chains.cos_u)) / (1 - cosine)
+        found |= {f'{name} {k + 1}': share[:, k] for name, share in angles.items()
                   for k in range(3)}
         found['tilt of the platform'] = state.motion.tilt / (self.tilt * left)
         found['condition number'] = condition_number(
-            model.robot.geometry, state.jacobians.J) / (
-                min(limits.condition_number, self.condition_number) * left)
+            model.robot.geometry, state.links.jacobians.J) / (
+                min(bounds.condition_number, self.condition_number) * left)
         return {name: float(share.max()) for name, share in found.items()}
 
 

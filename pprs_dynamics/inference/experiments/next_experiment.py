@@ -36,7 +36,7 @@ from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel, Forces
+from pprs_dynamics.physics.model.forces import Forces
 
 PURPOSES = ('separate', 'commission')
 SURE = 0.9  # probability from which a design counts as separating
@@ -132,7 +132,7 @@ class Experiment:
         Times [s] -> PlatformMotion, or JointMotion of an arm.
     forces : callable
         Times [s] -> Forces.
-    model : ForceModel
+    model : DriveModel
     """
 
     kind: str
@@ -145,7 +145,7 @@ class Experiment:
     duration: float
     motion: Callable[[Array], Any]
     forces: Callable[[Array], Forces]
-    model: ForceModel
+    model: DriveModel
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -224,7 +224,7 @@ def _listed(pairs: Sequence[tuple[str, str]]) -> str:
 
 
 def next_experiment(
-    model: ForceModel, recordings: Sequence[Recording] = (),
+    model: DriveModel, recordings: Sequence[Recording] = (),
     purpose: str = 'separate',
     limits: MotionLimits | ArmLimits | None = None, duration: float = 20.0, seed: int = 0,
     noise: float = 0.05, progress: Callable[[float], None] | None = None,
@@ -247,7 +247,7 @@ def next_experiment(
     check_purpose(purpose, recordings)
     check_duration(duration)
     question = (commissioning(model, recordings, noise, decisions)
-                if purpose == 'commission' and isinstance(model, DriveModel) else
+                if purpose == 'commission' and not model.moves_joints else
                 question_of(model, recordings, lambda share: report(0.2 * share), decisions))
     limits = limits or (ArmLimits() if model.moves_joints else MotionLimits())
     limits = replace(limits, effort_reserve=max(
@@ -372,7 +372,7 @@ def _known_to(labels: list[tuple[str, str, float]], precision: Precision, known:
             for (label, unit, scale), a, b in zip(labels, before, later, strict=True)]
 
 
-def _labels(term: FittedTerm, model: ForceModel) -> list[tuple[str, str, float]]:
+def _labels(term: FittedTerm, model: DriveModel) -> list[tuple[str, str, float]]:
     """Return name, unit and scale of each parameter of a term that is fitted."""
     prefix, unit = term.effect.name, DriveUnits()
     if term.drive is not None:

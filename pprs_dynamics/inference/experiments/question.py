@@ -50,7 +50,6 @@ from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel
 from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
 
 HELD = 1e-3  # of a column's square may lie outside the span of another effect's
@@ -123,7 +122,7 @@ class Question:
         return replace(self, contests=tuple(contests), criterion=Separation(tuple(contests)))
 
 
-def question_of(model: ForceModel, recordings: Sequence[Recording],
+def question_of(model: DriveModel, recordings: Sequence[Recording],
                 progress: Callable[[float], None], decisions: Decisions = DECISIONS) -> Question:
     """Return what recordings leave open; errors as `diagnose`."""
     table = tabulate(model, recordings, decisions, progress)

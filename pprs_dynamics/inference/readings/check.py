@@ -40,7 +40,7 @@ from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Defect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.recorded_names import CURRENT
 
 
@@ -67,7 +67,7 @@ class Fit:
                 and bool(np.all(sizes == sizes[0]) and sizes[0] != 1))
 
 
-def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False) -> Recording:
+def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False) -> Recording:
     """Return a recording with its mistakes among its findings.
 
     Raises
@@ -84,12 +84,12 @@ def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False)
     return replace(recording, findings=(*mistakes, *recording.findings))
 
 
-def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]:
+def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]:
     """Return where a recording is read better otherwise than its names and units say.
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recording : Recording
         Of the model's drives.
     """
@@ -134,12 +134,12 @@ class Search:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     excerpts : dict of float to Excerpt
         Of the recording, by the unit of its times [s].
     """
 
-    def __init__(self, model: ForceModel, excerpts: dict[float, Excerpt]) -> None:
+    def __init__(self, model: DriveModel, excerpts: dict[float, Excerpt]) -> None:
         self.model, self.excerpts = model, excerpts
         # Of currents without a known gain no force is known: masses say nothing.
         self.masses = np.inf if model.effort_kind == CURRENT and not model.knows_currents else (
@@ -350,7 +350,7 @@ def _time_units(recording: Recording) -> list[float]:
 # --------------------------------------------------------------------------------- sentences
 
 
-def _of_fit(model: ForceModel, fit: Fit) -> Iterator[OtherReading]:
+def _of_fit(model: DriveModel, fit: Fit) -> Iterator[OtherReading]:
     """Yield the mistakes of times, of positions and order, and of efforts."""
     drives, units = model.drives, model.units
     if fit.time_unit != 1.0:
@@ -376,7 +376,7 @@ def _of_fit(model: ForceModel, fit: Fit) -> Iterator[OtherReading]:
                               scales=effort_scales(model, group, np.full(len(drives), 1 / scale)))
 
 
-def position_scales(model: ForceModel, reading: Reading) -> Scales:
+def position_scales(model: DriveModel, reading: Reading) -> Scales:
     """Return the factors and offsets below `columns` with which positions are read so."""
     found = []
     offset = np.zeros(len(model.drives)) + reading.offset
@@ -393,7 +393,7 @@ def position_scales(model: ForceModel, reading: Reading) -> Scales:
     return () if reading.kind == 'drive_order' else tuple(found)
 
 
-def _of_strokes(model: ForceModel, recording: Recording, strokes: tuple[Array, Array],
+def _of_strokes(model: DriveModel, recording: Recording, strokes: tuple[Array, Array],
                 ) -> Iterator[Defect]:
     """Yield positions far beyond the strokes, which no effort is needed to recognise."""
     lower, upper = strokes
@@ -418,7 +418,7 @@ def _of_strokes(model: ForceModel, recording: Recording, strokes: tuple[Array, A
             scales=() if unit == 1.0 else position_scales(model, scale))
 
 
-def _of_velocities(model: ForceModel, recording: Recording, excerpt: Excerpt | None,
+def _of_velocities(model: DriveModel, recording: Recording, excerpt: Excerpt | None,
                    ) -> Iterator[Defect]:
     """Yield recorded velocities that are not the derivatives of positions."""
     if excerpt is None or excerpt.velocity is None:

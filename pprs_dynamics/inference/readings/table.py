@@ -47,6 +47,8 @@ CLOSEST = 2e-4
 MASSES, MASSES_MOST = 0.35, 7.0
 # Standard deviation of a constant effort, as a share of the effort.
 CONSTANT = 0.3
+# Width in which friction turns over, at most, as a share of a drive's speeds.
+REVERSAL = 0.2
 # Times the rigid body's forces, beyond which friction is unlikely, and what it can cost at most.
 FRICTION, FRICTION_MOST = 3.0, 9.0
 # Prior costs of mistakes [nats].

@@ -21,7 +21,7 @@ from pprs_dynamics.inference.regression.sensitivities import Number
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import set_number
 
 DIGITS = 6  # significant, of fitted values
@@ -118,7 +118,7 @@ def within(parameter: Parameter, value: float, units: DriveUnits) -> float:
     return float(min(max(rounded(value), bounded.lower), bounded.upper))
 
 
-def units_of(model: ForceModel, drive: str | int | None) -> DriveUnits:
+def units_of(model: DriveModel, drive: str | int | None) -> DriveUnits:
     """Return the units of a drive by name or number; those that push for the structure."""
     if drive is None:
         return DriveUnits()
@@ -132,7 +132,7 @@ def move_numbers(values: dict[str, Any], base: Sequence[BaseColumn], coefficient
             set_number(values, column.number.key, column.number.element, column.value(float(c)))
 
 
-def move_present(values: dict[str, Any], given: ForceModel, base: Sequence[BaseColumn],
+def move_present(values: dict[str, Any], given: DriveModel, base: Sequence[BaseColumn],
                  coefficients: Array) -> None:
     """Put the given model's effects as coefficients have them into a model's values."""
     moves: dict[tuple[type[CatalogueEffect], str | None],

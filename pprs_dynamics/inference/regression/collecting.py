@@ -14,7 +14,7 @@ from pprs_dynamics.inference.regression.sensitivities import NUMBERS, Sensitivit
 from pprs_dynamics.inference.regression.terms import FullRate
 from pprs_dynamics.inference.residuals.reconstruction import Reconstruction
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.model.force_model import Forces
+from pprs_dynamics.physics.model.forces import Forces
 from pprs_dynamics.physics.model.keys import GAIN
 
 

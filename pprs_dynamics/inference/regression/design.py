@@ -71,7 +71,7 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
 from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 
@@ -89,7 +89,7 @@ class Design:
 
     Parameters
     ----------
-    given, model : ForceModel
+    given, model : DriveModel
         As the user has it; and around which forces are linear.
     residuals : Residuals
         Whose error is that of the given model, extrapolated linearly from `model`.
@@ -111,8 +111,8 @@ class Design:
         Its mean is taken from what was measured, its directions are columns of every fit.
     """
 
-    given: ForceModel
-    model: ForceModel
+    given: DriveModel
+    model: DriveModel
     residuals: Residuals
     recordings: tuple[FullRate, ...]
     base: tuple[BaseColumn, ...]
@@ -140,14 +140,14 @@ class Design:
 
     @classmethod
     def of(
-        cls, model: ForceModel, recordings: Sequence[Recording],
+        cls, model: DriveModel, recordings: Sequence[Recording],
         progress: Callable[[float], None] | None = None,
     ) -> Design:
         """Evaluate a model and its sensitivities on recordings; errors as `measure_residuals`.
 
         Parameters
         ----------
-        model : ForceModel
+        model : DriveModel
         recordings : sequence of Recording
         progress : callable, optional
             Called with the share that is done.
@@ -241,7 +241,7 @@ class Design:
                     forces[:, d] += c * row
         return forces
 
-    def reconstructed(self, model: ForceModel) -> tuple[Reconstruction, ...]:
+    def reconstructed(self, model: DriveModel) -> tuple[Reconstruction, ...]:
         """Return the motion of the recordings as a model's encoders tell it."""
         if model.misreadings == self.model.misreadings:
             return self.reconstructions
@@ -253,7 +253,7 @@ class Design:
         return self._moved[key]
 
     @classmethod
-    def _evaluated(cls, model: ForceModel, given: ForceModel,
+    def _evaluated(cls, model: DriveModel, given: DriveModel,
                    reconstructions: tuple[Reconstruction, ...],
                    progress: Callable[[float], None] | None,
                    effects: Container[type[CatalogueEffect]] | None = None,

@@ -12,12 +12,12 @@ from scipy import fft
 
 from pprs_dynamics.inference.regression.terms import FullRate
 from pprs_dynamics.physics.effects.drive_effect import DriveRange
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 LONGEST_DELAY = 0.3  # [s], that a recording may show at once
 
 
-def drive_range(model: ForceModel, recordings: Sequence[FullRate], drive: int) -> DriveRange:
+def drive_range(model: DriveModel, recordings: Sequence[FullRate], drive: int) -> DriveRange:
     """Return what a drive of a model did in recordings."""
     position = np.concatenate([recording.position[:, drive] for recording in recordings])
     velocity = np.concatenate([recording.velocity[:, drive] for recording in recordings])

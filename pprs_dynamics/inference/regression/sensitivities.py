@@ -23,13 +23,9 @@ from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.model.force_model import (
-    ACTIVE_FRICTION,
-    PASSIVE_FRICTION,
-    ForceModel,
-)
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.forces import ACTIVE_FRICTION, PASSIVE_FRICTION
 from pprs_dynamics.physics.model.keys import GAIN
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.system.parallel import each
 
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
@@ -77,7 +73,7 @@ class Number:
         return self.key if self.element is None else f'{self.key}[{self.element + 1}]'
 
 
-def model_numbers(model: ForceModel) -> tuple[Number, ...]:
+def model_numbers(model: DriveModel) -> tuple[Number, ...]:
     """Return the model's numbers that its `tolerances` leave open.
 
     A tolerance is a limit: 2.5 standard deviations.
@@ -94,7 +90,7 @@ def model_numbers(model: ForceModel) -> tuple[Number, ...]:
     return tuple(found)
 
 
-def _unit(model: ForceModel, key: str, element: int | None) -> str:
+def _unit(model: DriveModel, key: str, element: int | None) -> str:
     """Return the unit of a number; of a joint's, that of its kind."""
     turning, *pushing = model.keys[key].unit.split(', ')
     turns = element is None or element >= len(model.drives) or model.units[element].turns
@@ -109,9 +105,9 @@ class Sensitivities:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
         Around which forces are linear.
-    given : ForceModel
+    given : DriveModel
         As the user gave it: what it has already is no candidate, and its numbers are those that
         tolerances are about.
 
@@ -128,7 +124,7 @@ class Sensitivities:
         Samples between those at which it is; 0: those within `HOMING_TIME`.
     """
 
-    def __init__(self, model: ForceModel, given: ForceModel) -> None:
+    def __init__(self, model: DriveModel, given: DriveModel) -> None:
         self.model, self.given = model, given
         self.each: Callable[..., Iterable[Any]] = each if model.takes_long else map
         self.numbers = model_numbers(given)
@@ -206,7 +202,7 @@ class Sensitivities:
             stride = max(1, round(HOMING_TIME / step))
         samples = every[min(stride // 2, len(every) - 1)::stride]
         there, seldom = state[samples], state[samples[::SLOWER]]
-        step = there.position_step
+        step = there.robot.position_step
 
         def efforts(drive: int, move: float) -> Array:
             return self._efforts(self.model, self._at(self.model, there.perturbed(drive, move)))
@@ -234,7 +230,7 @@ class Sensitivities:
     def _sensed_each(self, columns: Iterable[Array], state: Any) -> Array:
         return np.stack([self.sensed(column, state) for column in columns])
 
-    def _efforts(self, model: ForceModel, state: Any) -> Array:
+    def _efforts(self, model: DriveModel, state: Any) -> Array:
         """Return efforts at a state, without effects that know their past."""
         total: Array = state.rigid_force + sum(
             effect.force(state) for effect in following(model))
@@ -260,12 +256,12 @@ class Sensitivities:
         return [number.element] if number.key in PER_DRIVE or number.key == GAIN else None
 
     @cached_property
-    def _moved(self) -> dict[Number, ForceModel]:
+    def _moved(self) -> dict[Number, DriveModel]:
         """The model with numbers away from 0 by `RELATIVE_STEP` of the given ones.
 
         Made once, not chunk by chunk; numbers of a list that act on drives of their own share one.
         """
-        models: dict[tuple[str, int | None], ForceModel] = {}
+        models: dict[tuple[str, int | None], DriveModel] = {}
         found = {}
         for number in self.numbers:
             alone = None if self.drives_of(number) else number.element
@@ -278,7 +274,7 @@ class Sensitivities:
                         in enumerate(zip(value, self.given.values[number.key], strict=True)))
                 else:
                     value += RELATIVE_STEP * number.value
-                models[place] = build_model({**self.model.values, number.key: value})
+                models[place] = DriveModel.from_parameters({**self.model.values, number.key: value})
             found[number] = models[place]
         return found
 
@@ -340,7 +336,7 @@ class Sensitivities:
         return np.stack(full), np.stack(bare)
 
 
-def following(model: ForceModel) -> list[Effect]:
+def following(model: DriveModel) -> list[Effect]:
     """Return the effects whose forces follow from a state: no bodies, sensors or memories."""
     return [effect for effect in model.effects
             if not effect.is_measurement and not isinstance(effect, BodyEffect)

@@ -14,7 +14,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import DriveSamples
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 Rows = Mapping[int, Array]
 """Columns by drive, (k, M) each; drives that are not in it feel nothing."""
@@ -122,13 +122,13 @@ class OperatingPoint:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     base : (P,) array
         Coefficients of the base columns; those of reversals are 0.
     effects : tuple of PlacedEffect
         What it has beside the given model, or otherwise.
     """
 
-    model: ForceModel
+    model: DriveModel
     base: Array
     effects: tuple[PlacedEffect, ...] = ()

@@ -24,7 +24,7 @@ from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.measurement.motion.drive_motion import smooth_drives
 from pprs_dynamics.measurement.motion.rests import GLANCE
 from pprs_dynamics.measurement.motion.treatment import block_length
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 TOO_LONG = 'too_long'
 # Blocks of all recordings together. A search takes 50 to 150 kB for each, with six drives: as many
@@ -36,7 +36,7 @@ MOST_WHOLE, MOST_BLOCKS = 16_000, 9_000
 STRETCHES, SHORTEST_STRETCH = 12, 5.0
 
 
-def excerpts_within_memory(model: ForceModel, recordings: Sequence[Recording]) -> list[Recording]:
+def excerpts_within_memory(model: DriveModel, recordings: Sequence[Recording]) -> list[Recording]:
     """Return recordings of which no more is used than a search can hold.
 
     What is left out is among their findings. Those that are short enough stay as they are, and so
@@ -72,7 +72,7 @@ def _blocks(recording: Recording, times: int) -> float:
     return _used(recording) / (times * block_length(_step(recording)))
 
 
-def _block(model: ForceModel, recording: Recording) -> int:
+def _block(model: DriveModel, recording: Recording) -> int:
     """Return how many usual blocks make one of a model whose blocks follow the motion."""
     if not recording.segments:
         return 1

@@ -28,15 +28,15 @@ from pprs_dynamics.measurement.motion.drive_motion import (
     smoothed_again,
     smoothed_as,
 )
-from pprs_dynamics.measurement.motion.rests import find_rests
+from pprs_dynamics.measurement.motion.rests import are_held_poses, find_rests, rest_speeds
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.laws.elastic_joint import LINK_POSITION
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.three_pprs.forward_motion import find_pose_jumps, solve_forward_motion
-from pprs_dynamics.physics.three_pprs.robot import Geometry
+from pprs_dynamics.physics.three_pprs.geometry import Geometry
 
 if TYPE_CHECKING:
     from pprs_dynamics.measurement.files.recording import Recording
@@ -143,7 +143,7 @@ class Reconstruction(DriveMotion):
     def __len__(self) -> int:
         return len(self.time)
 
-    def recorded_share(self, model: ForceModel) -> Array:
+    def recorded_share(self, model: DriveModel) -> Array:
         """Return by what a model's efforts are multiplied to be those of the recording, (D,).
 
         1, but for currents that another gain than the model's made efforts of.
@@ -171,13 +171,13 @@ class Reconstruction(DriveMotion):
                 first = last
 
 
-def follow(model: ForceModel | Geometry, time: Array, drives: DriveMotion,
+def follow(model: DriveModel | Geometry, time: Array, drives: DriveMotion,
            progress: Progress | None = None) -> FollowedMotion:
     """Return the motion that belongs to the drives': of an axis and an arm it is the same.
 
     Parameters
     ----------
-    model : ForceModel or Geometry
+    model : DriveModel or Geometry
         Of any kind, or the geometry of a 3-PPRS.
     time : (N,) array
         [s].
@@ -190,7 +190,7 @@ def follow(model: ForceModel | Geometry, time: Array, drives: DriveMotion,
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    if isinstance(model, ForceModel) and model.moves_joints:
+    if isinstance(model, DriveModel) and model.moves_joints:
         return FollowedMotion(JointMotion(drives.position, drives.velocity, drives.acceleration),
                               np.zeros(len(time), dtype=bool), np.zeros(0, dtype=int))
     geometry = model if isinstance(model, Geometry) else model.robot.geometry
@@ -241,14 +241,14 @@ def _jumps(motion: PlatformMotion, time: Array, segments: Sequence[slice]) -> np
 
 
 def reconstruct(
-    model: ForceModel | Geometry, recording: Recording, progress: Progress | None = None,
+    model: DriveModel | Geometry, recording: Recording, progress: Progress | None = None,
     window: float | None = None,
 ) -> Reconstruction:
     """Return the motion and effort behind a recording.
 
     Parameters
     ----------
-    model : ForceModel or Geometry
+    model : DriveModel or Geometry
         Whose kinematics to use.
     recording : Recording
         Or anything with its arrays and segments.
@@ -264,12 +264,12 @@ def reconstruct(
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    names = model.drives if isinstance(model, ForceModel) else DRIVES
+    names = model.drives if isinstance(model, DriveModel) else DRIVES
     if tuple(recording.drives) != names:
         order = ', in this order' if len(names) > 1 else ''
         raise MotionError('drives', f'they are {", ".join(recording.drives)}',
                           f'be {", ".join(names)}{order}', 'shape')
-    if isinstance(model, ForceModel):
+    if isinstance(model, DriveModel):
         unit = 'rad' if all(units.turns for units in model.units) else 'm'
         drives = smooth_drives(recording, window, model.blocks_per_period, unit)
     else:
@@ -297,7 +297,7 @@ def reconstruct(
         recorded=recording, read=read, windup=windup)
 
 
-def read_by(reconstruction: Reconstruction, model: ForceModel) -> Reconstruction:
+def read_by(reconstruction: Reconstruction, model: DriveModel) -> Reconstruction:
     """Return the same reconstruction with the drives where another model's encoders are.
 
     Blocks do not depend on them.
@@ -347,11 +347,11 @@ def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recordin
 
 
 def _followed_rightly(
-    model: ForceModel | Geometry, recording: Recording, read: DriveMotion, time: Array,
+    model: DriveModel | Geometry, recording: Recording, read: DriveMotion, time: Array,
     windup: Array | None, progress: Progress | None = None,
 ) -> tuple[DriveMotion, FollowedMotion]:
     """Return the true motion of the drives, and of what they move, behind that which was read."""
-    if not isinstance(model, ForceModel) or not model.misreadings:
+    if not isinstance(model, DriveModel) or not model.misreadings:
         return read, follow(model, time, read, progress)
     q, q_dot, q_ddot = misread(model.misreadings, model.drives, recording, read)
     drives = replace(read, position=read.position - q, velocity=read.velocity - q_dot,
@@ -402,19 +402,25 @@ def _channels(recording: Recording, index: Array) -> dict[str, Array]:
     return found
 
 
-def _efforts(model: ForceModel | Geometry, recording: Recording) -> Array:
-    """Return the efforts of a recording, NaN where a drive stands."""
+def _efforts(model: DriveModel | Geometry, recording: Recording) -> Array:
+    """Return the efforts of a recording, NaN where a drive stands between motions.
+
+    Where poses are held throughout, their efforts count: they show gravity and offsets.
+    """
     effort = recording.effort
-    if isinstance(model, ForceModel) and model.rest_speed:
+    if isinstance(model, DriveModel) and model.rest_speed and not are_held_poses(
+            recording.position, recording.segments):
         effort = effort.copy()
         for part in recording.segments:
             step = float(np.median(np.diff(recording.time[part])))
-            effort[part][find_rests(recording.position[part], step, model.rest_speed)] = np.nan
+            position = recording.position[part]
+            speeds = rest_speeds(position, step, model.rest_speed)
+            effort[part][find_rests(position, step, speeds)] = np.nan
     return effort
 
 
 def sensed_forces(
-    model: ForceModel, reconstruction: Reconstruction,
+    model: DriveModel, reconstruction: Reconstruction,
 ) -> Iterator[tuple[Chunk, Any, dict[str, Array]]]:
     """Yield chunk by chunk what the model returns, and its efforts as the sensors would see them.
 
@@ -431,14 +437,14 @@ def sensed_forces(
 
 
 def treated_forces(
-    model: ForceModel, reconstruction: Reconstruction, progress: Progress | None = None,
+    model: DriveModel, reconstruction: Reconstruction, progress: Progress | None = None,
     more: Callable[[Any], Mapping[Any, Array]] = lambda forces: {},
 ) -> dict[Any, Array]:
     """Return the model's forces on a reconstruction, treated: parts and their 'total', (M, D) [N].
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     reconstruction : Reconstruction
     progress : callable, optional
         Called with (samples done, all) now and then.

@@ -23,7 +23,7 @@ from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.patterns import Family, Pattern
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE, catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 RowKey = frozenset[tuple[str, str]]  # names with their place, and kinds of courses
 COURSE_TIMES = 200  # beginnings that are tried, evenly over the recordings
@@ -347,7 +347,7 @@ def set_key(candidates: tuple[Candidate, ...]) -> Hashable:
     return frozenset(candidate.key for candidate in candidates)
 
 
-def names_of(model: ForceModel) -> int:
+def names_of(model: DriveModel) -> int:
     """Return how many effects the catalogue has for what a model is of."""
     return sum(map(model.offers, catalogue().values()))
 
@@ -373,7 +373,7 @@ class PriorCosts:
 
     @classmethod
     def of(cls, regression: Regression, decisions: Decisions,
-           model: ForceModel | None = None) -> PriorCosts:
+           model: DriveModel | None = None) -> PriorCosts:
         """Return the prior costs for the drives and samples of a regression, of a model's errors.
 
         Names are those of effects that can act in what it is a model of, those of other packages

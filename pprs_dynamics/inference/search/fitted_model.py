@@ -23,8 +23,7 @@ from pprs_dynamics.inference.regression.terms import PlacedEffect
 from pprs_dynamics.inference.residuals.reconstruction import treated_forces
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 
 def parts_of(fits: FittedSets, fitted: CandidateSet) -> tuple[Array, tuple[PlacedEffect, ...]]:
@@ -41,7 +40,7 @@ def parts_of(fits: FittedSets, fitted: CandidateSet) -> tuple[Array, tuple[Place
     return base, tuple(effects)
 
 
-def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> ForceModel:
+def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> DriveModel:
     """Return the given model with its numbers as coefficients have them, and with effects.
 
     Raises
@@ -75,10 +74,10 @@ def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> Fo
                 parameter, every[parameter.name], units_of(design.given, effect.drive))
     if names:
         values['effects.active'] = names
-    return replace(build_model(values), source=design.given.source)
+    return replace(DriveModel.from_parameters(values), source=design.given.source)
 
 
-def fitted_model(fits: FittedSets, fitted: CandidateSet) -> ForceModel:
+def fitted_model(fits: FittedSets, fitted: CandidateSet) -> DriveModel:
     """Return the given model with the effects of a set, and its numbers as the fit moves them.
 
     Raises
@@ -121,7 +120,7 @@ def linear_error(fits: FittedSets, fitted: CandidateSet) -> float:
     return root_mean_square(linear_residual(fits, fitted))
 
 
-def exact_forces(design: Design, model: ForceModel) -> Array:
+def exact_forces(design: Design, model: DriveModel) -> Array:
     """Return the treated forces of a model on the recordings of a design, (M, D) [N].
 
     Raises

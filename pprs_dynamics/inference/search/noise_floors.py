@@ -30,7 +30,7 @@ from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 # Of all shapes of an effect: directions of their span with less than the share of the strongest
 # are left out, and all but the strongest few.
@@ -70,7 +70,7 @@ def _curve(position: Array) -> Array:
 
 
 def measure_columns(
-    model: ForceModel, recordings: Sequence[Recording],
+    model: DriveModel, recordings: Sequence[Recording],
     progress: Callable[[float], None] = lambda share: None, decisions: Decisions = DECISIONS,
 ) -> tuple[FittedSets | None, Residuals, tuple[str, ...]]:
     """Return what a largest fit needs, and what `measure_residuals` returns.
@@ -80,7 +80,7 @@ def measure_columns(
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings : sequence of Recording
     progress : callable, optional
         Called with the share of the work that is done.

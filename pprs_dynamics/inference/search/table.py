@@ -41,7 +41,7 @@ from pprs_dynamics.inference.search.relinearisation import has_nonlinear, linear
 from pprs_dynamics.inference.search.search import Search, patterns_of
 from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 SAME = 1e-6  # share of a column's square outside a span, up to which it is inside
 MOST_STEPS = 6  # of relinearisation of one row
@@ -265,14 +265,14 @@ class ModelTable:
         return list(found.values())
 
 
-def tabulate(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
+def tabulate(model: DriveModel, recordings: Sequence[Recording], decisions: Decisions,
              progress: Callable[[float], None] | None = None,
              carry_over: Callable[[Design], CarriedOver] | None = None) -> ModelTable:
     """Return the table of all choices of effects that a search fits to recordings.
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings : sequence of Recording
     decisions : Decisions
     progress : callable, optional
@@ -311,7 +311,7 @@ def tabulate(model: ForceModel, recordings: Sequence[Recording], decisions: Deci
     return _with_exact_best(table)
 
 
-def input_model_alone(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
+def input_model_alone(model: DriveModel, recordings: Sequence[Recording], decisions: Decisions,
                       progress: Callable[[float], None] | None = None) -> ModelTable:
     """Return the table of the row without any effect; errors as `measure_residuals`."""
     fits = FittedSets(Design.of(model, recordings, progress), decisions)

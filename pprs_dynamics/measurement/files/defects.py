@@ -64,6 +64,7 @@ class Judgement:
         if not len(self.samples.time):
             return
         self._order()
+        self._keep(self._first_of_held('position', self.samples.position))
         self._judge_positions()
         self._judge_spacing()
         self._judge_efforts_and_velocities()
@@ -152,6 +153,18 @@ class Judgement:
         self._tell_samples('duplicate_stamps', same, 'with the stamp of another')
         self._keep(~same)
 
+    def _first_of_held(self, quantity: str, values: NDArray[np.float64]) -> Mask:
+        """Return where values that a slower source wrote into a faster table are new."""
+        count = signals.held_for(values)
+        if count == 1:
+            return np.ones(len(values), dtype=bool)
+        rate = 1 / float(np.median(np.diff(self.samples.time)))
+        first = signals.first_of_held(values, count)
+        self._tell(f'held_{quantity}', int(np.sum(~first)),
+                   f'the {quantity}s are held: {rate / count:.3g} new ones a second in '
+                   f'{rate:.4g} samples a second')
+        return first
+
     def _judge_positions(self) -> None:
         found = signals.find_jumps(self.samples)
         for drive, name in enumerate(self.samples.drives):
@@ -213,6 +226,7 @@ class Judgement:
             self._tell('no_effort', len(effort), 'there is no effort of any drive')
         else:
             self._tell_missing('effort_not_measured', effort, 'effort')
+            effort[~self._first_of_held('effort', effort)] = np.nan
             self._leave_out_zeros()
             self._leave_out_saturated()
         velocity = self.samples.velocity
@@ -237,19 +251,24 @@ class Judgement:
         effort[lost] = np.nan
 
     def _leave_out_saturated(self) -> None:
-        """Take out efforts at the limit of a drive, which say only that it is there."""
+        """Take out efforts at a limit, which say only that they are there."""
         effort, samples = self.samples.effort, self.samples
-        for drive, limit in enumerate(samples.effort_limits):
+        limits = samples.effort_limits or (np.inf,) * len(samples.drives)
+        for drive, (limit, name) in enumerate(zip(limits, samples.drives, strict=True)):
             size = np.abs(effort[:, drive])
-            at_limit = size >= AT_LIMIT * limit
-            if not np.any(at_limit) or np.nanmax(size) > BEYOND_LIMIT * limit:
+            largest = np.nanmax(size, initial=0.0)
+            at_limit = size >= (AT_LIMIT * limit if largest <= BEYOND_LIMIT * limit else np.inf)
+            if not np.any(at_limit):
+                at_limit = signals.cut_off(effort[:, drive], samples.position[:, drive])
+            if not np.any(at_limit):
                 continue
-            name, count = samples.drives[drive], int(at_limit.sum())
-            self._tell('saturated_effort', count,
-                       f'the effort of {name} is at its limit of {limit:.6g} '
-                       f'{samples.unit_of(drive, "N")} in {100 * count / len(size):.3g} % of the '
-                       'samples',
-                       stamps.runs(at_limit), [name])
+            levels = sorted({f'{value:.4g}' for value in size[at_limit]}, key=float)
+            level = f'its limit of {limit:.6g}' if largest >= AT_LIMIT * limit else (
+                ' and '.join(levels))
+            self._tell('saturated_effort', int(at_limit.sum()),
+                       f'the effort of {name} is cut off at {level} '
+                       f'{samples.unit_of(drive, "N")} in {100 * at_limit.mean():.3g} % of the '
+                       'samples', stamps.runs(at_limit), [name])
             effort[at_limit, drive] = np.nan
 
     def _tell_missing(self, kind: str, values: NDArray[np.float64], quantity: str) -> None:

@@ -59,6 +59,8 @@ POLICY = {
     'impossible_position': 'those samples are dropped',
     'impossible_velocity': 'they count as not measured',
     'impossible_effort': 'they count as not measured',
+    'held_position': 'each is used once',
+    'held_effort': 'each is used once',
     'effort_zero': 'they count as not measured',
     'saturated_effort': 'they are left out of every comparison and fit',
     'no_effort': 'compare, diagnose, fit and adopt need them and will refuse it',

@@ -35,6 +35,12 @@ STUCK_POSITIONS = 10
 ZERO_SAMPLES = 3
 ZERO_RATIO = 5.0
 ZERO_QUANTILE = 0.9
+# The highest or lowest effort is a limit where so many samples have it, this many times as many as
+# any of the next values, and while the drive moves.
+CUT_SAMPLES, CUT_RATIO, CUT_BESIDE = 10, 5.0, 5
+# Values that are new only every so many samples, in this share of the changes, are held. Steps of
+# an encoder are no held values: most of those have one size.
+HELD_CHANGES, HELD_SHARE, HELD_LEAST = 30, 0.9, 1.9
 
 
 @dataclass(frozen=True)
@@ -140,6 +146,43 @@ def lost_to_zero(effort: Array) -> tuple[Mask, float]:
         if left * right > 0 and far > ZERO_RATIO * max(usual, abs(right - left)):
             found[first:last + 1] = True
     return found, usual
+
+
+def cut_off(effort: Array, position: Array) -> Mask:
+    """Return which efforts, (N,), are at a level that cuts off all higher or lower ones."""
+    found = np.zeros(len(effort), dtype=bool)
+    levels, counts = np.unique(effort[np.isfinite(effort)], return_counts=True)
+    moves = np.diff(position, prepend=position[:1]) != 0
+    for level, sizes in ((levels[:1], counts[:CUT_BESIDE + 1]),
+                         (levels[-1:], counts[:-CUT_BESIDE - 2:-1])):
+        if len(sizes) > CUT_BESIDE and level != 0 and sizes[0] >= max(
+                CUT_SAMPLES, CUT_RATIO * sizes[1:].max()):
+            at = effort == level
+            if 2 * np.sum(at & moves) > np.sum(at):
+                found |= at
+    return found
+
+
+def held_for(values: Array) -> int:
+    """Return for how many samples each value, (N, D), is held; 1 where that varies."""
+    steps = np.diff(np.nan_to_num(values, posinf=0.0, neginf=0.0), axis=0)
+    at = np.flatnonzero(np.any(steps != 0, axis=1))
+    if len(at) <= HELD_CHANGES:
+        return 1
+    spans = np.diff(at)
+    mean = float(np.mean(spans[spans <= 2 * np.median(spans)]))
+    sizes = np.abs(steps[steps != 0])
+    is_regular = np.mean((spans >= np.floor(mean)) & (spans <= np.ceil(mean))) > HELD_SHARE
+    of_one_size = np.mean(sizes < 1.5 * sizes.min())
+    return int(mean) if mean > HELD_LEAST and is_regular and of_one_size < HELD_SHARE else 1
+
+
+def first_of_held(values: Array, count: int) -> Mask:
+    """Return which samples have a value, (N, D), for the first time, of those held for `count`."""
+    changed = np.concatenate(([True], np.any(values[1:] != values[:-1], axis=1)))
+    place = np.arange(len(values))
+    first: Mask = (place - np.maximum.accumulate(np.where(changed, place, 0))) % count == 0
+    return first
 
 
 def is_constant(values: Array) -> bool:

@@ -22,12 +22,14 @@ from pprs_dynamics.measurement.motion.differentiation import (
     choose_smoothing,
     representative,
 )
+from pprs_dynamics.measurement.motion.rests import are_held_poses
 from pprs_dynamics.measurement.motion.sampling_grid import SamplingGrid, find_grid
 from pprs_dynamics.measurement.motion.treatment import (
     block_duration,
     block_length,
     motion_bandwidth,
 )
+from pprs_dynamics.system.plain_text import counted
 
 # Readers of files take a while to import, and a live node reads none.
 if TYPE_CHECKING:
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
 # Where fewer blocks than this share of the measured samples' have an effort in every sample,
 # efforts come less often than positions, and blocks are single samples.
 SPARSE_EFFORTS = 0.5
+LEAST_MEANS = 100  # of poses that are held: statistics need as many
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,8 @@ def smooth_drives(recording: Recording, window: float | None = None,
     MotionError
         Where no segment is long enough.
     """
+    if are_held_poses(recording.position, recording.segments):
+        return _held_poses(recording)
     segments = [part for part in recording.segments
                 if part.stop - part.start > 2 * SHORTEST_WINDOW]
     if not segments:
@@ -139,6 +144,27 @@ def smooth_drives(recording: Recording, window: float | None = None,
         tuple(notes))
 
 
+def _held_poses(recording: Recording) -> DriveMotion:
+    """Return poses that are held, a block each, as motion without velocity and acceleration."""
+    parts = recording.segments
+    index = np.concatenate([np.arange(part.start, part.stop) for part in parts])
+    position = np.concatenate([np.broadcast_to(
+        recording.position[part].mean(axis=0), recording.position[part].shape) for part in parts])
+    lengths, still = np.array([part.stop - part.start for part in parts]), np.zeros_like(position)
+    firsts = np.cumsum(lengths) - lengths
+    means = -(-LEAST_MEANS // len(parts))  # of each pose
+    starts = np.unique([firsts + k * lengths // means for k in range(means)])
+    noise = np.std(recording.position[index] - position, axis=0)
+    step = float(np.median(np.diff(recording.time[index])))
+    return DriveMotion(
+        position, still, still, index, (slice(0, len(index)),),
+        starts, int(np.diff(starts).max()),
+        Smoothing(0.0, noise, 0 * noise, 0 * noise, ''),
+        (SamplingGrid(step, np.arange(len(index), dtype=float), 0.0, 0),),
+        np.zeros((2, position.shape[1]), dtype=bool),
+        (f'{len(parts)} poses are held: each counts by {counted(means, "mean")} of its effort',))
+
+
 def smoothed_again(motion: DriveMotion, recording: Recording,
                    made: Callable[[Array], Array]) -> DriveMotion:
     """Return a motion with the window that suits what is made of its positions.
@@ -153,6 +179,8 @@ def smoothed_again(motion: DriveMotion, recording: Recording,
     recording, made
         See `smoothed_as`.
     """
+    if not motion.smoothing.duration:  # poses that are held
+        return replace(motion, position=made(motion.position))
     smoothing = choose_smoothing(representative([
         Stretch(made(grid.at_steps(recording.position[part])), grid.step)
         for grid, part in zip(motion.grids, _segments_of(motion, recording), strict=True)]))
@@ -178,6 +206,9 @@ def smoothed_as(motion: DriveMotion, recording: Recording, made: Callable[[Array
         Other than the motion's, which stays at the ends of segments that a longer window does not
         reach.
     """
+    if not motion.smoothing.duration:  # poses that are held
+        values = made(recording.position[motion.index])
+        return values, np.zeros_like(values), np.zeros_like(values)
     parts = []
     for span, grid, part in zip(motion.segments, motion.grids, _segments_of(motion, recording),
                                 strict=True):

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pprs_dynamics.arrays import Array
@@ -15,8 +17,18 @@ NORMAL_MEDIAN = 0.6745  # of standard deviations: median size of what is normall
 RESOLVED = 4.0  # steps, or deviations of the noise, of a measured position, that are no motion
 
 
-def find_rests(position: Array, step: float, speed: float) -> np.typing.NDArray[np.bool_]:
-    """Return where each drive stands, (N, D).
+SLOW_SHARE = 0.2  # of a drive's own fast speed: a slower one is a rest
+
+
+def are_held_poses(position: Array, segments: Sequence[slice]) -> bool:
+    """Return whether no drive moves within any segment of positions, (N, D), but for noise."""
+    noise = 2 * RESOLVED * resolution(position)
+    return bool(segments) and all(
+        bool(np.all(np.ptp(position[part], axis=0) <= noise)) for part in segments)
+
+
+def rest_speeds(position: Array, step: float, speed: float) -> Array:
+    """Return the speed below which each drive stands, (D,): less for a drive that is always slow.
 
     Parameters
     ----------
@@ -25,6 +37,28 @@ def find_rests(position: Array, step: float, speed: float) -> np.typing.NDArray[
     step : float
         Between samples [s].
     speed : float
+        Of a drive that also moves faster [rad/s, m/s].
+    """
+    window = max(1, round(SHORTEST_REST / step))
+    if len(position) <= window:
+        return np.full(position.shape[1], speed)
+    moved = np.abs(position[window:] - position[:-window])
+    fast = np.quantile(moved, 0.95, axis=0)
+    is_motion = fast > 2 * RESOLVED * resolution(position)
+    found: Array = np.where(is_motion, np.minimum(speed, SLOW_SHARE * fast / SHORTEST_REST), speed)
+    return found
+
+
+def find_rests(position: Array, step: float, speed: float | Array) -> np.typing.NDArray[np.bool_]:
+    """Return where each drive stands, (N, D).
+
+    Parameters
+    ----------
+    position : (N, D) array
+        Of one segment [rad, m].
+    step : float
+        Between samples [s].
+    speed : float or (D,) array
         A drive stands that moves less than this, in the mean over `SHORTEST_REST` [rad/s, m/s].
     """
     # Here and not above: only arms need it, and it takes long to import.

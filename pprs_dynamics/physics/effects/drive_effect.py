@@ -16,7 +16,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, SINGLE_AXIS, CatalogueEffect, names
-from pprs_dynamics.physics.mechanism.drive_states import DriveStates
+from pprs_dynamics.physics.mechanism.state import MechanismState
 
 ALONE = 'drive'  # name of one whose name does not matter
 
@@ -41,7 +41,7 @@ class DriveSamples:
     channels: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, state: DriveStates, drive: int, memory: Any = None) -> DriveSamples:
+    def of(cls, state: MechanismState, drive: int, memory: Any = None) -> DriveSamples:
         """Return the samples of one drive of a state."""
         return cls(state.time, state.position[:, drive], state.velocity[:, drive],
                    state.acceleration[:, drive], state.direction[:, drive],
@@ -228,7 +228,7 @@ class DriveEffect(CatalogueEffect):
                     p.of(drive in turning).check(f'effects.{cls.name}.{drive}.{p.name}',
                                                  block[p.name])
 
-    def force(self, state: DriveStates, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the effect's drive forces [N], (N, D)."""
         force = np.zeros_like(state.velocity)
         for name, values in self.drives.items():
@@ -361,7 +361,7 @@ class MeasurementEffect(DriveEffect):
         """Return the measured effort where the drives apply `effort`, (N, D) [N]."""
         return effort
 
-    def seen(self, effort: Array, state: DriveStates, memory: Any = None) -> Array:
+    def seen(self, effort: Array, state: MechanismState, memory: Any = None) -> Array:
         """Return the measured effort at a state; by default what `sensed` says, whatever it is."""
         return self.sensed(effort, state.time, state.drives, memory)
 
@@ -384,7 +384,7 @@ class GainEffect(MeasurementEffect):
             factor += coefficients[c.name] * share
         return factor
 
-    def seen(self, effort: Array, state: DriveStates, memory: Any = None) -> Array:
+    def seen(self, effort: Array, state: MechanismState, memory: Any = None) -> Array:
         """Return the efforts times their factors."""
         scaled = effort.copy()
         for name in self.drives:

@@ -15,7 +15,7 @@ from functools import cache
 from typing import Any
 
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.three_pprs.robot import ELBOWS
+from pprs_dynamics.physics.three_pprs.geometry import ELBOWS
 
 EQUATIONS = ('corrected', 'printed')
 ANY = -1

@@ -29,6 +29,7 @@ import yaml
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.catalogue import find_effect
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
     DRIVES_KEY,
     FILES,
@@ -37,7 +38,6 @@ from pprs_dynamics.physics.model.keys import (
     keys_of,
 )
 from pprs_dynamics.physics.model.ledger import BLOCK
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import (
     LEDGER,
     other_nodes,
@@ -127,7 +127,7 @@ def format_model(values: Mapping[str, Any], path: str = '') -> str:
     ModelError
         For values that are no model.
     """
-    build_model(values, path)
+    DriveModel.from_parameters(values, path)
     keys = keys_of(values)
     ordered = {key: values[key] for key in keys if key in values}
     ordered.update((key, value) for key, value in values.items() if key not in ordered
@@ -155,7 +155,7 @@ def edit_model(text: str, values: Mapping[str, Any], path: str = '') -> str:
     ModelError
         For values that are no model.
     """
-    build_model(values, path)
+    DriveModel.from_parameters(values, path)
     old = parse_parameters(text)
     keys = keys_of(values)
     wanted = {key: value for key, value in values.items()

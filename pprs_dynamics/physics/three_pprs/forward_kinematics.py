@@ -41,9 +41,9 @@ from pprs_dynamics.physics.three_pprs.closure import (
     rows_of_chains,
     solve_closure,
 )
+from pprs_dynamics.physics.three_pprs.geometry import Geometry
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import chain_arm, solve_inverse_kinematics
 from pprs_dynamics.physics.three_pprs.kernel_parameters import GeometryParameters
-from pprs_dynamics.physics.three_pprs.robot import Geometry
 
 RESIDUAL_TOLERANCE = 1e-13  # of the lengths involved; a few rounding errors of the closure
 MAXIMUM_STEPS = 30

@@ -34,6 +34,7 @@ from pprs_dynamics.physics.three_pprs.closure import (
     read_inverse,
 )
 from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
+from pprs_dynamics.physics.three_pprs.geometry import Geometry
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
     ThreeChains,
     chain_table,
@@ -41,7 +42,6 @@ from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
 )
 from pprs_dynamics.physics.three_pprs.jacobians import inverse_table
 from pprs_dynamics.physics.three_pprs.kernel_parameters import GeometryParameters
-from pprs_dynamics.physics.three_pprs.robot import Geometry
 
 # Marks that seed the samples between them are at most this much travel of any drive apart [m]:
 # Newton-Raphson then converges in one or two steps, far from any other solution.

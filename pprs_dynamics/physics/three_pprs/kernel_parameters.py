@@ -68,8 +68,13 @@ class RobotParameters(NamedTuple):
 
 
 class Joints(NamedTuple):
-    """Friction of C_i and of A_i: c [N m s/rad], M [N m] at any load, mu [1] and d [m]."""
+    """Friction of C_i and of A_i: c [N m s/rad], M [N m] at any load, mu [1] and d [m].
 
+    It turns over within `width` [rad/s]; `printed` is 1 for Eq. (12) to the letter, else 0.
+    """
+
+    width: Any
+    printed: Any
     c_r: Value = 0.0
     M_r: Value = 0.0
     mu_r: Value = 0.0
@@ -80,15 +85,16 @@ class Joints(NamedTuple):
     d_s: Value = 0.0
 
     @classmethod
-    def of(cls, blocks: Mapping[str, Mapping[str, float]]) -> Joints:
+    def of(cls, blocks: Mapping[str, Mapping[str, float]], width: float) -> Joints:
         """Return the friction of blocks `revolute` and `spherical`; 0 for what is left out.
 
         Parameters
         ----------
         blocks : mapping of str to mapping
             `viscous`, `torque`, `coulomb` and `radius`.
+        width : float
         """
-        return cls(*(
+        return cls(width, 0.0, *(
             factor * block.get(key, 0.0)
             for block in (blocks.get(REVOLUTE, {}), blocks.get(SPHERICAL, {}))
             for key, factor in (('viscous', 1.0), ('torque', 1.0), ('coulomb', 1.0),

@@ -151,7 +151,7 @@ def resistance_table(joints: Joints, reactions: Array, turnover: Array) -> Array
 
 
 def transferred(geometry: KernelParameters[GeometryParameters], chains: Array, inverse: Array,
-                k: Array, printed: bool) -> Array:
+                k: Array, printed: float) -> Array:
     """Return the drive forces that overcome k_r and k_s, (N, 6) [N m s/rad], (N, 6) [N]."""
     force = np.empty(k.shape)
     evaluate(transfer_kernel, geometry.extended(TransferParameters, printed), chains, inverse, k,

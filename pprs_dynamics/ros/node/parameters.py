@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,6 @@ from rclpy.parameter import Parameter
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
     ADDED,
     ANY,
@@ -26,8 +25,6 @@ from pprs_dynamics.physics.model.keys import (
     FILES,
     KEYS,
     LARGEST,
-    NAMES,
-    NODE_KEYS,
     Key,
     as_list,
     is_axis,
@@ -36,7 +33,7 @@ from pprs_dynamics.physics.model.keys import (
 )
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.model.parameter_values import is_known
-from pprs_dynamics.ros.node.provenance import folder_of, names_given
+from pprs_dynamics.ros.node.provenance import folder_of
 from pprs_dynamics.ros.node.rclpy_internals import parameter_overrides
 from pprs_dynamics.system.package_files import located
 
@@ -145,10 +142,10 @@ def has_model(given: Mapping[str, Any]) -> bool:
         name.startswith('geometry.') for name in given)
 
 
-def declare_model(node: Node) -> list[str]:
+def declare_model(node: Node, arguments: Sequence[str]) -> list[str]:
     """Declare every key of a node's model, which is the paper's 3-PPRS where nothing is given.
 
-    A relative path of a mechanism's URDF becomes an absolute one.
+    A relative path of a mechanism's URDF becomes an absolute one, by the node's command line.
 
     Returns
     -------
@@ -162,10 +159,12 @@ def declare_model(node: Node) -> list[str]:
     """
     given = overrides(node)
     if is_axis(given):
-        DriveModel.from_parameters(given)  # refuses it
+        key = next(name for name in given if is_axis((name,)))
+        raise ModelError(key, given[key], 'not be given: this needs a 3-PPRS, and a single axis is '
+                         'for pprs compare, diagnose, adopt, fit and history')
     for key in FILES:
         if isinstance(given.get(key), str) and given[key]:
-            given[key] = str(located(given[key], folder_of(key)))
+            given[key] = str(located(given[key], folder_of(key, arguments)))
     # Of somebody's own robot what is missing must not become the paper's in silence.
     defaults = {} if has_model(given) else default_parameters()
     _declare_keys(node, keys_of(given), given, defaults)
@@ -259,8 +258,7 @@ def refuse_unknown(node: Node) -> None:
 
 def overrides(node: Node) -> dict[str, Any]:
     """Return what was given in files and on the command line, None for an empty list."""
-    given = parameter_overrides(node, lambda: {*NAMES, *NODE_KEYS, *names_given()})
-    return {name: plain_value(value) for name, value in given.items()}
+    return {name: plain_value(value) for name, value in parameter_overrides(node).items()}
 
 
 def current_values(node: Node, changes: Iterable[Parameter] = ()) -> dict[str, Any]:

@@ -19,14 +19,12 @@ from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.simulation.engine_model import load_engine
+from pprs_dynamics.simulation.engine import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState
 from pprs_dynamics.simulation.export.exported_robot import ExportedRobot
 from pprs_dynamics.simulation.export.expressed import AT_ONCE, MJCF, Expressed
 from pprs_dynamics.simulation.export.writers import closures
-from pprs_dynamics.simulation.mechanism_run import draw_motion
+from pprs_dynamics.simulation.injection import draw_motion
 
 # The motion where no recording is given: rests, reverses every drive, and takes seconds.
 DURATION, RATE = 8.0, 100.0  # [s, Hz]
@@ -79,9 +77,9 @@ class Replay:
 
     def add(self, forces: Any) -> Array:
         """Replay the motion of forces of the model, and return the efforts by the file, (N, D)."""
-        motion = (forces.mechanism.motion if isinstance(self.expressed.model, DriveModel)
-                  else JointMotion(*forces.drive_motion))
-        model: Any = self.expressed.model  # of the kind that the motion is of
+        model = self.expressed.model
+        motion = (JointMotion(*forces.drive_motion) if model.moves_joints
+                  else forces.mechanism.motion)
         expected = model.drive_forces(motion).total
         efforts = self.efforts(*(np.ascontiguousarray(each) for each in forces.drive_motion))
         self.samples += len(efforts)
@@ -126,7 +124,7 @@ class Replayed:
                        for name, unit, error, expected, effort in by_drive}}
 
 
-def replay_excitation(model: ForceModel, replay: Replay) -> Replayed:
+def replay_excitation(model: DriveModel, replay: Replay) -> Replayed:
     """Replay a short motion of the model itself."""
     state = model.initial_state()
     forces = model.measured(model.drive_forces(_excitation(model), state), state)
@@ -137,12 +135,11 @@ def replay_excitation(model: ForceModel, replay: Replay) -> Replayed:
                     effort)
 
 
-def _excitation(model: ForceModel) -> Any:
+def _excitation(model: DriveModel) -> Any:
     time = np.arange(0.0, DURATION, 1 / RATE)
-    if isinstance(model, DriveModel):
-        return Excitation(duration=DURATION).motion(time)
-    assert isinstance(model, MechanismModel)
-    return draw_motion(model, DURATION, 0)
+    if model.moves_joints:
+        return draw_motion(model, DURATION, 0)
+    return Excitation(duration=DURATION).motion(time)
 
 
 def _close(mujoco: Any, spec: Any, robot: ExportedRobot) -> None:

@@ -24,7 +24,7 @@ from pprs_dynamics.app.workbench.server.offered import ENDINGS, Offered
 from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.app.workbench.session_file import SavedSession
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MOST_UPLOADS, LONGEST_NAME = 20, 80
 NOT_PLAIN = re.compile('[^A-Za-z0-9._-]+')  # in names of files from elsewhere
@@ -45,7 +45,7 @@ class LiveSource(Protocol):
     def machine(self) -> str:
         """Return what would be set, in words, for a person to confirm; '' where no node runs."""
 
-    def set_model(self, model: ForceModel, confirmed: str) -> dict[str, Any]:
+    def set_model(self, model: DriveModel, confirmed: str) -> dict[str, Any]:
         """Set a model on the running nodes, all or none; return what each said."""
 
     def restore(self, confirmed: str) -> dict[str, Any]:

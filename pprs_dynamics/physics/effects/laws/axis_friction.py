@@ -13,7 +13,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import Effect
-from pprs_dynamics.physics.mechanism.drive_states import DriveStates
+from pprs_dynamics.physics.mechanism.state import MechanismState
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class AxisFriction(Effect):
     viscous: float | tuple[float, ...]
     coulomb: float | tuple[float, ...]
 
-    def force(self, state: DriveStates, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the drives' forces, (N, D) [N, N m]."""
         viscous, coulomb = self._rows
         return viscous * state.velocity + coulomb * state.direction
@@ -59,7 +59,7 @@ class AxisOffset(Effect):
     name: ClassVar[str] = 'offset'
     value: float | tuple[float, ...]
 
-    def force(self, state: DriveStates, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the drives' forces, (N, D) [N, N m]."""
         force: Array = 0.0 * state.velocity + self._row
         return force

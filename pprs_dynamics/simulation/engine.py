@@ -10,18 +10,17 @@ MuJoCo reads the description itself. Its masses, inertias, gravity and couplings
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Container, Iterator, Mapping
+from collections.abc import Container, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import ModelError
+from pprs_dynamics.errors import MissingLibraryError, ModelError
 from pprs_dynamics.physics.mechanism.description import (
     PARAMETERS,
     Frame,
-    body_at,
     inertial_in,
     principal_inertia,
 )
@@ -30,16 +29,18 @@ from pprs_dynamics.physics.mechanism.mjcf import readable_spec
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
 from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.robot_block import described_gravity
 from pprs_dynamics.simulation.engine_loops import ClosedMotion, EngineLoops, cross
-from pprs_dynamics.simulation.engine_model import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState
+from pprs_dynamics.simulation.platform import PlatformMechanism
 
 CARRIER = '_added_to_'  # body of what is added to a joint
 LEAST = 1e-12  # [kg, kg m^2], of bodies that another's inertia contains
 COMPILER = {'fusestatic': 'false', 'balanceinertia': 'false', 'boundmass': str(LEAST),
             'boundinertia': str(LEAST)}
+# What injected bodies change in MuJoCo's model.
+CHANGED = ('body_mass', 'body_inertia', 'body_ipos', 'body_iquat', 'body_sameframe')
 SLOWEST = 1e-9  # of the width in which friction turns over, below which tanh(x) / x is 1
 AGREEMENT = 1e-6  # of the largest effort
 WIDEST, SPAN = 1.0, 0.3  # [rad, m] of a drive, and the share of it in which both are compared
@@ -52,24 +53,29 @@ class MechanismEngine:
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
 
     Raises
     ------
     ModelError
         If MuJoCo computes other efforts from the description than the model.
+    MissingLibraryError
+        Where mujoco is not installed.
     """
 
-    def __init__(self, model: MechanismModel) -> None:
-        self.engine = mujoco = load_engine('a simulated robot')
-        robot = self.robot = self.described = model.robot
+    def __init__(self, model: DriveModel) -> None:
+        self.engine = mujoco = load_engine()
+        self.model_file = model
+        robot = self.robot = model.robot
         structure = self.structure = robot.structure
         path = Path(structure.description.path)
         is_mjcf = bool(model.values.get('robot.mjcf'))
-        reads_urdf = model.is_described and not is_mjcf
+        reads_urdf = 'robot.urdf' in model.values and not is_mjcf
         refused = {name: parameters for name, parameters in structure.description.links.items()
                    if reads_urdf and structure.links[name][0] and not _is_body(parameters)}
-        if not model.is_described:
+        if isinstance(model, PlatformMechanism):
+            spec = mujoco.MjSpec.from_string(model.mjcf)
+        elif not model.is_described:
             spec = _single_axis(mujoco, structure)
         elif is_mjcf:
             spec = readable_spec(mujoco, str(path))
@@ -116,9 +122,20 @@ class MechanismEngine:
         self.gravity = (self.root.R @ own if robot.gravity == described_gravity(structure)
                         else np.array(robot.gravity))
         self.model.opt.disableflags = mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-        self.wrench = np.zeros(6)  # that the tool applies at its origin, in the base's axes
+        # That the tool applies at its origin, in the base's axes; of each sample, (N, 6), or all.
+        self.wrench = np.zeros(6)
         mujoco.mj_setConst(self.model, self.data)
         self._require_agreement(model)
+        self._described = self.gravity, self._added.copy(), {
+            name: getattr(self.model, name).copy() for name in CHANGED}
+
+    def reset(self) -> None:
+        """Restore bodies, gravity and wrench of the description."""
+        gravity, added, of_model = self._described
+        self.gravity, self._added, self.wrench = gravity, added.copy(), np.zeros(6)
+        for name, values in of_model.items():
+            getattr(self.model, name)[:] = values
+        self.engine.mj_setConst(self.model, self.data)
 
     def _add_carrier(self, body: Any, row: int) -> None:
         """Add a body to one of the description's, in the joint's frame, for what is added to it."""
@@ -143,7 +160,7 @@ class MechanismEngine:
         self.model.body_iquat[body] = self._quaternion(axes)
         self.engine.mj_setConst(self.model, self.data)
 
-    def _require_agreement(self, model: MechanismModel) -> None:
+    def _require_agreement(self, model: DriveModel) -> None:
         """Raise ModelError where MuJoCo's efforts without friction are others than the model's."""
         structure, random = self.structure, np.random.default_rng(0)
         middle, way = structure.room(WIDEST)
@@ -161,37 +178,20 @@ class MechanismEngine:
             f'{motion.position[k].round(4).tolist()} it is {ours[k, drive]:.6g} in the model and '
             f'{theirs[k, drive]:.6g} in MuJoCo: please report this file')
 
-    def add_payload(self, mass: float, offset: Array) -> None:
-        """Hang a point mass on the tool, `offset` from its origin in its axes [m]."""
-        x, y, z = offset
-        point = mass * np.array([1, x, y, z, y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z,
-                                 x * x + y * y])
+    def carry(self, link: str, parameters: Array) -> None:
+        """Add inertial parameters (10,) to a link, in the link's frame."""
+        row, frame = self.structure.links[link]
+        self._carry(row, inertial_in(frame, parameters))
+
+    def shift_tool(self, offset: Array) -> None:
+        """Move the centre of mass of what carries the tool by an offset in the tool's axes [m]."""
         row, frame = self.structure.links[self.structure.tool]
-        self._carry(row, inertial_in(frame, point))
-        self.robot = self.robot.with_body(self.structure.tool, point)
-
-    def add_to_link(self, body: int, mass: float) -> None:
-        """Put a point mass at the centre of a body [kg]."""
-        row = int(self.robot.bodies[body])
-        parameters = self.robot.inertial[body]
-        link = self.robot.body_names[body]
-        centre = parameters[1:4] / parameters[0]
-        self._carry(row, body_at(mass, tuple(centre), np.zeros((3, 3))))
-        at = self.structure.links[link][1].inverse.of_point(centre)
-        self.robot = self.robot.with_body(link, body_at(mass, tuple(at), np.zeros((3, 3))))
-
-    def inverse(self, position: Array, velocity: Array, acceleration: Array,
-                ) -> tuple[Array, Array, Array]:
-        """Return efforts of all joints of the tree, (nv,), its inertia, and rates (nv, D).
-
-        For a motion of the drives, (D,) each, that goes on from where the engine is.
-        """
-        self.model.opt.gravity[:] = self.root.R.T @ self.gravity
-        rates = self.loops.put(position, velocity, acceleration)
-        self.engine.mj_inverse(self.model, self.data)
-        inertia = np.empty((self.model.nv, self.model.nv))
-        self.engine.mj_fullM(self.model, self.data, inertia)
-        return self.data.qfrc_inverse, inertia, rates
+        move = frame.R @ offset
+        for body, axes in ((self.links[row], self._frames[row].R.T),
+                           (self.model.body(f'{CARRIER}{row}').id, np.eye(3))):
+            self.model.body_ipos[body] += axes @ move
+            self.model.body_sameframe[body] = 0  # MuJoCo's shortcut for a centre at the origin
+        self.engine.mj_setConst(self.model, self.data)
 
     def home(self) -> None:
         """Put the engine where the description is assembled."""
@@ -207,93 +207,99 @@ class MechanismEngine:
             self._last = motion, self.loops.follow(motion)
         return self._last[1]
 
-    def _needed(self, motion: JointMotion) -> Iterator[tuple[int, Array, Array]]:
-        """Yield samples, efforts of all joints of the tree (nv,), and rates (nv, D) of a motion.
+    def use(self, motion: JointMotion, closed: ClosedMotion) -> None:
+        """Take a motion with closed loops from another engine of the same kinematics."""
+        self._last = motion, closed
 
-        The engine is there.
-        """
-        self.model.opt.gravity[:] = self.root.R.T @ self.gravity
-        closed, data = self.closed(motion), self.data
-        for k in range(len(motion)):
-            data.qpos[:], data.qvel[:], data.qacc[:] = (
-                closed.position[k], closed.velocity[k], closed.acceleration[k])
-            self.engine.mj_inverse(self.model, data)
-            yield k, data.qfrc_inverse + self._of_wrench(), closed.rates[k]
+    def inertia(self) -> Array:
+        """Return the inertia of the tree where the engine is, (nv, nv)."""
+        found = np.empty((self.model.nv, self.model.nv))
+        self.engine.mj_fullM(self.model, self.data, found)
+        return found
 
-    def torques(self, motion: JointMotion, passive: Mapping[str, Array] | None = None) -> Array:
-        """Return inverse dynamics along a motion, (N, D).
+    def carried(self, closed: ClosedMotion, passive: Array | None = None) -> Carried:
+        """Return inverse dynamics along a motion.
 
         Parameters
         ----------
-        motion : JointMotion
-        passive : mapping of str to (N,) array, optional
-            Efforts against friction of passive joints, by joint.
+        closed : ClosedMotion
+        passive : (N, nv) array, optional
+            Efforts of the tree's joints besides, as against friction of passive joints.
         """
-        found = np.empty_like(motion.position)
-        for k, needed, rates in self._needed(motion):
-            for name, effort in (passive or {}).items():
-                needed[self.state.dof(name)] += effort[k]
-            found[k] = rates.T @ needed
-        return found
-
-    def joint_friction(self, motion: JointMotion, joints: JointFriction) -> Array:
-        """Return efforts against friction of passive joints along a motion, (N, D).
-
-        Friction is c w + (T + mu r F) tanh(w / width), F what the joint transmits without it:
-        across the axis of a hinge, and all of it in a closure.
-        """
-        found = np.empty_like(motion.position)
-        for k, needed, rates in self._needed(motion):
-            found[k] = rates.T @ self.rubbing(joints, needed, rates.T @ needed)
-        return found
-
-    def rubbing(self, joints: JointFriction, needed: Array, efforts: Array) -> Array:
-        """Return efforts of the tree's joints against friction where the engine is, (nv,)."""
-        rows, coefficients = self.friction_of(joints, needed, efforts)
-        rates = rows @ self.data.qvel
-        found: Array = np.einsum('k,ki,kin->n', coefficients(rates), rates, rows)
-        return found
-
-    def friction_of(self, joints: JointFriction, needed: Array, efforts: Array,
-                    ) -> tuple[Array, Callable[[Array], Array]]:
-        """Return relative velocities of rubbing joints by the engine's, (K, 3, nv), and a law.
-
-        The law gives friction over rate, (K,), of rates (K, 3): a hinge's stand in the first.
-        """
-        loads, data = self.transmitted(needed, efforts), self.data
-        turns = self.loops.relative(self.loops.frames()[1][1])[1]
-        hinges, closures = np.flatnonzero(joints.joint >= 0), np.flatnonzero(joints.loop >= 0)
-        names = [self._names[int(row)] for row in joints.joint[hinges]]
-        rows = np.zeros((len(joints.joint), 3, self.model.nv))
-        rows[hinges, 0, [self.state.dof(name) for name in names]] = 1.0
-        rows[closures] = turns[joints.loop[closures]]
-        force = np.empty((len(joints.joint), 3))
-        bodies = [self.links[int(row)] for row in joints.joint[hinges]]
-        force[hinges] = cross(data.cfrc_int[bodies, 3:],
-                              data.xaxis[[self.state.number(name) for name in names]])
-        force[closures] = loads[joints.loop[closures], :3]
-        dry = joints.torque + joints.lever * np.sqrt(np.sum(force * force, axis=1))
-
-        def coefficients(rates: Array) -> Array:
-            x = np.maximum(np.linalg.norm(rates, axis=1) / joints.width, SLOWEST)
-            found: Array = joints.viscous + dry * np.tanh(x) / (x * joints.width)
-            return found
-
-        return rows, coefficients
-
-    def transmitted(self, needed: Array, efforts: Array) -> Array:
-        """Return what closures transmit where the engine is, (L, 6), and have it find the rest."""
-        data = self.data
-        forces = self.loops.transmitted(needed, efforts)
-        self.loops.apply(forces)
-        if self.wrench.any():
-            body, at = self._tool()
-            force, moment = (self.root.R.T @ part for part in (self.wrench[:3], self.wrench[3:]))
-            data.xfrc_applied[body, :3] -= force
-            data.xfrc_applied[body, 3:] -= moment + np.cross(at - data.xipos[body], force)
-        self.engine.mj_rnePostConstraint(self.model, data)
+        model, data, engine = self.model, self.data, self.engine
+        model.opt.gravity[:] = self.root.R.T @ self.gravity
+        count = len(closed.position)
+        needed = np.empty((count, model.nv))
+        forces, axes = np.empty((count, model.nbody, 3)), np.empty((count, model.njnt, 3))
+        wrench = np.broadcast_to(self.wrench, (count, 6)) if np.any(self.wrench) else None
+        for k in range(count):
+            data.qpos[:], data.qvel[:], data.qacc[:] = (
+                closed.position[k], closed.velocity[k], closed.acceleration[k])
+            engine.mj_inverse(model, data)
+            needed[k] = data.qfrc_inverse
+            if wrench is not None:
+                needed[k] += self._pushed(wrench[k])
+            engine.mj_rnePostConstraint(model, data)
+            forces[k], axes[k] = data.cfrc_int[:, 3:], data.xaxis
         data.xfrc_applied[:] = 0.0
-        return forces
+        if passive is not None:
+            needed += passive
+        reactions = np.einsum('nlij,nj->nli', closed.reactions, needed)
+        forces -= np.einsum('bl,nli->nbi', self.loops.behind, reactions)
+        return Carried(needed, np.einsum('nvd,nv->nd', closed.rates, needed), forces, axes,
+                       reactions)
+
+    def torques(self, motion: JointMotion, passive: Array | None = None) -> Array:
+        """Return inverse dynamics along a motion, (N, D); see `carried`."""
+        return self.carried(self.closed(motion), passive).efforts
+
+    def tool_velocity(self, closed: ClosedMotion) -> Array:
+        """Return the velocity of the tool's origin in the base, (N, 3) [m/s]."""
+        found, jacobian = np.empty((len(closed.position), 3)), np.empty((3, self.model.nv))
+        for k in range(len(found)):
+            self.data.qpos[:] = closed.position[k]
+            self.engine.mj_kinematics(self.model, self.data)
+            self.engine.mj_comPos(self.model, self.data)
+            body, at = self._tool()
+            self.engine.mj_jac(self.model, self.data, jacobian, None, at, body)
+            found[k] = self.root.R @ jacobian @ closed.velocity[k]
+        return found
+
+    def friction(self, joints: JointFriction, closed: ClosedMotion, carried: Carried) -> Rubbing:
+        """Return the friction of joints along a motion.
+
+        Friction is c w + (T + mu r F) tanh(w / width), F the force in the joint without friction:
+        across the axis of a hinge or a slide, and all of it in a closure.
+        """
+        rows = np.zeros((len(closed.rates), len(joints.joint), 3, self.model.nv))
+        force = np.empty((*rows.shape[:2], 3))
+        driven, closures = np.flatnonzero(joints.joint >= 0), np.flatnonzero(joints.loop >= 0)
+        names = [self._names[int(row)] for row in joints.joint[driven]]
+        rows[:, driven, 0, [self.state.dof(name) for name in names]] = 1.0
+        rows[:, closures] = closed.turns[:, joints.loop[closures]]
+        force[:, driven] = self.across(names, carried)
+        force[:, closures] = carried.reactions[:, joints.loop[closures]]
+        return Rubbing(joints, rows, joints.torque + joints.lever * np.linalg.norm(force, axis=2))
+
+    def across(self, names: Sequence[str], carried: Carried) -> Array:
+        """Return the forces across the axes of joints, (N, K, 3)."""
+        bodies = [self.links[self.structure.rows[name]] for name in names]
+        return cross(carried.forces[:, bodies],
+                     carried.axes[:, [self.state.number(name) for name in names]])
+
+    def joint_friction(self, motion: JointMotion, joints: JointFriction, rounds: int = 1) -> Array:
+        """Return efforts against friction of joints along a motion, (N, D); see `friction`.
+
+        With more than one round the loads are those with friction of passive joints.
+        """
+        closed = self.closed(motion)
+        effort: Array | None = None
+        for _ in range(rounds):
+            rubbing = self.friction(joints, closed, self.carried(closed, effort))
+            effort = rubbing.efforts(closed.velocity)
+            if rounds > 1:
+                effort[:, self.state.drives] = 0.0  # a guide's friction loads no other joint
+        return rubbing.of_drives(closed)
 
     def _tool(self) -> tuple[int, Array]:
         """Return the body that has the tool, and the tool's origin in the engine's world."""
@@ -302,12 +308,96 @@ class MechanismEngine:
         there = Frame(self.data.xmat[body].reshape(3, 3), self.data.xpos[body])
         return body, there.of_point(own.of_point(frame.p))
 
-    def _of_wrench(self) -> Array:
-        """Return the efforts of all joints with which the tool applies the wrench, (nv,)."""
-        (body, at), efforts = self._tool(), np.zeros(self.model.nv)
-        self.engine.mj_applyFT(self.model, self.data, self.root.R.T @ self.wrench[:3],
-                               self.root.R.T @ self.wrench[3:], at, body, efforts)
+    def _pushed(self, wrench: Array) -> Array:
+        """Let the tool apply a wrench (6,) in the base, and return the joints' efforts, (nv,)."""
+        (body, at), efforts, data = self._tool(), np.zeros(self.model.nv), self.data
+        force, moment = (self.root.R.T @ part for part in (wrench[:3], wrench[3:]))
+        self.engine.mj_applyFT(self.model, data, force, moment, at, body, efforts)
+        data.xfrc_applied[:] = 0.0
+        data.xfrc_applied[body] = -np.concatenate(
+            (force, moment + np.cross(at - data.xipos[body], force)))
         return efforts
+
+
+class Carried(NamedTuple):
+    """Inverse dynamics along a motion, without friction.
+
+    Parameters
+    ----------
+    needed : (N, nv) array
+        Efforts of all joints of the tree, loops cut open.
+    efforts : (N, D) array
+        Of the drives.
+    forces : (N, bodies, 3) array
+        On each body from the one that it hangs on, in the engine's world [N].
+    axes : (N, joints, 3) array
+        Of the joints, in the engine's world.
+    reactions : (N, L, 3) array
+        Force of each closure on its second link [N].
+    """
+
+    needed: Array
+    efforts: Array
+    forces: Array
+    axes: Array
+    reactions: Array
+
+
+class Rubbing(NamedTuple):
+    """Friction of K joints along a motion.
+
+    Parameters
+    ----------
+    joints : JointFriction
+    rows : (N, K, 3, nv) array
+        Relative velocities per velocity of the tree's joints; a hinge's are in the first row.
+    dry : (N, K) array
+        Dry friction [N m, N].
+    """
+
+    joints: JointFriction
+    rows: Array
+    dry: Array
+
+    def coefficients(self, rates: Array) -> Array:
+        """Return friction over rate, (N, K), of relative velocities (N, K, 3)."""
+        width = self.joints.width
+        x = np.maximum(np.sqrt(np.einsum('nki,nki->nk', rates, rates)) / width, SLOWEST)
+        found: Array = self.joints.viscous + self.dry * np.tanh(x) / (x * width)
+        return found
+
+    def efforts(self, velocity: Array) -> Array:
+        """Return the efforts of the tree's joints against it, (N, nv)."""
+        rates = np.einsum('nkiv,nv->nki', self.rows, velocity)
+        return np.einsum('nk,nki,nkiv->nv', self.coefficients(rates), rates, self.rows,
+                         optimize=True)
+
+    def of_drives(self, closed: ClosedMotion) -> Array:
+        """Return the efforts of the drives against it, (N, D)."""
+        return np.einsum('nvd,nv->nd', closed.rates, self.efforts(closed.velocity))
+
+
+def load_engine(purpose: str = 'the simulated robot') -> Any:
+    """Return the module mujoco.
+
+    Parameters
+    ----------
+    purpose : str
+        Feature that needs it, for the message.
+
+    Raises
+    ------
+    MissingLibraryError
+        If it is not installed.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        raise MissingLibraryError('mujoco', purpose, 'sim') from None
+    if mujoco.get_mju_user_warning() is None:
+        # By default it writes MUJOCO_LOG.TXT into the user's folder; warnings are counted anyway.
+        mujoco.set_mju_user_warning(lambda message: None)
+    return mujoco
 
 
 def _single_axis(mujoco: Any, structure: Structure) -> Any:
