@@ -233,7 +233,7 @@ class TestTrajectoryProxy:
             publisher = bench.probe.create_publisher(JointTrajectory, '/arm/joint_trajectory', 1)
             result = answered(bench, client, resting_goal(action, 2.0)).result
             assert result.error_code == action.Result.PATH_TOLERANCE_VIOLATED
-            assert result.error_string.startswith('CONTROLLER: the controller says that the goal')
+            assert result.error_string.startswith('CONTROLLER: the controller reports the goal')
             assert '/probe, /trajectory_proxy' in result.error_string
             bench.probe.destroy_publisher(publisher)
 

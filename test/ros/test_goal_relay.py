@@ -122,7 +122,7 @@ def test_feedback_result_and_refusal_pass_through(relayed: Relayed) -> None:
     assert relayed.answer(relayed.goal(5), 5) == (SUCCEEDED, [5])
     assert relayed.counted_to(5)
     assert relayed.answer(relayed.goal(-1), 5) == (ABORTED, [])
-    assert relayed.node.said == ['the controller rejected the goal; its log says why']
+    assert relayed.node.said == ['the controller rejected the goal; its log has the reason']
 
 
 def test_a_goal_is_cancelled_at_the_controller(relayed: Relayed) -> None:

@@ -18,7 +18,7 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
-NOWHERE = 'No place stands out: the error lies nowhere in particular.'
+NOWHERE = 'The error is not concentrated in any region.'
 FIRST = 3  # statements on the first screen
 # Lines that places take without --details, and characters of a line of 80 columns, which words
 # seldom fill.
@@ -152,10 +152,10 @@ def comparison_page(
                     residuals, drive)), f'{name}: effort, model and their difference.',
                     over_time=True)
     _by_drive(page, residuals, comparison)
-    page.folded_list('How it was computed', notes)
+    page.folded_list('Method', notes)
     findings = [f'{recording.name}: {finding.text}' for recording in recordings
                 for finding in recording.findings]
-    page.folded_list('What is wrong with the recordings', findings)
+    page.folded_list('Faults of the recordings', findings)
     return page
 
 
@@ -163,7 +163,7 @@ def _by_drive(page: Page, residuals: Residuals, comparison: Comparison) -> None:
     """Add figures of one drive at a time, the worst first."""
     names = list(comparison.drives)
     worst = max(names, key=lambda name: comparison.drives[name].unexplained)
-    with page.fold('Against what it may depend on'):
+    with page.fold('Error over other variables'):
         page.text('Mean error over bins, with two standard deviations under noise that is '
                   'correlated in time.', 'note')
         page.menu('Drive', names, worst)
