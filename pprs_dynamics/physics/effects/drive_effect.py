@@ -23,11 +23,22 @@ ALONE = 'drive'  # name of one whose name does not matter
 
 @dataclass(frozen=True)
 class DriveSamples:
-    """Samples of one drive: all (N,); `time` is None where unknown, `direction` is sgn.
+    """Samples of one drive, (N,) each.
 
-    `friction_load` is what its guide or gear carries, without a sign; `transmitted` what its gear
-    or screw passes on to the mechanism, without friction, with the sign of the effort [N, N m];
-    `channels` has further measurements of the drive, such as `temperature` [degC].
+    Parameters
+    ----------
+    time : (N,) array or None
+        None where unknown [s].
+    position, velocity, acceleration : (N,) arrays
+    direction : (N,) array
+        sgn of the velocity.
+    friction_load : (N,) array
+        Load of its guide or gear, without a sign [N, N m].
+    transmitted : (N,) array
+        Load on the mechanism through gear or screw, without friction [N, N m].
+    memory : object, optional
+    channels : mapping of str to (N,) array
+        Further measurements, such as `temperature` [degC].
     """
 
     time: Array | None

@@ -212,8 +212,10 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         Sets of coefficients that are tried, the others being zero; by default all at once.
     scanned : tuple of str
         Coefficients with which shapes are searched; by default all.
+    is_positive : bool
+        True where linear parameters below 0 are unphysical; of friction they always are.
     unphysical_below : mapping of str to float
-        Parameters that make the force unphysical below that value (negative friction).
+        Lowest values of parameters that make a physical force; by default as `is_positive` says.
     may_be_measurement : bool
         True where a model file may declare it a sensor's, in `effects.measured`.
     is_friction : bool
@@ -251,6 +253,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     coefficients: ClassVar[tuple[Parameter, ...]]
     variants: ClassVar[tuple[tuple[str, ...], ...]]
     scanned: ClassVar[tuple[str, ...]]
+    is_positive: ClassVar[bool] = False
     unphysical_below: ClassVar[Mapping[str, float]] = {}
     may_be_measurement: ClassVar[bool] = False
     is_friction: ClassVar[bool] = False
@@ -271,6 +274,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
                 cls.variants = (tuple(c.name for c in cls.coefficients),)
             if 'scanned' not in vars(cls):
                 cls.scanned = tuple(c.name for c in cls.coefficients)
+            if 'unphysical_below' not in vars(cls) and (cls.is_friction or cls.is_positive):
+                cls.unphysical_below = {p.name: 0.0 for p in cls.linear}
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and vars(self) == vars(other)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 import numpy as np
 
@@ -30,9 +29,9 @@ class CurrentGain(GainEffect):
     Efforts are currents times one constant; what the motor gives per current is another one.
     """
 
-    name: ClassVar[str] = 'current_gain'
-    idealised: ClassVar[bool] = False
-    nonlinear: ClassVar[bool] = True
+    name = 'current_gain'
+    idealised = False
+    nonlinear = True
     linear = (Parameter('temperature', 'kappa', '1/K', 'by which effort is measured too large per '
                         'kelvin', -0.1, 0.1, 0.0, scale=0.001, expected=(0.002, 0.002)),
               Parameter('ripple', 'a', '1', 'height of the wave over the effort', 0.0, 0.9, 0.0,

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 import numpy as np
 
@@ -29,12 +28,12 @@ TURN = 2 * math.pi
 class EccentricEncoder(MeasurementEffect):
     """Positions that are wrong by a wave once a turn of the encoder."""
 
-    name: ClassVar[str] = 'eccentric_encoder'
+    name = 'eccentric_encoder'
     # Of a joint that turns, or of a drive whose motor is known to turn so often.
     acts_in = frozenset({ARM})
-    idealised: ClassVar[bool] = False
-    nonlinear: ClassVar[bool] = True
-    is_of_position: ClassVar[bool] = True
+    idealised = False
+    nonlinear = True
+    is_of_position = True
     linear = (
         Parameter('amplitude', 'A', 'm', 'of the wave', 0.0, 0.1, scale=1e-4, turning=(0.0, 0.5)),
         Parameter('phase', 'phi', 'rad', 'phase at position 0', -TURN, TURN, is_angle=True))

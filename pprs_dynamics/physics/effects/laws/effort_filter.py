@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Effort that a low-pass filter has rounded off: (T/2 d/dt + 1)^2 y = F.
+"""Effort behind a low-pass filter: (T/2 d/dt + 1)^2 y = F.
 
-Two equal lags in series, since filters of amplifiers and recorders are of first order (an RC), of
-second (Butterworth, Bessel) or means over some samples: of a change at 20 Hz that each of them
-makes, this form leaves an eighth, where a single lag leaves a quarter of a Butterworth's and a
-third of a pure delay's. T is the filter's mean delay, whatever its order. What another order does
-is left open in every fit: to the second order in T d/dt a Butterworth is as far from two lags as
-these are from one.
+The form is two equal lags in series. Filters of amplifiers and recorders are of first order (an
+RC), of second order (Butterworth, Bessel) or means over some samples. At 20 Hz the residual of this
+form is an eighth of the change that each of them makes. The residual of a single lag is a quarter
+for a Butterworth filter and a third for a pure delay. T is the filter's mean delay, whatever its
+order. Every fit allows for another order: to the second order in T d/dt a Butterworth filter is as
+far from two lags as these are from one.
 
 References
 ----------
@@ -18,7 +18,7 @@ G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems, 3r
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -35,10 +35,10 @@ SHORTEST, LONGEST, TRIALS = 0.002, 0.2, 14
 class EffortFilter(MeasurementEffect):
     """The amplifier's or the recorder's effort signal is smoothed before it is recorded."""
 
-    name: ClassVar[str] = 'effort_filter'
-    nonlinear: ClassVar[bool] = True
-    shows_at_reversals: ClassVar[bool] = True
-    assumed_at_start: ClassVar[str] = 'the filter has settled at the first sample'
+    name = 'effort_filter'
+    nonlinear = True
+    shows_at_reversals = True
+    assumed_at_start = 'the filter has settled at the first sample'
     linear = ()
     shape = (Parameter('time_constant', 'T', 's', 'mean delay of the filter', 1e-4, 1.0,
                        scale=0.01),)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 import numpy as np
 
@@ -30,7 +29,7 @@ TURN = 2 * math.pi
 class ForceRipple(DriveEffect):
     """Force that repeats with each turn or pole: screw, gear or motor cogging."""
 
-    name: ClassVar[str] = 'force_ripple'
+    name = 'force_ripple'
     linear = (
         Parameter('force', 'A', 'N', 'amplitude', 0.0, 1e6, scale=0.3),
         Parameter('phase', 'phi', 'rad', 'phase at position 0', -TURN, TURN,
@@ -47,7 +46,7 @@ class ForceRipple(DriveEffect):
             ('second_sine', 'A_2 cos phi_2', 'amplitude of the second sine'),
             ('second_cosine', 'A_2 sin phi_2', 'amplitude of the second cosine')))
     scanned = ('sine', 'cosine')
-    is_wave: ClassVar[bool] = True
+    is_wave = True
     variants = (('sine', 'cosine'), ('sine', 'cosine', 'second_sine', 'second_cosine'))
     card = Card(
         'A sin(2 pi q / p + phi) + A_2 sin(4 pi q / p + phi_2)',

@@ -4,10 +4,10 @@
 """Lost motion between encoder and link: the encoder is not where the link is.
 
 The encoder reads q + e. With backlash, e is half of it towards the side to which the load pushes
-the gear, b / 2 sgn(tau): the link falls from one flank to the other while the motor, and with it
-the encoder, goes on as before. With play, the link stays behind at reversals: the encoder first
-travels all of the play without it, and what the link does meanwhile no encoder says; it is taken
-to go on smoothly from its motion before to that after. What winds up is `elastic_joint`.
+the gear, b / 2 sgn(tau). The link falls from one flank to the other, while motor and encoder go on
+as before. With play, the link stays behind at reversals: the encoder first travels all of the play
+without it. No encoder measures the link meanwhile: its motion is taken as smooth between those
+before and after. `elastic_joint` is the effect of a gear that winds up.
 
 References
 ----------
@@ -39,9 +39,9 @@ USUAL = (5e-4, math.radians(1.0))
 class LostMotion(MeasurementEffect):
     """Backlash or play of what is between an encoder and the link that it is to measure."""
 
-    name: ClassVar[str] = 'lost_motion'
+    name = 'lost_motion'
     acts_in = frozenset({PLATFORM, ARM})
-    nonlinear: ClassVar[bool] = True
+    nonlinear = True
     not_linear_in: ClassVar[tuple[str, ...]] = ('play',)
     linear = (
         Parameter('backlash', 'b', 'm', 'distance between the flanks, of which the load chooses '
@@ -49,7 +49,7 @@ class LostMotion(MeasurementEffect):
         Parameter('play', 'b_r', 'm', 'travel of the encoder without the link at each reversal',
                   -0.1, 0.1, 0.0, 5e-4, expected=USUAL, turning=(-0.5, 0.5)))
     variants = (('backlash',), ('play',))
-    unphysical_below: ClassVar[Mapping[str, float]] = {'backlash': 0.0, 'play': 0.0}
+    is_positive = True
     card = Card(
         'measured position = q + e, e = b sgn(tau) / 2, or b_r sgn(q_dot) / 2 once the encoder '
         'has come back by b_r',

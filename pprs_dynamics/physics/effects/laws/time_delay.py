@@ -12,7 +12,7 @@ on delays of sampling and filtering.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -30,11 +30,11 @@ SHORT = (STEP / 8, STEP / 4, STEP / 2)
 class TimeDelay(MeasurementEffect):
     """The recorder's effort is not of the recorder's positions' time."""
 
-    name: ClassVar[str] = 'time_delay'
-    assumed_at_start: ClassVar[str] = 'the effort changed before the first sample as after it'
-    nonlinear: ClassVar[bool] = True
-    idealised: ClassVar[bool] = False
-    shows_at_reversals: ClassVar[bool] = True
+    name = 'time_delay'
+    assumed_at_start = 'the effort changed before the first sample as after it'
+    nonlinear = True
+    idealised = False
+    shows_at_reversals = True
     linear = ()
     shape = (Parameter('delay', 'd', 's', 'by which effort is late; negative: early', -1.0, 1.0,
                        scale=0.001),)

@@ -22,10 +22,10 @@ from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 class ToolDrag(BodyEffect):
     """Force c v against the velocity of the tool's origin, moment c_r omega against its turning."""
 
-    name: ClassVar[str] = 'tool_drag'
+    name = 'tool_drag'
     acts_in = frozenset({PLATFORM, ARM})
-    is_friction: ClassVar[bool] = True
-    needs_several_drives: ClassVar[bool] = True  # of a single one it is viscous friction
+    is_friction = True
+    needs_several_drives = True  # of a single one it is viscous friction
     linear = (
         Parameter('coefficient', 'c', 'N s/m', 'force per velocity of the tool', -1e6, 1e6,
                   scale=1.0),
