@@ -179,7 +179,7 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
     where = localise(residuals, progress=stage(progress, 'where it fails'))
     comparison = compare_residuals(
         residuals, where,
-        noise_floors(columns, where.patterns, period=residuals.period) if columns else {},
+        noise_floors(columns, residuals.period) if columns else {},
         little_explained(inputs.model, residuals))
     return ComparisonResult(
         inputs, residuals, comparison, tuple(notes),

@@ -20,8 +20,8 @@ from pprs_dynamics.app.api.inputs import (
     stage,
 )
 from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.inference.experiments.arm_motions import ArmExcitation, ArmLimits, excite_arm
-from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
+from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation, excite_arm
+from pprs_dynamics.inference.experiments.motion_limits import ArmLimits, MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import Experiment, check_purpose
 from pprs_dynamics.inference.experiments.next_experiment import next_experiment as design
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion

@@ -12,7 +12,7 @@ from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, titled_table
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_unit
-from pprs_dynamics.inference.experiments.arm_motions import ArmExcitation
+from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation
 from pprs_dynamics.inference.experiments.next_experiment import Experiment
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion

@@ -18,7 +18,7 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.candidates import Candidate, CandidateSet, EffectCandidate
-from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 # Independent shapes over which a form error is spread; a candidate is one of them. Measured on 62
@@ -57,6 +57,8 @@ class FormErrors:
                 regression.residuals.parts[name][:, d]) ** 2) for d in regression.drives}
             for name in self._shares}
 
+    @outside_cost('a row is inadmissible if one of its effects is smaller than the form error of '
+                  'the others')
     def reason(self, fitted: CandidateSet) -> str:
         """Return which candidate may be the form error of others; '' for none."""
         forces = self.forces(fitted)
