@@ -75,7 +75,7 @@ def test_no_more_is_taken_away_than_there_is(name: str, names: tuple[str, ...], 
 
 def test_what_can_only_be_nothing_does_not_void_what_is_there() -> None:
     """One direction may have less than nothing by chance; the other is told all the same."""
-    bare = DriveModel.from_parameters({**MODEL.values, 'axis.coulomb': 0.0})
+    bare = DriveModel.from_parameters({**MODEL.values, 'friction.coulomb': [0.0]})
     moved = motion()
     forward = (1 + np.sign(moved.velocity)) / 2
     effort = bare.drive_forces(moved).total + COULOMB * forward + 0.1 * COULOMB * (1 - forward)
@@ -151,7 +151,7 @@ def test_a_gain_that_a_drive_may_have_is_one() -> None:
 def test_less_inertia_than_none_is_no_effect() -> None:
     """Efforts that decelerate where they should accelerate, with the friction that there is."""
     moved = motion()
-    light = DriveModel.from_parameters({**MODEL.values, 'axis.mass': 1e-6})
+    light = DriveModel.from_parameters({**MODEL.values, 'links.mass': [1e-6]})
     effort = light.drive_forces(moved).total - 0.3 * MASS * moved.acceleration
     found = diagnose(MODEL, [recorded(effort)], as_it_is=True)
     assert found.verdict != 'effect'

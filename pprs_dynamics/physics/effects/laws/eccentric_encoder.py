@@ -21,7 +21,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveRange, MeasurementEffect
-from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.mechanism.places import MECHANISM
 
 TURN = 2 * math.pi
 
@@ -31,7 +32,7 @@ class EccentricEncoder(MeasurementEffect):
 
     name: ClassVar[str] = 'eccentric_encoder'
     # Of a joint that turns, or of a drive whose motor is known to turn so often.
-    acts_in = frozenset({ARM})
+    acts_in = frozenset({MECHANISM})
     idealised: ClassVar[bool] = False
     nonlinear: ClassVar[bool] = True
     is_of_position: ClassVar[bool] = True
