@@ -38,8 +38,7 @@ if TYPE_CHECKING:
         UnreadableFileError,
         WorkspaceError,
     )
-    from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
-    from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
+    from pprs_dynamics.inference.experiments.motion_limits import ArmLimits, MotionLimits
     from pprs_dynamics.measurement.files.recording import (
         Recording,
         read_recording,
@@ -85,8 +84,7 @@ _HOMES = {
         'ConvergenceError', 'EffectError', 'LimitError', 'MissingLibraryError', 'ModelError',
         'MotionError', 'PprsError', 'SingularityError', 'UnknownNameError', 'UnreadableFileError',
         'WorkspaceError'),
-    'inference.experiments.arm_motions': ('ArmLimits',),
-    'inference.experiments.motion_limits': ('MotionLimits',),
+    'inference.experiments.motion_limits': ('ArmLimits', 'MotionLimits'),
     'measurement.files.recording': ('Recording', 'read_recording', 'write_recording'),
     'physics.effects.drive_effect': (
         'DriveEffect', 'DriveRange', 'DriveSamples', 'GainEffect', 'MeasurementEffect'),

@@ -40,10 +40,10 @@ from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.experiments.fourier_path import FourierPath
+from pprs_dynamics.inference.experiments.motion_design import PlatformMotions, random_motions
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
-from pprs_dynamics.inference.experiments.next_experiment import experiment_of
+from pprs_dynamics.inference.experiments.next_experiment import design_experiment
 from pprs_dynamics.inference.experiments.question import Question, question_of
-from pprs_dynamics.inference.experiments.trajectory_search import TrajectorySearch
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 from pprs_dynamics.simulation.injection import CLIMATE, Choice, Injection, PlainRobot
@@ -155,12 +155,10 @@ def score(name: str, seed: int) -> dict[str, Any] | None:
         return None
     robot, old, question = start.robot, start.recording, start.question
     limits = MotionLimits(effort_reserve=4 * question.noise_floor)
-    search = TrajectorySearch(question, limits, NEW, seed)
     cpu, wall = time.process_time(), time.perf_counter()
-    found = search.run()
+    experiment = design_experiment(question, limits, NEW, seed)
     cost = {'design_cpu': time.process_time() - cpu, 'design_wall': time.perf_counter() - wall}
-    random = TrajectorySearch(question, limits, NEW, seed + 1000).screen(draws=1)[0].path
-    experiment = experiment_of(question, found)
+    (random,) = random_motions(PlatformMotions(robot.model, limits, NEW), seed + 1000, 1)
     result: dict[str, Any] = {
         'effect': name, 'seed': seed, 'scale': robot.scale, 'motion': start.how,
         'rivals': rivals_of(name, question),
@@ -170,7 +168,7 @@ def score(name: str, seed: int) -> dict[str, Any] | None:
         'expected_evidence': experiment.expected_evidence,
         'largest_use': max(experiment.limits.values()), **cost}
     grid = times(NEW)
-    result['designed'] = judged(robot, [old, robot.record(found.path.motion(grid), 1)])
+    result['designed'] = judged(robot, [old, robot.record(experiment.motion(grid), 1)])
     result['random'] = judged(robot, [old, robot.record(random.motion(grid), 2)])
     result['repeat'] = judged(robot, [old, *(robot.record(start.motion, run) for run in (3, 4))])
     return result

@@ -80,13 +80,13 @@ def _check_arguments(name: str, arguments: list[str]) -> None:
     parser = argparse.ArgumentParser(
         name, f'{name} [--ros-args [--params-file FILE] [-p NAME:=VALUE] [-r FROM:=TO] ...]',
         add_help=False, allow_abbrev=False,
-        description='A ROS 2 node. Files, parameters and remappings stand after --ros-args.',
+        description='A ROS 2 node. Files, parameters and remappings follow --ros-args.',
         epilog=f'docs/nodes.md lists topics and parameters; `ros2 param describe /{name} '
                'PARAMETER` explains one while the node runs.')
     parser.add_argument('-h', '--help', action='help', help='show this and exit')
     _, stray = parser.parse_known_args(_outside_ros_args(arguments))
     if stray:
-        parser.error(f'{stray[0]} stands outside of --ros-args, where it has no effect')
+        parser.error(f'{stray[0]} is outside of --ros-args, where it has no effect')
 
 
 def _outside_ros_args(arguments: list[str]) -> list[str]:

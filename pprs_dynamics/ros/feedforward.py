@@ -396,7 +396,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         return bool(self._status.facts.get('lagging'))
 
     def _refresh(self) -> None:
-        """Bring what is told once a second up to date."""
+        """Update the facts that are published once a second."""
         if self._last_unchecked is not None and self._status.code == 'OK':
             # Nothing came after it: where it leads to is told all the same.
             self._report_condition(self._last_unchecked)

@@ -146,7 +146,7 @@ class DriveTrajectory(NamedTuple):
 
 
 class _Leaving(NamedTuple):
-    """What was in force before a change, while efforts go over to what is now.
+    """Model in force before a change, during the ramp to the present one.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ class _Leaving(NamedTuple):
     since, duration : float
         [s]
     earlier : _Leaving, optional
-        That was still going over at the change.
+        Ramp that was not complete at the change.
     """
 
     model: Any
@@ -168,7 +168,7 @@ class _Leaving(NamedTuple):
     earlier: _Leaving | None
 
     def is_over(self, now: float) -> bool:
-        """Return whether all has gone over to what is in force now."""
+        """Return whether the ramp is complete."""
         return now >= self.since + self.duration
 
     def blended(self, motion: Motion, offsets: Indices, effort: Array, now: float) -> Array:
@@ -221,7 +221,7 @@ class Feedforward:
     def use(self, model: DriveModel, node_values: Mapping[str, Any]) -> None:
         """Go on with another model; effects that both have keep their memory.
 
-        Efforts go over to those of the other one in `ramp_time`.
+        Efforts change to those of the other model in `ramp_time`.
         """
         ramp_time, scale = node_values.get('ramp_time', 0.0), node_values['feedforward_scale']
         if self._last is not None and self._memory is not None and (

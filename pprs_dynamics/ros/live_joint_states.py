@@ -114,7 +114,7 @@ class LiveJointStates(Node):
                 **{each.name: plain_value(each.value) for each in parameters}}, self.model.source))
 
     def _takers(self, full_name: str) -> list[str]:
-        """Return the nodes that listen to what a node tells drives."""
+        """Return the nodes that subscribe to a node's commands."""
         namespace, _, name = full_name.rpartition('/')
         try:
             topics = self.get_publisher_names_and_types_by_node(name, namespace or '/')

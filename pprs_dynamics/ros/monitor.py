@@ -61,8 +61,8 @@ PARAMETERS = (
                    'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0, stays=True),
     node_parameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
                    upper=3600.0, stays=True),
-    node_parameter('diagnose_since', (), 'recordings of days on which the machine was right: '
-                   'windows are diagnosed for what has changed since then', stays=True),
+    node_parameter('diagnose_since', (), 'recordings of days on which the machine was correct: '
+                   'windows are diagnosed for changes since then', stays=True),
     node_parameter('feedforward', 'feedforward', 'node that gets what ~/adopt_confirmed sets, '
                    'absolute or in the namespace of this one', stays=True),
 )
@@ -203,7 +203,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         unit = common_effort(self._settings.model.units)
         text = (f'largest running error {np.nanmax(running):.4g} {unit}'
                 if np.isfinite(running).any() else
-                'no running error: efforts are not measured, or all joints stand')
+                'no running error: efforts are not measured, or no joint moves')
         text += f'; {self._share:.0%} of the samples are compared'
         if self._stream.measures_no_effort:
             self._status.report('WARN', 'WAITING', f'nothing is compared: {text}')

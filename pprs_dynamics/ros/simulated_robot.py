@@ -175,7 +175,7 @@ class SimulatedRobotNode(ExplainsRefusals):
         efforts = np.array(message_in(data, Float64MultiArray).data)
         count = len(self._names.joints)
         if efforts.shape != (count,) or not np.all(np.isfinite(efforts)):
-            raise PprsError(f'data holds {len(efforts)} values, must be {count} finite efforts')
+            raise PprsError(f'data has {len(efforts)} values, must be {count} finite efforts')
         self._queue.clear()
         self._queue.add(self._now(), Setpoint(None, None, efforts))
 

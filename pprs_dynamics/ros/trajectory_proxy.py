@@ -171,7 +171,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
         if left > LEFT_AT_MOST * duration:
             topic = self._hold.topic_name
             raise ControllerError(
-                f'the controller says that the goal is reached {left:.2f} s before its last point: '
+                f'the controller reports the goal as reached {left:.2f} s before its last point: '
                 f'it followed another trajectory, which came on {topic}, where these publish: '
                 f'{publishers_of(self, topic)}', began=True)
 

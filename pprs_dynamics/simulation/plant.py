@@ -98,6 +98,8 @@ class Plant:
         [s]
     position, velocity : (D,) arrays
         Of the drives [m, rad].
+    last_acceleration : (D,) array
+        Of the last step: loads that friction follows are those of it.
     injected : list of dict
         Name, drives, parameters and form of each injected effect.
     largest : (D,) array
@@ -251,7 +253,7 @@ class Plant:
         self.velocity = np.zeros_like(self.position) if velocity is None else np.array(velocity)
         self.engine.home()
         self.engine.loops.put(self.position, self.velocity, self._rest)
-        self._acceleration = np.zeros_like(self.position)
+        self.last_acceleration = np.zeros_like(self.position)
         self._held = self._rest
         self._held = self.holding(self.position) - self._offset
 
@@ -265,7 +267,7 @@ class Plant:
         UnsolvedError
             Where the step has no solution with a physical meaning.
         """
-        h, v, a = self.time_step, self.velocity, self._acceleration
+        h, v, a = self.time_step, self.velocity, self.last_acceleration
         middle = self.position + h / 2 * v + h * h / 8 * a
         acceleration = self.acceleration(middle, v + h / 2 * a, effort, v, h / 2)
         velocity = v + h * acceleration
@@ -275,7 +277,7 @@ class Plant:
         if np.any((position < self.lower - BEYOND * self._span)
                   | (position > self.upper + BEYOND * self._span)):
             raise UnsolvedError(self.time, 'a drive has gone through the stop at its end')
-        self.position, self.velocity, self._acceleration = position, velocity, acceleration
+        self.position, self.velocity, self.last_acceleration = position, velocity, acceleration
         self.time += h
 
     def acceleration(self, position: Array, velocity: Array, effort: Array, start: Array,
@@ -292,9 +294,9 @@ class Plant:
         ahead : float
             [s]
         """
-        M, bias, rows, coefficients = self._equations(position, velocity, self._acceleration)
+        M, bias, rows, coefficients = self._equations(position, velocity, self.last_acceleration)
         push = effort - bias - self._offset + self._stops(position, velocity)
-        a = found = self._acceleration
+        a = found = self.last_acceleration
         for _ in range(ROUNDS):
             mid = start + ahead * a
             C = np.einsum('kid,k,kie->de', rows, coefficients(rows @ mid), rows)
@@ -347,7 +349,7 @@ class Plant:
         for j, name, drawn, nominal in self._pushes:
             one, following = slice(j, j + 1), [(j + 1) % len(position)]
             moment = JointMoment(
-                np.array([self.time]), position[one], velocity[one], self._acceleration[one],
+                np.array([self.time]), position[one], velocity[one], self.last_acceleration[one],
                 self._load[one], nominal.effort, nominal.speed, nominal.gear_ratio,
                 np.interp([self.time], nominal.time, nominal.temperature), self._pressed[one],
                 velocity[following])

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import ast
-import dataclasses
 import json
 import subprocess
 import sys
@@ -92,11 +91,6 @@ def test_a_comparison_needs_neither_terminal_nor_pictures_before_it_is_shown() -
     assert not loaded & {'pandas', 'rich', 'matplotlib', 'plotly', 'rclpy', 'starlette'}
 
 
-def test_an_unknown_name_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match='no attribute'):
-        getattr(pprs_dynamics, 'compaer')  # noqa: B009
-
-
 @pytest.mark.parametrize('file', sorted((ROOT / 'docs/example_effect').glob('*.py')),
                          ids=lambda file: file.stem)
 def test_effects_of_ones_own_import_nothing_deeper(file: Path) -> None:
@@ -158,11 +152,6 @@ def test_a_result_shows_itself(compared: ComparisonResult, folder: Path) -> None
     assert 'slide_2' in page.read_text(encoding='utf-8')
 
 
-def test_results_are_frozen(compared: ComparisonResult) -> None:
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        compared.notes = ()  # type: ignore[misc]
-
-
 def test_recordings_from_memory_and_from_files_are_one(
     compared: ComparisonResult, folder: Path,
 ) -> None:
@@ -196,23 +185,6 @@ def test_what_is_no_model_and_no_recording_is_refused_in_a_sentence(
     for recordings in (None, 3, [None], pd.DataFrame({'time': [0.0]}), np.zeros((3, 2))):
         with pytest.raises(PprsError, match='must be a path or a Recording'):
             call('config/paper.yaml', recordings)
-
-
-def test_a_missing_library_is_named(compared: ComparisonResult,
-                                    monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, 'matplotlib.figure', None)
-    for module in ('box', 'console', 'markup', 'table'):
-        monkeypatch.setitem(sys.modules, f'rich.{module}', None)
-    for show, library in ((compared.plot, 'matplotlib'), (compared.view, 'rich')):
-        with pytest.raises(pprs_dynamics.MissingLibraryError, match=library):
-            show()
-
-
-def test_pages_need_no_terminal() -> None:
-    reports = 'adoption', 'comparison', 'diagnosis', 'experiment', 'fit', 'history'
-    loaded = modules_after('from pprs_dynamics.app.report import ' + ', '.join(
-        f'{name}_report' for name in reports))
-    assert not loaded & {'rich', 'plotly', 'matplotlib'}
 
 
 def test_an_experiment_that_has_nothing_to_read_from_is_refused() -> None:

@@ -76,7 +76,7 @@ MISTAKES = {
     'workbench --no-browser --model no.yaml': 'no.yaml',
     'workbench --no-browser --port 99999': '--port',
     'workbench --no-browser short.csv': 'short.csv',
-    'workbench --no-browser run.csv run.csv': 'twice',
+    'workbench --no-browser run.csv run.csv': 'may be given once',
 }
 
 

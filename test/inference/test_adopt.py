@@ -224,7 +224,7 @@ def test_a_damaged_model_file_is_left_alone(files: Files, tmp_path: Path, damage
     model = tmp_path / 'model.yaml'
     text = files.new.read_text()
     model.write_bytes({
-        'cut': text[:len(text) // 3].encode(), 'binary': b'\x00\xff\xfe' * 50,
+        'cut': text[:text.index('effect: coulomb') + 3].encode(), 'binary': b'\x00\xff\xfe' * 50,
         'value': text.replace('effect: coulomb_friction', 'effect: 5', 1).encode(),
         'ledger': text.replace('forced: false', 'forced: perhaps', 1).encode()}[damage])
     content = model.read_bytes()

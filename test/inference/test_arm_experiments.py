@@ -16,12 +16,9 @@ import pytest
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.experiments.arm_motions import (
-    ArmLimits,
-    ArmMotions,
-    _Information,
-    excite_arm,
-)
+from pprs_dynamics.inference.experiments.arm_excitation import ArmInformation, excite_arm
+from pprs_dynamics.inference.experiments.motion_design import ArmMotions, random_motions
+from pprs_dynamics.inference.experiments.motion_limits import ArmLimits
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 from pprs_dynamics.physics.model.model_writer import write_model
 
@@ -61,11 +58,8 @@ def test_it_is_a_motion_from_rest_to_rest(found) -> None:
 
 
 def test_it_tells_more_than_motions_drawn_at_random(model: DriveModel, found) -> None:
-    motions = ArmMotions(model, ArmLimits(), DURATION)
-    known = _Information(motions)
-    random = np.random.default_rng(99)
-    drawn = [motions.within_limits(random.normal(size=found.series.coefficients.shape))
-             for _ in range(20)]
+    motions = ArmMotions(model, ArmLimits(), DURATION, (8,), 1.0)
+    known, drawn = ArmInformation(motions), random_motions(motions, 99, 20)
     told = [np.sum(np.log1p(known.of(one))) for one in (found.series, *drawn)]
     assert told[0] > max(told[1:])
 

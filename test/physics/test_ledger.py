@@ -232,5 +232,5 @@ def test_a_model_without_steps_has_none_to_take_back(tmp_path: Path) -> None:
     done = pprs('history', str(tmp_path / 'model.yaml'), '--undo', '--output',
                 str(tmp_path / 'new.yaml'))
     assert done.returncode == 1
-    assert 'holds no step' in done.stderr
+    assert 'has no step' in done.stderr
     assert not (tmp_path / 'new.yaml').exists()

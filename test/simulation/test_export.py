@@ -26,7 +26,7 @@ from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.simulation.export.exported_robot import TreePositions, export_robot
 from pprs_dynamics.simulation.export.expressed import MJCF, URDF, express
-from pprs_dynamics.simulation.export.replay import DURATION, Replay, replay_excitation
+from pprs_dynamics.simulation.export.replay import DURATION, replay
 from pprs_dynamics.simulation.export.writers import closures, written
 from pprs_dynamics.simulation.injection import draw_motion
 
@@ -228,7 +228,7 @@ def test_friction_of_passive_joints_that_was_adopted(
     expressed = express(model, MJCF)
     assert expressed.not_expressed == left
     robot = export_robot(expressed, MJCF)
-    found = replay_excitation(model, Replay(expressed, robot, written(robot, MJCF), MJCF))
+    found = replay(model, expressed, robot, written(robot, MJCF), MJCF)
     assert found.error == pytest.approx(found.expected, abs=1e-8)
     # Dry friction turns over at once in the file, within a width in the model.
     assert (found.error.max() < 1e-8) == (not left and parameter == 'viscous')

@@ -7,15 +7,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 import robots_with_loops as robots
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism import structure
-from pprs_dynamics.physics.model import robot_block
-from pprs_dynamics.simulation import engine
 from pprs_dynamics.simulation.engine import MechanismEngine
 
 BODY = ('<inertial><origin xyz="0.2 0.02 0.1"/><mass value="{}"/><inertia ixx="0.03" iyy="0.04" '
@@ -67,38 +63,15 @@ def test_plant_and_model_agree(tmp_path: Path) -> None:
     MechanismEngine(DriveModel.load(path))
 
 
-def locked_at_zero(self: object, joint: object) -> float:
-    return 0.0
-
-
-@pytest.mark.parametrize('fault', ['massless_rotors_are_dropped', 'locked_joints_are_at_zero',
-                                   'a_follower_ignores_its_offset', 'gravity_is_in_the_base'])
-def test_faults_of_the_model_are_seen(tmp_path: Path, fault: str,
-                                      monkeypatch: pytest.MonkeyPatch) -> None:
-    if fault == 'massless_rotors_are_dropped':
-        own = structure.Structure.__dict__['inertial'].func
-
-        def with_mass(self: structure.Structure) -> np.ndarray:
-            inertial: np.ndarray = own(self)
-            return np.where(inertial[:, :1] > 0, inertial, 0.0)
-
-        monkeypatch.setattr(structure.Structure, 'inertial', property(with_mass))
-    elif fault == 'locked_joints_are_at_zero':
-        monkeypatch.setattr(structure._Builder, '_locked_position', locked_at_zero)
-    elif fault == 'a_follower_ignores_its_offset':
-        whole = structure._Builder._locked_position
-
-        def without_offset(self: structure._Builder, joint: structure.Joint) -> float:
-            return 0.0 if joint.mimic is not None else whole(self, joint)
-
-        monkeypatch.setattr(structure._Builder, '_locked_position', without_offset)
-    else:
-        def as_standard(of: structure.Structure) -> tuple[float, ...]:
-            return (0.0, 0.0, -9.81)
-
-        monkeypatch.setattr(robot_block, 'described_gravity', as_standard)
-        monkeypatch.setattr(engine, 'described_gravity', as_standard)
-    robot_block._structure.cache_clear()
+@pytest.mark.parametrize(('read', 'stands'), [
+    ('mass value="2"', 'mass value="2.5"'), ('offset="1.5"', 'offset="0"'),
+    ('rpy="3 0.2 0"', 'rpy="0 0.2 0"')], ids=['mass', 'follower', 'gravity'])
+def test_another_reading_of_the_description_is_refused(
+    tmp_path: Path, read: str, stands: str,
+) -> None:
+    path = described(tmp_path)
+    model, urdf = DriveModel.load(path), tmp_path / 'robot.urdf'
+    assert read in urdf.read_text()
+    urdf.write_text(urdf.read_text().replace(read, stands))
     with pytest.raises(ModelError, match='in MuJoCo'):
-        MechanismEngine(DriveModel.load(described(tmp_path)))
-    robot_block._structure.cache_clear()
+        MechanismEngine(model)

@@ -167,8 +167,7 @@ def test_actuation_delay_makes_efforts_come_late() -> None:
 
 
 def test_stops_end_the_strokes() -> None:
-    plant = Plant(DriveModel.from_parameters({**DriveModel.load('config/delta.yaml').values},
-                              DriveModel.load('config/delta.yaml').source))
+    plant = Plant(DriveModel.load('config/delta.yaml'))
     robot = SimulatedRobot(plant, sensors=QUIET)
     for _ in range(300):
         robot.command(Setpoint(effort=np.full(len(plant.position), 0.2) * plant.largest))

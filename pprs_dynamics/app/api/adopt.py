@@ -118,7 +118,7 @@ class AdoptionRunResult(Result):
     run : AdoptionRun
         What was adopted and refused, one after the other.
     refit : Refit, optional
-        Of the base model beside it.
+        Of the base model with the adopted effects.
     """
 
     inputs: Inputs
@@ -134,7 +134,7 @@ class AdoptionRunResult(Result):
 
     @property
     def refused(self) -> bool:
-        """Whether it ended because what is left was refused."""
+        """Whether it ended because the remaining effects were refused."""
         return self.run.ended == REFUSED
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -213,8 +213,7 @@ def adopt(model: Model, effect: str, recordings: Recordings, validate: Recording
     topic, progress, as_it_is : optional
         As in `compare`.
     reference : path, Recording, or a sequence of them, optional
-        As in `diagnose`: the effect is a change since then, fitted and judged beside what was
-        there already.
+        As in `diagnose`: the effect is a change since then. Errors of the reference are subtracted.
 
     Returns
     -------
@@ -241,15 +240,15 @@ def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *
               refit: Recordings | None = None, diagnosis: DiagnosisResult | None = None,
               topic: str | None = None, progress: Progress | None = None,
               reference: Given | None = None) -> AdoptionRunResult:
-    """Diagnose and adopt until nothing more can be told.
+    """Diagnose and adopt until no effect is missing.
 
     Parameters
     ----------
     model, recordings, validate, diagnosis, topic, progress, reference
         As in `adopt`.
     refit : path, Recording, or a sequence of them, optional
-        To which the base model is then fitted again, as `fit` does, beside what was adopted; it
-        is taken where the error on other data falls. An empty sequence means `recordings`.
+        To which the base model is then fitted again, as `fit` does, with the adopted effects. It is
+        taken if the error on other data falls. An empty sequence means `recordings`.
 
     Returns
     -------

@@ -110,7 +110,7 @@ class ComparisonResult(Result):
                             'unit': one.unit} for one in drives.values()], list(drives), 'drive')
 
     def plot(self) -> Figure:
-        """Return a picture: the error of every drive beside its noise, and the worst over time."""
+        """Return a picture: error and noise of every drive, and the worst drive over time."""
         from pprs_dynamics.app.report.pictures import plot_errors, plot_series
 
         drives = self.comparison.drives
@@ -147,7 +147,7 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
     ----------
     model : DriveModel or path
     recordings : path, Recording, or a sequence of them
-        A path is read, and its units and signs are checked; a Recording is taken as it is.
+        A path is read, and its units and signs are checked; a Recording is not checked.
     topic : str, optional
         Of sensor_msgs/JointState, where a bag holds several.
     beside : path, optional
@@ -179,7 +179,7 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
     where = localise(residuals, progress=stage(progress, 'where it fails'))
     comparison = compare_residuals(
         residuals, where,
-        noise_floors(columns, where.patterns, period=residuals.period) if columns else {},
+        noise_floors(columns, residuals.period) if columns else {},
         little_explained(inputs.model, residuals))
     return ComparisonResult(
         inputs, residuals, comparison, tuple(notes),

@@ -110,7 +110,7 @@ class DiagnosisResult(Result):
 def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,
              topic: str | None = None, progress: Progress | None = None, as_it_is: bool = False,
              reference: Given | None = None) -> DiagnosisResult:
-    """Find the physical effect that a model lacks, as far as recordings can tell.
+    """Find the physical effect that a model lacks, from recordings.
 
     Parameters
     ----------

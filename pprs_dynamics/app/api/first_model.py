@@ -67,7 +67,7 @@ SURE_KINDS = {'position_unit', 'effort_unit', 'effort_sign', 'effort_sign_bit', 
 
 
 class FirstModelError(PprsError, ValueError):
-    """What a first model file would need is not there, or cannot be told."""
+    """A first model file cannot be written from the given files."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def first_model(
     Raises
     ------
     PprsError
-        Where a file cannot be read, or joints and columns cannot be told.
+        Where a file cannot be read, or joints and columns cannot be matched.
     """
     path = Path(robot)
     is_mjcf = _root_tag(path) == 'mujoco'
@@ -159,8 +159,8 @@ def first_model(
     shared = [name for each in coupled(description) for name in each.joints if name in chosen]
     if shared and not drives:
         chosen = tuple(name for name in chosen if name not in shared)
-        notes.append(f'{" and ".join(shared)} share a transmission: they are left out, and '
-                     'taken to stand; to drive them list them, with friction: {motors: …}')
+        notes.append(f'{" and ".join(shared)} share a transmission: they are not driven; '
+                     'to drive them, list them with friction: {motors: …}')
     if contents is not None and contents.joints and not names.joints:
         names = _by_numbers(contents, chosen)
         notes.append('joints are matched by the numbers in their names')
@@ -330,7 +330,7 @@ def _grouped(recordings: Sequence[Path]) -> tuple[list[Path], dict[str, Path]]:
 
 
 def _by_quantity(files: Sequence[Path]) -> dict[str, Path]:
-    """Return files whose names tell a quantity, and time; of two alike the first."""
+    """Return files by the quantity in their names, also time; the first of each."""
     found: dict[str, Path] = {}
     for file in files:
         words = {*words_of(file.name.split('.')[0])}
@@ -507,13 +507,13 @@ def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, ba
     gain = ', '.join(['1.0'] * len(drives))
     lines = [
         f'# Model of {robot.name}'
-        + (f', read beside {", ".join(recordings[:3])}' if recordings else '')
+        + (f', read with {", ".join(recordings[:3])}' if recordings else '')
         + '. Lines with "guessed" or "not known" are to be checked.',
         '/**:',
         '  ros__parameters:',
         '    robot:',
         f'      {"mjcf" if is_mjcf else "urdf"}: {scalar(place)}  # from the folder of this file',
-        f'      base: {scalar(base)}  # the link that stands',
+        f'      base: {scalar(base)}  # the link that does not move',
         f'      tool: {scalar(branch.tool)}  # the link that carries the load',
         f'      drives: [{", ".join(scalar(name) for name in drives)}]  # driven, in the order '
         'of all results',

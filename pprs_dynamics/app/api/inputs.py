@@ -85,7 +85,7 @@ class Inputs:
     def of(cls, model: Model, recordings: Recordings, validate: Recordings = (),
            topic: str | None = None, progress: Progress | None = None,
            whole: bool = False, as_it_is: bool = False) -> Inputs:
-        """Read what is given as a path and check it, and take what is in memory as it is.
+        """Read and check paths; recordings in memory are not checked.
 
         Of recordings that are too long for a fit excerpts are taken, but where the `whole` is
         asked for.
@@ -118,9 +118,6 @@ class Inputs:
         shipped = base is not None and base == find_file(DEFAULT_MODEL)
         given = base or '' if isinstance(model, DriveModel) else model
         name = '' if shipped else str(given)
-        # Before anything is read, which may take minutes.
-        _refuse_same_paths(listed_recordings(recordings), [], ONCE)
-        _refuse_same_paths(listed_recordings(validate), listed_recordings(recordings), OTHER)
         fitted, held_out = (_read_all(found, listed, topic, progress)
                             for listed in (recordings, validate))
         _refuse_repeats(fitted, [], ONCE)
@@ -190,7 +187,7 @@ class Inputs:
                        paths=self.paths - {name}).require_recordings()
 
     def since(self, reference: Given | None, model: DriveModel | None = None) -> Inputs:
-        """Return this with reference runs, () for the model's own; as it is for None.
+        """Return this with reference runs, () for the model's own; unchanged for None.
 
         They are fitted to the model, or to another one that is given.
 
@@ -299,16 +296,6 @@ def _read_all(model: DriveModel, given: Given, topic: str | None, progress: Prog
 def listed_recordings(given: Given) -> Sequence[File | Recording]:
     """Return what is given as one or several, as several."""
     return [given] if isinstance(given, (str, PathLike, Recording)) else given
-
-
-def _refuse_same_paths(given: Sequence[File | Recording], earlier: Sequence[File | Recording],
-                       rule: str) -> None:
-    seen = {str(one) for one in earlier if not isinstance(one, Recording)}
-    for one in given:
-        if not isinstance(one, Recording):
-            if str(one) in seen:
-                raise UnreadableFileError(str(one), f'it is given twice, but {rule}')
-            seen.add(str(one))
 
 
 def _require_kinds(recordings: Given, validate: Given) -> None:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The motion that tells most about what recordings leave open."""
+"""Design of the motion that best separates the remaining candidates."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from pprs_dynamics.app.api.inputs import (
     stage,
 )
 from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.inference.experiments.arm_motions import ArmExcitation, ArmLimits, excite_arm
-from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
+from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation, excite_arm
+from pprs_dynamics.inference.experiments.motion_limits import ArmLimits, MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import Experiment, check_purpose
 from pprs_dynamics.inference.experiments.next_experiment import next_experiment as design
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
@@ -84,7 +84,7 @@ class ExperimentResult(Result):
         return experiment_view(self.design)
 
     def page(self) -> Page:
-        """Return a page: what the motion would tell, its curves and its use of the limits."""
+        """Return a page: expected evidence, curves, and use of the limits."""
         from pprs_dynamics.app.report.experiment_report import excitation_page, experiment_page
 
         if isinstance(self.design, ArmExcitation):
@@ -118,7 +118,7 @@ def next_experiment(
     noise: float = 0.05, rate: float = RATE, topic: str | None = None,
     progress: Progress | None = None,
 ) -> ExperimentResult:
-    """Design the motion that tells most about what recordings leave open.
+    """Design the motion that best separates the remaining candidates.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def next_experiment(
     purpose : {'separate', 'commission'}
         What the recordings leave open; or a first motion of a new robot, without recordings.
     limits : MotionLimits or ArmLimits, optional
-        Beside those of the model file or the URDF.
+        In addition to those of the model file or the URDF.
     duration : float
         [s]
     seed : int

@@ -76,8 +76,8 @@ def add_validation(parser: argparse.ArgumentParser,
 def add_reference(parser: argparse.ArgumentParser) -> None:
     """Declare --reference."""
     parser.add_argument('--reference', metavar='RECORDING', nargs='*',
-                        help='runs from a day on which the machine was right (none given: those '
-                        'that the model file names): what has changed since then?')
+                        help='runs of a day on which the machine was correct (default: those in '
+                        'the model file); report what has changed since then')
 
 
 def add_model_output(parser: argparse.ArgumentParser, what: str, required: bool = True) -> None:

@@ -17,7 +17,7 @@ from pprs_dynamics.app.report.terminal import console, shown, text_table
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.export.exported_robot import export_robot
 from pprs_dynamics.simulation.export.expressed import FORMATS, express
-from pprs_dynamics.simulation.export.replay import Replay, Replayed, replay_excitation
+from pprs_dynamics.simulation.export.replay import Replayed, replay
 from pprs_dynamics.simulation.export.writers import written
 from pprs_dynamics.system.output_files import write_text
 
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     expressed = express(model, options.to)
     robot = export_robot(expressed, options.to)
     text = written(robot, options.to)
-    found = replay_excitation(model, Replay(expressed, robot, text, options.to))
+    found = replay(model, expressed, robot, text, options.to)
     write_text(options.output, text)
     if options.json:
         write_json(options.json, {'format': options.to, 'output': options.output,

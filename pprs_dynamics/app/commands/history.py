@@ -25,7 +25,7 @@ EXAMPLE = 'pprs history better.yaml --report history.html'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('file', metavar='FILE', help='model file')
-    parser.add_argument('--undo', action='store_true', help='take the last step back')
+    parser.add_argument('--undo', action='store_true', help='undo the last step')
     add_model_output(parser, 'model file that --undo writes', required=False)
     add_report(parser, 'draw the falling error as a page')
 
@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> int:
     model = DriveModel.load(base)
     steps, unit = read_steps(model.values), common_effort(model.units)
     if options.undo and not steps:
-        print(f'pprs history: {options.file} holds no step that could be taken back',
+        print(f'pprs history: {options.file} has no step that could be undone',
               file=sys.stderr)
         return 1
     screen.print(history_view(steps, unit))
@@ -54,5 +54,5 @@ def run(options: argparse.Namespace) -> int:
     if options.undo:
         values, step = without_last_step(model.values)
         write_model(options.output, values, base)
-        screen.print(f'{step.effect} taken back: {shown(options.output)}')
+        screen.print(f'{step.effect} removed: {shown(options.output)}')
     return 0

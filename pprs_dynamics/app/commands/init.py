@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'files of one quantity each (q.csv tau.csv), or their folder, are one')
     parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
                         default='robot.yaml', help='model file to write (default robot.yaml)')
-    parser.add_argument('--base', metavar='LINK', default='', help='the link that stands')
+    parser.add_argument('--base', metavar='LINK', default='', help='the link that does not move')
     parser.add_argument('--tool', metavar='LINK', default='', help='the link that carries the load')
     parser.add_argument('--drives', metavar='JOINT,JOINT', default='', help='the driven joints')
     parser.add_argument('--rate', metavar='HZ', type=number(0.0, FASTEST, 'Hz', above=True),
@@ -65,8 +65,8 @@ def run(options: argparse.Namespace) -> int:
     if first.has_efforts:
         screen.print(f'[bold]Next[/] pprs fit {names} --model {model} --output base.yaml')
         screen.print(f'then pprs diagnose {names} --model base.yaml')
-        screen.print('What is wrong with the robot in a run becomes part of the model that is '
-                     'fitted to it: fit a healthy run without load, and diagnose another one.')
+        screen.print('A fault of the robot becomes part of the model that is fitted to it: fit a '
+                     'healthy run without load, and diagnose another one.')
     else:
         screen.print(f'[bold]Next[/] pprs info {names} --model {model}')
     if options.json:

@@ -44,7 +44,7 @@ def fit_named_effects(model: DriveModel, recording: Recording,
     residuals : Residuals
         Of the model as given.
     noise : dict of str to float
-        That the fit leaves, by drive [N].
+        Noise of the fit, by drive [N].
 
     Raises
     ------

@@ -136,8 +136,8 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
                         over_time=True)
     if answer.curve is not None:
         page.figure(curve_with_band(answer), 'The measured curve with two standard deviations, '
-                    'and what the model without it leaves: a table of correction, not a cause. '
-                    'Beyond the measured range it goes on with its last value.')
+                    'and the residual of the model without it. It is a correction table, not a '
+                    'cause. Beyond the measured range it is constant.')
     if command and answer.adopted:
         page.command('See what is still missing', command)
     page.table(*errors_table(answer, 'error on'), caption='What was fitted to, and what decides.')

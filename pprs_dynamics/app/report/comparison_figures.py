@@ -229,7 +229,7 @@ def over_workspace(residuals: Residuals) -> Any | None:
 
 
 def spectrum(residuals: Residuals, comparison: Comparison) -> Any:
-    """Return the spectrum of each drive's error beside that of its noise."""
+    """Return the spectra of error and noise of each drive."""
     traces = []
     for drive, name in enumerate(residuals.drives):
         noise = comparison.localisation.drives[name].noise

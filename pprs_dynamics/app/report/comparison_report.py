@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import accumulate
 from typing import Any
 
 from pprs_dynamics.app.report import comparison_figures as figures
@@ -18,11 +17,8 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
-NOWHERE = 'No place stands out: the error lies nowhere in particular.'
-FIRST = 3  # statements on the first screen
-# Lines that places take without --details, and characters of a line of 80 columns, which words
-# seldom fill.
-MOST_LINES, LINE = 9, 70
+NOWHERE = 'The error is not concentrated in any region.'
+FIRST = 3  # statements on the first screen, and without --details
 EFFORTS = ('rms', 'bias', 'peak', 'noise')
 
 
@@ -53,14 +49,12 @@ def comparison_view(comparison: Comparison, following: tuple[str, str], details:
     beside : Beside, optional
     """
     lines = [f'{number}. {one.text}' for number, one in enumerate(comparison.where, start=1)]
-    taken = accumulate(-(-len(line) // LINE) for line in lines)
-    told = [line for line, total in zip(lines, taken, strict=True)
-            if details or total <= MOST_LINES]
-    parts = [_drives_table(comparison), escape(comparison.verdict), *map(escape, told)]
+    shown = lines if details else lines[:FIRST]
+    parts = [_drives_table(comparison), escape(comparison.verdict), *map(escape, shown)]
     if not lines:
         parts.append(NOWHERE)
-    if len(lines) > len(told):
-        parts.append(f'… and {len(lines) - len(told)} more, with --details, --json or --report')
+    if len(lines) > len(shown):
+        parts.append(f'… and {len(lines) - len(shown)} more, with --details, --json or --report')
     if details:
         parts += [escape(drive.verdict) for drive in comparison.drives.values()]
     if comparison.is_beyond_noise:
@@ -152,10 +146,10 @@ def comparison_page(
                     residuals, drive)), f'{name}: effort, model and their difference.',
                     over_time=True)
     _by_drive(page, residuals, comparison)
-    page.folded_list('How it was computed', notes)
+    page.folded_list('Method', notes)
     findings = [f'{recording.name}: {finding.text}' for recording in recordings
                 for finding in recording.findings]
-    page.folded_list('What is wrong with the recordings', findings)
+    page.folded_list('Faults of the recordings', findings)
     return page
 
 
@@ -163,7 +157,7 @@ def _by_drive(page: Page, residuals: Residuals, comparison: Comparison) -> None:
     """Add figures of one drive at a time, the worst first."""
     names = list(comparison.drives)
     worst = max(names, key=lambda name: comparison.drives[name].unexplained)
-    with page.fold('Against what it may depend on'):
+    with page.fold('Error over other variables'):
         page.text('Mean error over bins, with two standard deviations under noise that is '
                   'correlated in time.', 'note')
         page.menu('Drive', names, worst)

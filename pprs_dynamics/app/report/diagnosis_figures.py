@@ -39,10 +39,10 @@ def before_and_after(before: Residuals, after: Residuals, drive: int, floor: flo
         before, before.measured[:, drive], before.model[:, drive], after.model[:, drive])
     figure = effort_over_error(
         before, drive, time,
-        (('measured', measured, charts.MEASURED), ('model as given', given, charts.ERROR),
-         ('model with what was found', found, AFTER)),
-        (('error as given', measured - given, charts.ERROR),
-         ('error with what was found', measured - found, AFTER)))
+        (('measured', measured, charts.MEASURED), ('input model', given, charts.ERROR),
+         ('model with the reported effects', found, AFTER)),
+        (('error of the input model', measured - given, charts.ERROR),
+         ('error with the reported effects', measured - found, AFTER)))
     for level in (-2 * floor, 2 * floor):
         figure.add_hline(y=level, row=2, col=1, line={'color': FLOOR, 'width': 1, 'dash': 'dot'})
     return figure
@@ -61,7 +61,7 @@ def add_every_drive(page: Page, before: Residuals, after: Residuals,
 
 
 def curve_with_band(answer: Adoption) -> Any:
-    """Return a measured curve over its variable, its band, and the errors that it stands for."""
+    """Return a measured curve over its variable, its band, and the errors without it."""
     assert isinstance(answer.request, CurveRequest)
     assert answer.curve is not None
     after, curve = answer.residuals_after, answer.curve.curve
@@ -122,7 +122,7 @@ def effect_pictures(diagnosis: Diagnosis, found: FittedEffect,
                     ) -> list[tuple[Any, str]]:
     """Return what one effect has to explain and what it makes of it, with captions.
 
-    The first is along what it depends on, where that tells most of it; the last over time.
+    The first is over the variable that the effect depends on; the last is over time.
     """
     part = partial_residual(diagnosis, found)
     residuals = diagnosis.residuals

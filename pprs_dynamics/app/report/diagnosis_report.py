@@ -51,13 +51,12 @@ ELSEWHERE = '[dim]Evidence, confirmation and all values: --details, or --report 
 LEGEND = '[dim]Cost terms: fit = misfit; coefficients = prior; others = model choices[/]'
 SEEN = 'Not seen, and from which size it would have been'
 METHOD = (
-    'Model and measured effort get the same treatment; every effect of the catalogue, in every '
-    'shape tried and on every drive, is a column of one regression beside the model\'s own numbers '
-    'as far as these are free.',
-    'Sets of effects and of patterns of no catalogue are compared by one cost: the penalised '
-    'deviance under noise that is correlated in time, whose spectrum is fitted anew for each set, '
-    'and prior costs for effects, drives, shapes and patterns that were tried. Evidence of an '
-    'effect is by how much more the best set without it costs, whatever stands there instead.')
+    'Model and measured effort are filtered alike. Every effect of the catalogue is a column of '
+    'one regression, in each shape and on each drive, together with the free numbers of the model.',
+    'Sets of effects are compared by one cost: the penalised deviance under noise that is '
+    'correlated in time, plus prior penalties. The spectrum of the noise is fitted for each set. '
+    'The evidence of an effect is the cost of the best set without it minus the cost of the '
+    'reported set.')
 
 
 def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False,
@@ -72,7 +71,7 @@ def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False
     details : bool
         Whether all is shown that there is.
     next_step : bool
-        Whether the command to go on with is told; not where it runs already.
+        Whether the next command is shown.
     """
     return stacked(*(_parts if details else _brief)(diagnosis, words),
                    *(_following(words) if next_step else ()),
@@ -311,7 +310,7 @@ def _errors(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> Non
 
 
 def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
-    """Add the one picture that shows what was found."""
+    """Add the first picture: the unexplained pattern, or the first effect."""
     if diagnosis.depends_on:
         statement = max(diagnosis.depends_on, key=lambda one: one.mean_square)
         picture = figures.unknown_picture(diagnosis, statement)
@@ -382,7 +381,7 @@ def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep])
             page.errors([ErrorRow(f'+ {step.label}' if k else step.label, step.overall)
                          for k, step in enumerate(steps)],
                         f'Error over all drives, rms [{unit}], as one after the other is added; '
-                        f'both ends are what a comparison says, the noise is '
+                        f'the noise is '
                         f'{in_unit(diagnosis.noise_floor, unit)}.')
         page.table(('effect', 'evidence', f'error before [{unit}]', f'after [{unit}]',
                     f'held out before [{unit}]', f'after [{unit}]', 'on'), [

@@ -12,7 +12,7 @@ from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, titled_table
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_unit
-from pprs_dynamics.inference.experiments.arm_motions import ArmExcitation
+from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation
 from pprs_dynamics.inference.experiments.next_experiment import Experiment
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -51,21 +51,21 @@ def experiment_view(experiment: Experiment) -> Any:
     """Return what a motion is for, what it promises, and which limits it uses."""
     parts: list[Any] = [f'[bold]{escape(experiment.text)}[/]']
     if experiment.contests:
-        parts.append(titled_table('What it would tell', contests_table(experiment), right=()))
+        parts.append(titled_table('Expected evidence', contests_table(experiment), right=()))
     if experiment.accuracies:
         headings, rows = accuracies_table(experiment)
         parts.append(titled_table('Standard deviations', (headings, rows[:MOST_SHOWN]), right=()))
         if len(rows) > MOST_SHOWN:
             parts.append(f'… and {len(rows) - MOST_SHOWN} more, in --json')
     used = [row for row in limit_rows(experiment) if float(row[1].rstrip(' %')) >= 100 * HIGH]
-    parts.append('limits, of what their margin leaves: ' + ', '.join(
+    parts.append('use of the limits, less their margin: ' + ', '.join(
         f'{name} {share}' for name, share in used[:6]) + '; all others less')
     return stacked(*parts)
 
 
 def excitation_view(excitation: ArmExcitation) -> Any:
     """Return what an arm's first motion is for, and which limits it uses."""
-    return stacked(escape(excitation.text), 'limits, of what their margin leaves: ' + ', '.join(
+    return stacked(escape(excitation.text), 'use of the limits, less their margin: ' + ', '.join(
         f'{name} {share:.0%}' for name, share in excitation.limits.items()))
 
 
@@ -76,15 +76,15 @@ def experiment_page(experiment: Experiment, motion: Motion) -> Page:
     ----------
     experiment : Experiment
     motion : PlatformMotion or JointMotion
-        As it is written.
+        Sampled as in the file.
     """
     page = Page('The next experiment')
     page.text(experiment.text, 'lead')
     if experiment.contests:
         page.table(*contests_table(experiment),
-                   caption='What it would tell. Evidence is by how much the rival costs more in a '
-                   'diagnosis of all recordings; the chance is that of the rival falling so far '
-                   'behind that it is told as a rival no more.')
+                   caption='Evidence is the cost of the rival minus that of the truth, in a '
+                   'diagnosis of all recordings. The chance is that of the rival no longer '
+                   'being reported.')
     if isinstance(motion, PlatformMotion):
         page.figure(_platform(motion), 'The motion of the platform, from where it starts.',
                     over_time=True)
@@ -93,13 +93,13 @@ def experiment_page(experiment: Experiment, motion: Motion) -> Page:
                     'Position, velocity, acceleration and effort of every drive.', over_time=True)
     with page.fold('Use of the limits'):
         page.table(('limit', 'use'), limit_rows(experiment),
-                   caption='Of what the margin leaves of each limit; checked at 500 Hz.')
+                   caption='Use of each limit, less its margin; checked at 500 Hz.')
     if experiment.accuracies:
         with page.fold('How well numbers would be known'):
             page.table(*accuracies_table(experiment), caption='Standard '
-                       'deviations; effects that may or may not be there each beside the model '
-                       'alone. A number of an effect matters from the size in the fourth column; '
-                       'for a number of the model that is what its tolerance says.')
+                       'deviations. Each uncertain effect is fitted alone with the model. A number '
+                       'matters from the size in the fourth column, which is the tolerance for '
+                       'numbers of the model.')
     return page
 
 

@@ -41,7 +41,7 @@ def fit_view(model: DriveModel, fit: BaseFit, details: bool = False) -> Any:
     errors = text_table(*plain_rows(errors_table(model, fit)), right=(2, 3, 4),
                         title=f'Error, rms; held out: {HELD_OUT[fit.held_out_on]}')
     numbers = [text_table(*plain_rows(numbers_table(fit)), right=(2, 3, 4))] if details else []
-    headline = [escape(f'{word_little(fit.little)}, fitted as it is')] if fit.little else []
+    headline = [escape(f'{word_little(fit.little)}, fitted nevertheless')] if fit.little else []
     return stacked(*headline, errors, *map(escape, fit.told), *numbers)
 
 
@@ -59,7 +59,7 @@ def fit_page(model: DriveModel, fit: BaseFit, recordings: Sequence[str],
     """
     page = Page('Base model')
     if fit.little:
-        page.text(sentence(f'{word_little(fit.little)}, fitted as it is'), 'lead')
+        page.text(sentence(f'{word_little(fit.little)}, fitted nevertheless'), 'lead')
     held_out = f'; {", ".join(validate)} held out' if validate else ''
     page.text(f'Model: {Path(model.source).name or "built in memory"}. Fitted to '
               f'{", ".join(recordings)}{held_out}.', 'note')

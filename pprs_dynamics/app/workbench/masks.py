@@ -62,7 +62,7 @@ def quantity(fits: TickFits, view: ViewState, name: str, drive: int) -> Array:
     Raises
     ------
     ResidualsError
-        For a name that stands for nothing.
+        For an unknown name.
     """
     data = fits.design.residuals
     table = {'measured': fits.measured, 'error before': fits.before,

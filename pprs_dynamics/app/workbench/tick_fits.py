@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Sets of effects around one model: fitted at the noise as it is, and with their own noise.
+"""Sets of effects on one model, fitted at given noise and with their own noise.
 
 At given noise a fit is linear and takes milliseconds, as all products of columns are summed up
 before. Noise, shapes and the exact forces of the fitted model follow after.
@@ -27,7 +27,7 @@ from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
 from pprs_dynamics.inference.search.fitted_model import exact_forces, fitted_model, linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.relinearisation import relinearised
+from pprs_dynamics.inference.search.relinearisation import linearised
 from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
@@ -62,13 +62,13 @@ class Tick:
 
 @dataclass(frozen=True, eq=False)
 class Offer:
-    """An effect that takes no part, where it would pay best beside those that do.
+    """An unticked effect, on the drives where it reduces the cost most.
 
     Parameters
     ----------
     candidate : EffectCandidate
     gain, evidence : float
-        By which the penalised deviance would fall at the noise as it is; and less its prior cost.
+        Fall of the penalised deviance at given noise; and the same less the prior cost.
     residual : (M, D) array
         What would be left [N].
     """
@@ -103,7 +103,7 @@ class TickFits:
     Parameters
     ----------
     model : DriveModel
-        As it is; its numbers count from where its ledger says they began.
+        In force. Its ledger gives the values that estimates count from.
     recordings : sequence of Recording
     reference : Reference, optional
         Whose forces are taken from all errors.
@@ -111,7 +111,7 @@ class TickFits:
     Attributes
     ----------
     before : (M, D) array
-        What the model as it is leaves [N].
+        Residual of the model [N].
     since : SinceReference or None
         What the reference says of the recordings.
 
@@ -156,7 +156,7 @@ class TickFits:
 
     def offered(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
                 found: CandidateSet) -> EffectCandidate | None:
-        """Return an effect on some drives, or where it pays best beside a set.
+        """Return an effect on some drives, or where it reduces the cost of a set most.
 
         In the best shape that a scan knows at the noise of the set; None where it cannot act.
         """
@@ -182,12 +182,12 @@ class TickFits:
             found.fit, components.block(one)), default=None)
 
     def _proposed(self, found: CandidateSet) -> list[EffectCandidate]:
-        """Return every effect where it pays best beside a set."""
+        """Return every effect on the drives where it reduces the cost of a set most."""
         added = (sets[-1] for sets in self.scan.proposals(found, least=-np.inf))
         return [one for one in added if isinstance(one, EffectCandidate)]
 
     def offers(self, found: CandidateSet) -> list[Offer]:
-        """Return what every effect that is not in a set would gain beside it, the best first."""
+        """Return the gain of every effect that is not in a set, the best first."""
         there = {c.effect for c in found.effects}
         # A fit that was ended before it stood still has the deviance of the noise before.
         found = self.at(found.effects, found)
@@ -196,7 +196,7 @@ class TickFits:
                            if one.effect not in there), key=lambda one: -one.evidence)
 
     def offer(self, found: CandidateSet, candidate: EffectCandidate) -> Offer:
-        """Return what one candidate would gain beside a set at its noise."""
+        """Return the gain of one candidate in addition to a set, at its noise."""
         more = self.at((*found.effects, candidate), found)
         return Offer(candidate, found.fit.deviance - more.fit.deviance, found.total - more.total,
                      self.residual(more).astype(np.float32))
@@ -217,7 +217,7 @@ class TickFits:
         return self.fits.at_noise_of(near, tuple(candidates))
 
     def fitted(self, candidates: Sequence[EffectCandidate]) -> CandidateSet:
-        """Return a set with the noise fitted beside it."""
+        """Return a set with its own noise."""
         return self.fits.evaluate(tuple(candidates))
 
     def refined(self, found: CandidateSet) -> CandidateSet:
@@ -248,7 +248,7 @@ class TickFits:
     # What a set says
 
     def residual(self, found: CandidateSet) -> Array:
-        """Return what the linear fit leaves, (M, D) [N]."""
+        """Return the residual of the linear fit, (M, D) [N]."""
         return linear_residual(self.fits, found)
 
     def values(self, found: CandidateSet) -> dict[str, dict[str, float]]:
@@ -272,7 +272,7 @@ class TickFits:
         return name if drive is None else f'{self.drives[drive]}.{name}'
 
     def exact(self, found: CandidateSet, is_free: bool) -> Exact:
-        """Return the fitted model and what it leaves, with nothing linear about it.
+        """Return the fitted model and its residual, evaluated without linearisation.
 
         Where an effect of the set is nonlinear, and nothing is held, the set is fitted around
         its own model first.
@@ -284,7 +284,7 @@ class TickFits:
         """
         fits, parameters = self.fits, None
         if is_free and any(c.effect.nonlinear for c in found.effects):
-            fits, found = relinearised(fits, found)
+            fits, found = linearised(fits, found)
             parameters = {c.name: estimate(fits, found, c, True).parameters for c in found.effects}
         model = fitted_model(fits, found)
         return Exact(model, self.measured - exact_forces(fits.design, model), parameters)

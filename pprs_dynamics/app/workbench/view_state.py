@@ -83,7 +83,7 @@ class ViewState:
     free, found : CandidateSet
         The best fit of the ticked effects; and with what somebody chose, at the same noise.
     residual : (M, D) array
-        What is left [N].
+        With the ticked effects [N].
     estimates : mapping of str to mapping of str to Estimate
         By effect, of the values that are shown; NaN where the deviation is not known yet.
     stage : {'linear', 'fitted', 'refined', 'exact'}
@@ -133,7 +133,7 @@ class ViewState:
 
 
 def without_ticks(fits: TickFits, revision: int) -> ViewState:
-    """Return what is shown of a model as it is."""
+    """Return the view of a model without ticks."""
     return ViewState(revision, {}, fits.none, fits.none, fits.before, {}, FITTED)
 
 

@@ -35,6 +35,7 @@ from pprs_dynamics.inference.diagnosis.quantities import change, listed, plain
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
+from pprs_dynamics.inference.search.decisions import outside_cost
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.inference.search.held_out import PredictiveGain, predictive_gain
 from pprs_dynamics.inference.search.table import Row
@@ -147,6 +148,8 @@ class _Case:
         shown = self.reference.shown_by(recordings)
         return [replace(one, measured=one.measured - shown) for one in found]
 
+    @outside_cost('adopt refuses an effect that does not lower the error, on the recordings and '
+                  'held out')
     def objections(self, gain: PredictiveGain | None, residuals: Sequence[Residuals],
                    where: str) -> list[str]:
         """Return why an effect does not lower the error on some data for certain; none if it does.
@@ -271,6 +274,7 @@ def _of_table(case: _Case, row: Row, effect: FoundEffect) -> list[str]:
     return [f'the recordings do not support {request.name}: {more} than the model without it']
 
 
+@outside_cost('adopt refuses friction that pushes along the motion')
 def _of_friction(places: Sequence[str], model: DriveModel, residuals: Residuals) -> list[str]:
     """Return whether friction of a model would push along the motion; '' is all joints."""
     own, passive = np.zeros((2, *residuals.model.shape))

@@ -16,6 +16,7 @@ from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.answer import Answer
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.search.candidates import EffectCandidate
+from pprs_dynamics.inference.search.decisions import outside_cost
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate, estimate_present
 from pprs_dynamics.inference.search.estimates import calibrations as moved_numbers
 from pprs_dynamics.inference.search.fitted_model import model_at, parts_of
@@ -79,7 +80,7 @@ def requested_row(table: ModelTable, request: EffectRequest, margin: float) -> R
         raise PlacementError(f'{", ".join(standing)} hardly moved in the recordings' if standing
                              else f'{request.name} has no force in these recordings')
     fitted = fits.refined(fits.evaluate((*rest, EffectCandidate.of(chosen))))
-    return Row(*linearised(fits, fitted, alone=True), 0.0)
+    return Row(*linearised(fits, fitted), 0.0)
 
 
 def _candidate(row: Row, request: EffectRequest) -> EffectCandidate | None:
@@ -142,6 +143,7 @@ class RequestedModel:
                 for key, estimate in self.effect.parameters.items() if prefix + key in values}
 
     @cached_property
+    @outside_cost('adopt removes an effect of the model of which the recordings show none')
     def gone(self) -> tuple[str, ...]:
         """Where the input model has the effect and the recordings leave none of it.
 

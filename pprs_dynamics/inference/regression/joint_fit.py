@@ -43,8 +43,8 @@ CERTAIN = 1e14
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
 # The fit has converged when the next round would change the deviance by less than the first, the
 # last one having changed it by less than the second; rounds are bounded.
-CONVERGED, NEARLY, MOST_ROUNDS = 0.01, 0.1, 40
-NOISE_STEPS = 3  # of the noise in a round: fitted to its end, rounds take a quarter longer
+CONVERGED, NEARLY, MOST_ROUNDS = 0.1, 0.5, 40
+NOISE_STEPS = 2  # of the noise in a round
 MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
 MOST_PRODUCTS = 4000  # products of blocks on a drive that are kept: some 10 kB each
 MOST_EQUATIONS = 100  # of drives that are kept: some 0.2 to 1 MB each

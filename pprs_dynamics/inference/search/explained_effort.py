@@ -17,7 +17,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import LEAST_MOVING, TURNED
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions, outside_cost
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 CONSTANT = 1e-9  # of an effort's size, below which a change of it is rounding
@@ -54,6 +54,7 @@ def explained_shares(residuals: Residuals, left: Array | None = None) -> dict[st
     return shares
 
 
+@outside_cost('the model explains less than half of the effort of a drive: `unknown`')
 def little_explained(model: DriveModel, residuals: Residuals, left: Array | None = None,
                      decisions: Decisions = DECISIONS,
                      noise: Mapping[str, float] = MappingProxyType({}),

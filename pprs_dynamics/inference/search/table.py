@@ -28,7 +28,7 @@ from pprs_dynamics.inference.search.candidates import (
 )
 from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.courses import fit_courses
-from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
 from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,
@@ -72,7 +72,7 @@ class Row:
         around, moved = fits, fitted
         try:
             for _ in range(MOST_STEPS):
-                around, moved = linearised(around, moved, alone=True)
+                around, moved = linearised(around, moved)
                 before, moved = moved, of_same_names(around, moved)
                 if moved is before:
                     break
@@ -229,6 +229,7 @@ class ModelTable:
                 rivals.append(Rival(row, tuple(missing), tuple(instead)))
         return rivals
 
+    @outside_cost('a freer form of the same friction is no rival')
     def _is_freer(self, row: Row, missing: Sequence[str], instead: Sequence[str]) -> bool:
         """Return whether friction of a row contains all that is missing, with more coefficients.
 

@@ -329,8 +329,8 @@ class RequestReader(NamedTuple):
 def readers_for(model: DriveModel, names: RobotNames | None = None) -> dict[str, RequestReader]:
     """Return how trajectories for a model arrive, by topic.
 
-    A robot with loops takes the motion of its drives, and beside it that of its tool where the
-    tool's pose determines the drives.
+    A robot with loops takes the motion of its drives, and of its tool if the pose of the tool
+    determines the drives.
     """
     readers = {TRAJECTORY: reader_for(model, names)}
     if model.moves_joints:

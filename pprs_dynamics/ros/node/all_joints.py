@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where all joints and free bodies of a robot are, prepared beside a node that answers."""
+"""Poses of all joints and free bodies of a robot, prepared in a thread of its own."""
 
 from __future__ import annotations
 

@@ -169,7 +169,7 @@ def declare_model(node: Node, arguments: Sequence[str]) -> list[str]:
 def _declare_keys(
     node: Node, keys: Mapping[str, Key], given: Mapping[str, Any], defaults: Mapping[str, Any],
 ) -> None:
-    """Declare a model's keys, and what was given beside them, as of effects."""
+    """Declare a model's keys and further parameters, as of effects."""
     for name, key in keys.items():
         value = given.get(name, defaults.get(name, key.default))
         if value is None and name in given and key.may_be_empty:
@@ -195,7 +195,7 @@ def _declare_key(node: Node, key: Key, value: Any) -> None:
 def _declare(
     node: Node, name: str, kind: Parameter.Type, value: Any, descriptor: ParameterDescriptor,
 ) -> None:
-    """Declare a parameter with a value of a type, which an empty list does not tell."""
+    """Declare a parameter with a value and its type, which an empty list lacks."""
     # An override would bring back a whole number, or a relative path.
     if isinstance(value, list) and not value:
         node.declare_parameter(name, kind, descriptor, ignore_override=True)
@@ -205,7 +205,7 @@ def _declare(
 
 
 def in_declared_type(node: Node, change: Parameter) -> Parameter:
-    """Return a change with decimal numbers where whole ones, or nothing, stand for them."""
+    """Return a change with whole numbers and empty lists in the declared type."""
     kind = (node.get_parameter(change.name).type_ if node.has_parameter(change.name)
             else _added_type(change.name, change.value))
     value = plain_value(change.value)
@@ -266,7 +266,7 @@ def current_values(node: Node, changes: Iterable[Parameter] = ()) -> dict[str, A
 def added_descriptor(name: str) -> ParameterDescriptor:
     """Return how a parameter is declared that is not in the table of keys, as of an effect."""
     if name == ACTIVE:
-        return _descriptor('effects beside the paper\'s friction, in force',
+        return _descriptor('effects in force in addition to the paper\'s friction',
                            'be a list of names of effects', Parameter.Type.STRING_ARRAY)
     block, _, rest = name.partition('.')
     effect, _, place = rest.partition('.')

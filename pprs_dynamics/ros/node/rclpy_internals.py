@@ -110,7 +110,7 @@ def call_if_due(timer: Timer) -> bool:
 
 
 def destroy_state_machine(node: LifecycleNode) -> None:
-    """Let go of what rclpy leaves of a destroyed managed node.
+    """Destroy the state machine of a destroyed managed node.
 
     Its state machine holds the node, and with it the DDS participant, until Python's garbage
     collection finds the circle; of frozen objects it never does.

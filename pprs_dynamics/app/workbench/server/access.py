@@ -141,7 +141,7 @@ class AccessControl:
                 self.used()
             return answer
         if not known:
-            return _refuse(401, 'open the address that stands in the terminal, with its token')
+            return _refuse(401, 'open the address in the terminal, with its token')
         length = headers.get('content-length', '0')
         most = self.uploads.get(request.url.path, MOST_BYTES)
         if not length.isdecimal() or len(length) > len(str(most)) or int(length) > most:

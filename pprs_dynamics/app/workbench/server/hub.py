@@ -87,7 +87,7 @@ class Hub:
         self._worker = Thread(target=self._run, name='workbench', daemon=True)
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begin to work; changes are told in this loop."""
+        """Start the worker; changes are announced in this loop."""
         self._loop = loop
         self._worker.start()
 
@@ -112,7 +112,7 @@ class Hub:
 
     @contextmanager
     def steady(self) -> Iterator[None]:
-        """Keep the state as it is while the block lasts, for one who looks at it."""
+        """Prevent changes of the state while the block lasts."""
         with self._steady, self.session.ticks.steady() if self.session else nullcontext():
             yield
 
@@ -129,7 +129,7 @@ class Hub:
         self._waiting.discard(queue)
 
     def notify(self) -> None:
-        """Tell all browsers that something changed."""
+        """Notify all browsers of a change."""
         self.log.count()
         if self._loop is not None and not self._loop.is_closed():
             with suppress(RuntimeError):  # it closes just now
@@ -171,7 +171,7 @@ class Hub:
     def upload(self, name: str) -> Iterator[Path]:
         """Give the path for an upload, in a folder of its own, with what is plain of its name.
 
-        What raises an error inside leaves nothing behind, and does not count.
+        After an error inside the block nothing remains, and the upload does not count.
 
         Raises
         ------

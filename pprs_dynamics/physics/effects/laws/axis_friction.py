@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class AxisFriction(Effect):
         F_c [N, N m].
     """
 
-    name: ClassVar[str] = 'active_friction'
+    name = 'active_friction'
     viscous: float | tuple[float, ...]
     coulomb: float | tuple[float, ...]
 
@@ -56,7 +56,7 @@ class AxisOffset(Effect):
         [N, N m]
     """
 
-    name: ClassVar[str] = 'offset'
+    name = 'offset'
     value: float | tuple[float, ...]
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import cos, sin
-from typing import Any, ClassVar
+from typing import Any
 
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
@@ -23,10 +23,10 @@ from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 class BaseTilt(BodyEffect):
     """Gravity turned by x about the x axis of `base`, then by y about its y axis."""
 
-    name: ClassVar[str] = 'base_tilt'
+    name = 'base_tilt'
     acts_in = frozenset({PLATFORM, MECHANISM})
-    idealised: ClassVar[bool] = False
-    nonlinear: ClassVar[bool] = True
+    idealised = False
+    nonlinear = True
     # A base is levelled to a degree; what leans by more than 20 stands so on purpose: gravity in
     # the model says how.
     linear = tuple(

@@ -10,7 +10,6 @@ l = sqrt(1 + rho^2 - 2 rho cos(q - q_0)) is its length over b.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 import numpy as np
 
@@ -32,7 +31,7 @@ BEND = 0.2
 class Counterbalance(DriveEffect):
     """Spring, gas or hydraulic cylinder that carries weight, between two links."""
 
-    name: ClassVar[str] = 'counterbalance'
+    name = 'counterbalance'
     acts_in = frozenset({MECHANISM})
     linear = (Parameter('force', 'F_b', 'N m', 'pull at no length, times b; negative where it '
                         'pushes', -1e7, 1e7, scale=5.0),

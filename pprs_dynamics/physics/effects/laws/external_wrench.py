@@ -10,7 +10,7 @@ L.-W. Tsai, Robot Analysis, 1999, on statics by virtual work.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -29,9 +29,9 @@ class ExternalWrench(BodyEffect):
     Pulled down, force_z is positive.
     """
 
-    name: ClassVar[str] = 'external_wrench'
+    name = 'external_wrench'
     acts_in = frozenset({PLATFORM, MECHANISM})
-    nonlinear: ClassVar[bool] = True
+    nonlinear = True
     linear = (
         *(Parameter(name, f'F_{name[-1]}', 'N', f'force to overcome along {name[-1]} of base',
                     -1e6, 1e6, scale=1.0) for name in FORCES),

@@ -35,10 +35,10 @@ class JointFrictionEffect(PassiveJointEffect):
     goes to the drives by virtual power of the whole mechanism, whatever friction.approach is.
     """
 
-    name: ClassVar[str] = 'joint_friction'
+    name = 'joint_friction'
     acts_in = frozenset({PLATFORM, MECHANISM})
-    is_friction: ClassVar[bool] = True
-    is_of_one_place: ClassVar[bool] = True
+    is_friction = True
+    is_of_one_place = True
     linear = ()
     radii: ClassVar[Mapping[str, float]] = {}
     card = Card(
@@ -115,7 +115,7 @@ class ModelJointFriction(Effect):
         `viscous`, `torque`, `coulomb` and `radius` by joint.
     """
 
-    name: ClassVar[str] = 'passive_friction'
+    name = 'passive_friction'
 
     def __init__(self, blocks: Mapping[str, Mapping[str, float]]) -> None:
         self.blocks = {name: dict(one) for name, one in blocks.items()}

@@ -30,9 +30,9 @@ class JointSpring(BodyEffect):
     On a 3-PPRS in its joints C_i, between lift and rod, alike in all chains.
     """
 
-    name: ClassVar[str] = 'joint_spring'
+    name = 'joint_spring'
     acts_in = frozenset({PLATFORM, MECHANISM})
-    is_of_one_place: ClassVar[bool] = True
+    is_of_one_place = True
     linear = ()
     joints: ClassVar[tuple[str, ...]] = ()
     card = Card(

@@ -11,7 +11,7 @@ parameters.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 from pprs_dynamics.physics.effects.added_body import AddedBody, Place
 from pprs_dynamics.physics.effects.effect import Card
@@ -26,9 +26,9 @@ class LinkMass(AddedBody):
     that carries the tool is left to the payload.
     """
 
-    name: ClassVar[str] = 'link_mass'
+    name = 'link_mass'
     acts_in = frozenset({PLATFORM, MECHANISM})
-    is_of_one_place: ClassVar[bool] = True
+    is_of_one_place = True
     linear = ()
     card = Card(
         'm_b -> m_b + m_+, uniform along each rod',

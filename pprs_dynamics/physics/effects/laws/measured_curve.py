@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -104,7 +104,7 @@ def spline_basis(
 class MeasuredCurve(DriveEffect):
     """A drive's force over one variable, as it was measured: a table, not a cause."""
 
-    name: ClassVar[str] = 'measured_curve'
+    name = 'measured_curve'
     linear = ()
     variants = ((),)
     card = Card(

@@ -12,7 +12,7 @@ IEEE Control Systems Magazine 27 (2007), on payload identification.
 from __future__ import annotations
 
 from math import inf
-from typing import Any, ClassVar
+from typing import Any
 
 from pprs_dynamics.physics.effects.added_body import AddedBody, Place, body_parameters
 from pprs_dynamics.physics.effects.effect import Card
@@ -22,7 +22,7 @@ from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 class PayloadMass(AddedBody):
     """A body more at the tool: at the centre of mass of a 3-PPRS' platform, as a point."""
 
-    name: ClassVar[str] = 'payload_mass'
+    name = 'payload_mass'
     acts_in = frozenset({PLATFORM, MECHANISM})
     places = (Place('', 'the tool', (0.0, 0.0, 0.0), inf, is_spread=True),)
     linear = body_parameters('', 'the tool', (0.0, 0.0, 0.0), inf)[:1]
