@@ -54,9 +54,7 @@ class ElasticJoint(MeasurementEffect):
 
     def loaded_position_error(self, drives: Sequence[str], transmitted: Array) -> Array:
         """Return how far encoders are ahead because of loads, (N, D) [m, rad]."""
-        softness = [self.drives.get(name, {}).get('compliance', 0.0) for name in drives]
-        error: Array = transmitted * np.array(softness)
-        return error
+        return self.by_drive(drives, transmitted, lambda load, own: own['compliance'] * load)
 
     def windup_error(self, drives: Sequence[str], transmitted: Array, windup: Array) -> Array:
         """Return what the second encoder says otherwise than loads, of positions and rates."""

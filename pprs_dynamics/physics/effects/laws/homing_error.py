@@ -52,5 +52,4 @@ class HomingError(MeasurementEffect):
 
     def position_error(self, drives: Sequence[str], position: Array) -> Array:
         """Return z of each drive, the same at every sample, (N, D) [m, rad]."""
-        zeros = np.array([self.drives.get(name, {}).get('zero', 0.0) for name in drives])
-        return np.broadcast_to(zeros, position.shape)
+        return self.by_drive(drives, position, lambda q, own: np.full_like(q, own['zero']))

@@ -10,7 +10,7 @@ F. M. White, Fluid Mechanics, on creeping flow.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +32,6 @@ class ToolDrag(BodyEffect):
         Parameter('rotational', 'c_r', 'N m s/rad', 'moment per angular velocity of the tool',
                   -1e6, 1e6, 0.0, scale=0.01))
     variants = (('coefficient',), ('coefficient', 'rotational'))
-    unphysical_below: ClassVar[dict[str, float]] = {'coefficient': 0.0, 'rotational': 0.0}
     card = Card(
         'Q = [J]^T (c v, c_r omega)',
         'errors on several drives that follow the velocity of the platform and not that of one '
