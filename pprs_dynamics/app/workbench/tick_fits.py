@@ -27,7 +27,7 @@ from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
 from pprs_dynamics.inference.search.fitted_model import exact_forces, fitted_model, linear_residual
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.relinearisation import relinearised
+from pprs_dynamics.inference.search.relinearisation import linearised
 from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
@@ -284,7 +284,7 @@ class TickFits:
         """
         fits, parameters = self.fits, None
         if is_free and any(c.effect.nonlinear for c in found.effects):
-            fits, found = relinearised(fits, found)
+            fits, found = linearised(fits, found)
             parameters = {c.name: estimate(fits, found, c, True).parameters for c in found.effects}
         model = fitted_model(fits, found)
         return Exact(model, self.measured - exact_forces(fits.design, model), parameters)

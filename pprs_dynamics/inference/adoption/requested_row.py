@@ -80,7 +80,7 @@ def requested_row(table: ModelTable, request: EffectRequest, margin: float) -> R
         raise PlacementError(f'{", ".join(standing)} hardly moved in the recordings' if standing
                              else f'{request.name} has no force in these recordings')
     fitted = fits.refined(fits.evaluate((*rest, EffectCandidate.of(chosen))))
-    return Row(*linearised(fits, fitted, alone=True), 0.0)
+    return Row(*linearised(fits, fitted), 0.0)
 
 
 def _candidate(row: Row, request: EffectRequest) -> EffectCandidate | None:

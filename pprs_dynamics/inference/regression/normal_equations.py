@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -50,6 +51,11 @@ class Block:
     def size(self) -> int:
         """Number of coefficients."""
         return len(self.precision)
+
+    @cached_property
+    def log_det(self) -> float:
+        """Of the precision."""
+        return float(np.linalg.slogdet(self.precision)[1])
 
 
 def term_gains(S: Array, b: Array, precision: Array, mean: Array) -> Array:
@@ -110,18 +116,18 @@ class Prior:
     @classmethod
     def of(cls, columns: Sequence[BaseColumn], blocks: Sequence[Block]) -> Prior:
         """Return the prior of base columns, then of blocks in order."""
-        parts = [np.diag([column.precision for column in columns]),
-                 *(block.precision for block in blocks)]
-        count = sum(map(len, parts))
-        precision, mean, at, log_det = np.zeros((count, count)), np.zeros(count), 0, 0.0
-        for part, block in zip(parts, (None, *blocks), strict=True):
-            place = slice(at, at + len(part))
-            precision[place, place] = part
-            if block is not None and block.mean is not None:
+        first = np.array([column.precision for column in columns])
+        at = len(first)
+        count = at + sum(block.size for block in blocks)
+        precision, mean = np.zeros((count, count)), np.zeros(count)
+        precision[np.arange(at), np.arange(at)] = first
+        log_det = float(np.log(first).sum()) + sum(block.log_det for block in blocks)
+        for block in blocks:
+            place = slice(at, at + block.size)
+            precision[place, place] = block.precision
+            if block.mean is not None:
                 mean[place] = block.mean
-            if len(part):
-                log_det += float(np.linalg.slogdet(part)[1])
-            at += len(part)
+            at += block.size
         limited = np.zeros(count, dtype=bool)
         limited[:len(columns)] = [isinstance(column, ModelNumber) for column in columns]
         return cls(precision, mean, log_det, limited)

@@ -14,8 +14,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from pprs_dynamics.inference.regression.terms import OperatingPoint, PlacedEffect
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.fitted_model import (
@@ -31,26 +29,23 @@ LEAST_DIFFERENCE = 4.0  # whitened square by which the exact model may differ fr
 MOST_STEPS, MOST_HALVINGS = 6, 4
 
 
-def linearised(fits: FittedSets, fitted: CandidateSet, alone: bool = False,
-               ) -> tuple[FittedSets, CandidateSet]:
-    """Return a set around its own fitted model, and the fitted sets that it is of.
+def linearised(fits: FittedSets, fitted: CandidateSet) -> tuple[FittedSets, CandidateSet]:
+    """Return a set around its own fitted model, and the fitted sets that it is one of.
 
-    Those given where nothing would change. Gauss-Newton steps with the set as it is, each
-    halved until the exact error falls; where none does, the set stays where columns
-    hold. `alone`: nothing is to be added, see `Design.around`.
+    Gauss-Newton steps with the effects of the set, each halved until the exact error falls. The
+    arguments are returned where nothing changes.
 
     Raises
     ------
     ModelError
         For values that no model may have.
     """
+    fitted = fits.refined(fitted)
     for _ in range(MOST_STEPS):
         point = next_operating_point(fits, fitted)
         if point is None:
             break
-        if point is fits.design.point:
-            return fits, _held_at(fits, fitted, point)
-        fits = FittedSets(fits.design.around(point, alone), fits.decisions,
+        fits = FittedSets(fits.design.around(point, alone=True), fits.decisions,
                           fits.regression.error_scale)
         fitted = fits.refined(fits.evaluate(fitted.candidates))
     return fits, fitted
@@ -59,9 +54,8 @@ def linearised(fits: FittedSets, fitted: CandidateSet, alone: bool = False,
 def next_operating_point(fits: FittedSets, fitted: CandidateSet) -> OperatingPoint | None:
     """Return where to expand next: towards a set's fitted model, as far as the exact error falls.
 
-    None where the exact forces of the fitted model are those of the linear fit, and columns were
-    computed with every nonlinear effect; the point where columns hold where no step from it
-    lowers the exact error.
+    None where no step lowers the exact error, or where the exact forces of the fitted model are
+    those of the linear fit and columns were computed with every nonlinear effect.
     """
     design = fits.design
     base, effects = parts_of(fits, fitted)
@@ -86,23 +80,8 @@ def next_operating_point(fits: FittedSets, fitted: CandidateSet) -> OperatingPoi
             target = model_at(design, base, effects)
             loss = squared(fits, fitted, measured - exact_forces(design, target))
         else:
-            return before
+            return None
     return OperatingPoint(target, base, effects)
-
-
-def _held_at(fits: FittedSets, fitted: CandidateSet, point: OperatingPoint) -> CandidateSet:
-    """Return a set with the numbers and coefficients of a point, all else fitted beside them."""
-    known = {(effect.effect, effect.drive): effect.coefficients for effect in point.effects}
-    index = [np.flatnonzero([column.in_model for column in fits.design.base])]
-    values = [point.base[index[0]]]
-    for component, block in fitted.blocks.items():
-        names = component.names or [c.name for c in component.effect.coefficients]
-        index.append(fitted.fit.index_of([block])[:len(names)])
-        values.append(np.array([known[component.effect, component.drive].get(name, 0.0)
-                                for name in names]))
-    at, wanted = np.concatenate(index), np.concatenate(values)
-    moves = wanted != fitted.fit.coefficients[at]  # numbers that are certain do not
-    return fits.held(fitted, at[moves], wanted[moves])
 
 
 def has_nonlinear(fits: FittedSets, fitted: CandidateSet) -> bool:
@@ -123,14 +102,3 @@ def _between(a: PlacedEffect, b: PlacedEffect) -> PlacedEffect:
     return replace(b, coefficients={
         name: (a.coefficients.get(name, 0.0) + value) / 2
         for name, value in b.coefficients.items()})
-
-
-def relinearised(fits: FittedSets, fitted: CandidateSet) -> tuple[FittedSets, CandidateSet]:
-    """Return what `linearised` does of a set whose shapes were refined until they stand still.
-
-    Raises
-    ------
-    ModelError
-        For values that no model may have.
-    """
-    return linearised(fits, fits.refined(fitted), alone=True)

@@ -15,8 +15,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
-import numpy as np
-
 from pprs_dynamics.inference.search.candidates import (
     CandidateSet,
     EffectCandidate,
@@ -27,7 +25,6 @@ from pprs_dynamics.inference.search.neighbours import exchanged, simplified, wit
 from pprs_dynamics.inference.search.scan import Scan, with_fast_noise
 from pprs_dynamics.inference.search.unknown import DrivePatterns, Shared, best_patterns
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
 BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
@@ -73,7 +70,7 @@ class Search:
         try:
             self.fits.evaluate(())
             if start:
-                self.rescanned(self.fits.evaluate(start))
+                self.fits.refined(self.fits.evaluate(start))
             self._descend(False, until_nonlinear)
             if not until_nonlinear or not self.best.is_nonlinear:
                 if self.patterns:
@@ -114,7 +111,6 @@ class Search:
         """Fit sets, and bring those that may be the best to where they cost least."""
         new = [self.fits.evaluate(candidates) for candidates in sets
                if not self.fits.has(candidates) and self._is_bounded(candidates)]
-        new += self._with_constants(new)
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
         shaped = [fitted for fitted in new if any(component.effect.shape or component.centre
                                                   for component in fitted.blocks)]
@@ -126,21 +122,6 @@ class Search:
         for fitted in new:
             if len(fitted.candidates) == len(fitted.effects) == 1:
                 simplified(self.fits, fitted)
-
-    def _with_constants(self, sets: Iterable[CandidateSet]) -> list[CandidateSet]:
-        """Return sets with one effect more, where they would be the best but for constants.
-
-        No noise takes a constant: what lacks nothing else is judged once it has it.
-        """
-        near = [fitted for fitted in sets if self._all_but_constants(fitted) < self.best.cost]
-        return [self.fits.evaluate(more) for fitted in near
-                for more in self.scan.proposals(fitted, 1) if self._is_bounded(more)]
-
-    def _all_but_constants(self, fitted: CandidateSet) -> float:
-        """Return the cost of a set if its drives' constants were what their noise expects."""
-        squares = fitted.fit.squares[:, 0] / fitted.fit.spectra[:, 0]
-        counts = self.fits.regression.counts[:, 0]
-        return fitted.cost - float(np.sum(np.maximum(squares - counts, 0)))
 
     @staticmethod
     def _is_bounded(candidates: Candidates) -> bool:
@@ -166,59 +147,6 @@ class Search:
                     patterns = best_patterns(self.patterns, near.fit, REPLACEMENTS)
                     found += [(*base.candidates, pattern) for pattern in patterns]
         return found
-
-    def best_of(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
-                ) -> CandidateSet | None:
-        """Return the best set of one effect alone, on some drives or where it pays.
-
-        None where the model has it everywhere already.
-        """
-        base = self.fits.evaluate(())
-        fast = replace(base, fit=with_fast_noise(self.fits.regression, base.fit))
-        for near in (base, fast):
-            found = self.scan.offers(near).get(effect, [])
-            if drives is None:
-                chosen = self.scan.best_drives(effect, found, None)[1] if found else []
-            else:
-                chosen = [component for _, component in found if component.drive in drives]
-            if chosen:
-                self.fits.refined(self.fits.evaluate((EffectCandidate.of(chosen),)))
-        while True:
-            alone = [fitted for fitted in self.fits.sets if fitted.candidates]
-            if not alone:
-                return None
-            best = min(alone, key=lambda fitted: fitted.cost)
-            for candidate in (*self._alternatives(best.effects[0]),
-                              *(self._variants(best.effects[0]))):
-                self.fits.evaluate((candidate,))
-            after = min((fitted for fitted in self.fits.sets if fitted.candidates),
-                        key=lambda fitted: fitted.cost)
-            if not after.cost < best.cost - LEAST_IMPROVEMENT:
-                return best
-            self.fits.refined(after)
-
-    def rescanned(self, fitted: CandidateSet) -> CandidateSet:
-        """Return the set on all drives where its effects pay, in shapes that scans find."""
-        for candidates in self.scan.proposals(fitted, effects={c.effect for c in fitted.effects}):
-            fitted = min(fitted, self.fits.evaluate(candidates), key=lambda fitted: fitted.cost)
-        for effect, d in [(component.effect, component.drive) for component in fitted.blocks
-                          if component.effect.shape and component.drive is not None]:
-            candidate = next(c for c in fitted.effects if c.effect is effect)
-            others = [component for component in candidate.components if component.drive != d]
-            rest = fitted.without(candidate)
-            less = (*rest, EffectCandidate.of(others)) if others else rest
-            offers = self.fits.components.local[d].offers(self.fits.at_noise_of(fitted, less).fit)
-            if effect.name in offers:
-                fitted = min(fitted, self.fits.evaluate((*rest, EffectCandidate.of(
-                    [*others, offers[effect.name][0]]))), key=lambda fitted: fitted.cost)
-        return self.fits.refined(fitted)
-
-    def _variants(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
-        """Yield the candidate with other coefficients of one component."""
-        for component in candidate.components:
-            for other in self.fits.components.variants(component):
-                if other.names != component.names:
-                    yield with_instead(candidate, component, other)
 
     def _replacements(self, best: CandidateSet) -> Iterator[Candidates]:
         """Yield sets in which something else stands for candidates, or for one on a drive.

@@ -72,7 +72,7 @@ class Row:
         around, moved = fits, fitted
         try:
             for _ in range(MOST_STEPS):
-                around, moved = linearised(around, moved, alone=True)
+                around, moved = linearised(around, moved)
                 before, moved = moved, of_same_names(around, moved)
                 if moved is before:
                     break
