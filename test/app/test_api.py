@@ -65,7 +65,7 @@ def compared(folder: Path) -> ComparisonResult:
 
 def modules_after(code: str) -> set[str]:
     said = subprocess.run([sys.executable, '-c', f'import sys\n{code}\nprint(*sys.modules)'],
-                          capture_output=True, text=True, check=True)
+                          capture_output=True, text=True, check=True, timeout=120)
     return {name.split('.')[0] for name in said.stdout.split()}
 
 

@@ -311,7 +311,7 @@ def test_the_session_imports_neither_ros_nor_a_server() -> None:
     code = ('import sys; from pprs_dynamics.app.workbench import Session; '
             'print(" ".join({name.split(".")[0] for name in sys.modules}))')
     loaded = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
-                            check=True).stdout.split()
+                            check=True, timeout=120).stdout.split()
     assert not set(loaded) & {'rclpy', 'starlette', 'uvicorn', 'plotly', 'rich', 'matplotlib'}
 
 

@@ -155,7 +155,7 @@ def test_a_controller_that_goes_in_the_middle_ends_the_goal(
         process.send_signal(signal.SIGCONT)
         relayed.spin_for(1.0)  # it finds the first goal, and that it is to be cancelled
     else:
-        process.wait()
+        process.wait(10)
         relayed.controller()
     relayed.feedback.clear()
     assert relayed.answer(relayed.goal(3), 5) == (SUCCEEDED, [3]), relayed.node.said

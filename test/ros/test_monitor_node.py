@@ -152,15 +152,6 @@ def test_without_measured_efforts_the_status_says_so_in_words(monitor: MonitorBe
     assert np.isnan(monitor.error[-1].data).all()
 
 
-def test_positions_that_no_platform_has_are_told_and_survived(monitor: MonitorBench) -> None:
-    monitor.send(200)
-    monitor.position[200:400, 0] += 1.0
-    monitor.send(200)
-    assert monitor.node._counters['WORKSPACE'] > 0
-    monitor.send(400)
-    assert max(monitor.error[-1].data) < RECONSTRUCTION
-
-
 def test_all_joints_are_published_while_somebody_draws_them(monitor: MonitorBench) -> None:
     monitor.send(100)
     joints = monitor.bench.listen(JointState, '/monitor/joint_states_full', 1000)

@@ -126,33 +126,33 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
                               answer.noise_floor),
                      *(ErrorRow(name, errors[name], fallen[name], answer.noise_floors.get(name))
                        for name in errors)],
-                    f'Error on the recordings, rms [{answer.unit}], before (grey) and with it '
-                    '(blue); dotted: the noise.')
+                    f'Error on the recordings, rms [{answer.unit}], before (grey) and with the '
+                    'effect (blue); dotted: the noise.')
         most = max(answer.noise_floors, key=lambda name: errors[name] - fallen[name], default='')
         if most:
             page.figure(before_and_after(before, after, before.drives.index(most),
                                          answer.noise_floors[most]),
-                        f'{most}, where it changes most: effort and error, before and with it.',
+                        f'{most}, where the error falls most: effort and error.',
                         over_time=True)
     if answer.curve is not None:
         page.figure(curve_with_band(answer), 'The measured curve with two standard deviations, '
                     'and the residual of the model without it. It is a correction table, not a '
                     'cause. Beyond the measured range it is constant.')
     if command and answer.adopted:
-        page.command('See what is still missing', command)
-    page.table(*errors_table(answer, 'error on'), caption='What was fitted to, and what decides.')
+        page.command('Look for further effects', command)
+    page.table(*errors_table(answer, 'error on'), caption='Errors on fitted and on held-out data.')
     page.bullets(answer.remarks)
     if answer.parameters:
         page.table(('parameter', '± two standard deviations'), parameter_rows(answer),
-                   caption='Its values')
+                   caption='Fitted values')
     forces = {effect.name: after.parts[effect.name] for effect in answer.after.effects
               if isinstance(effect, CatalogueEffect) and effect.name in after.parts}
     if any(np.any(force) for force in forces.values()):
-        with page.fold('What each added effect contributes'):
-            add_contributions(page, after, forces, 'What each added effect contributes.')
+        with page.fold('Contribution of each added effect'):
+            add_contributions(page, after, forces, 'Contribution of each added effect.')
     add_every_drive(page, before, after, answer.noise_floors, f'before and with {answer.effect}')
     if answer.calibrated:
-        with page.fold('Numbers of the model that move within their tolerances'):
+        with page.fold('Numbers of the model that changed within their tolerances'):
             page.table(('number', 'before', 'after'),
                        [(one.label, with_uncertainty(one.before, 0.0, one.unit),
                          with_uncertainty(one.after, one.std, one.unit))

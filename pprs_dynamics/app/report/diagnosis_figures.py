@@ -128,7 +128,7 @@ def effect_pictures(diagnosis: Diagnosis, found: FittedEffect,
     residuals = diagnosis.residuals
     drive = residuals.drives[part.drive]
     units = residuals.units_of(drive)
-    without, hover = 'measured, all but this in the model', charts.hover(units)
+    without, hover = 'measured minus the other effects', charts.hover(units)
     layout = {'hovermode': 'x unified', 'yaxis': {
         'title': f'force on {drive} [{units.effort}]', 'rangemode': 'tozero'}}
     figures = []

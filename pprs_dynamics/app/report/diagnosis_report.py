@@ -329,7 +329,7 @@ def _findings(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
                 page.card(finding.title, _lines(finding, effect.effect.card_in(kind).equation),
                           figures.effect_pictures(diagnosis, effect))
     if words.unexplained:
-        with page.fold('What no effect of the catalogue explains'):
+        with page.fold('Patterns that no effect of the catalogue explains'):
             for finding, group in zip(words.unexplained, unexplained_groups(diagnosis),
                                       strict=True):
                 pictures = [(figures.unknown_picture(diagnosis, statement), f'{statement.drive}.')
@@ -376,7 +376,7 @@ def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep])
     unit = diagnosis.residuals.unit
     where = ('the recordings given with --validate' if diagnosis.held_out_on == 'validation'
              else 'blocks of the same recordings, the weaker evidence')
-    with page.fold('What each effect does to the error'):
+    with page.fold('Error reduction by each effect'):
         if len(steps) > 2:
             page.errors([ErrorRow(f'+ {step.label}' if k else step.label, step.overall)
                          for k, step in enumerate(steps)],
@@ -391,7 +391,7 @@ def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep])
             caption='Error before: without the force of this effect, all else as fitted. '
             f'Held out before: fitted without it. Held out: {where}.')
         figures.add_contributions(page, diagnosis.residuals, {
-            one.name: one.force for one in diagnosis.effects}, 'What each effect contributes.')
+            one.name: one.force for one in diagnosis.effects}, 'Contribution of each effect.')
 
 
 def _parameters(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
