@@ -81,6 +81,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
         self._counters = {'received': 0, 'passed_on': 0, 'refused': 0}
         self._status = StatusReporter(self, {'action': node_values['action']}, self._counters,
                                       hardware_of(self._settings.model), self._refresh)
+        self._files = files_given(self.arguments)
         self._refresh()
         self._relay = GoalRelay(self, FollowJointTrajectory, node_values['action'],
                                 lambda: self._settings.node_values['controller_timeout'])
@@ -98,8 +99,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
 
     def _refresh(self) -> None:
         self._status.facts.update(
-            model={'files': files_given(self.arguments),
-                   'sha256': self._settings.model.fingerprint},
+            model={'files': self._files, 'sha256': self._settings.model.fingerprint},
             changes=len(self._settings.history or ()))
 
     def _accept(self, goal: Any) -> GoalResponse:
