@@ -73,8 +73,9 @@ class TrajectoryProxyNode(ExplainsRefusals):
         self._log = ThrottledLog(self)
         # Planners may leave derivatives out; feedforward, whose messages are short, refuses that.
         parameters = (ACTION, TIMEOUT, *(
-            replace(one, default=SPLINE) if one.name == 'missing_derivatives' else one
-            for one in parameters_for(drive_count(self)) if one.name in SHARED))
+            replace(parameter, default=SPLINE)
+            if parameter.name == 'missing_derivatives' else parameter
+            for parameter in parameters_for(drive_count(self)) if parameter.name in SHARED))
         self._settings = ModelParameters(self, parameters, lambda: None, drives=True)
         node_values = self._settings.node_values
         prepare(self._settings.model)
