@@ -19,8 +19,7 @@ from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.drives import DriveUnits, common_effort
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.sentences import word_terms
-from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
-from pprs_dynamics.inference.search.cost_terms import CostTerms
+from pprs_dynamics.inference.search.candidates import CandidateSet, CostTerms, EffectCandidate
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect

@@ -23,6 +23,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import (
     BaseColumn,
+    CarriedOver,
     ModelNumber,
     PresentCoefficient,
     PresentShape,
@@ -31,13 +32,7 @@ from pprs_dynamics.inference.regression.base_columns import (
     present_columns,
     present_values,
 )
-from pprs_dynamics.inference.regression.carried_over import CarriedOver
-from pprs_dynamics.inference.regression.collecting import (
-    ColumnCollector,
-    stacked_columns,
-)
-from pprs_dynamics.inference.regression.drive_ranges import drive_range
-from pprs_dynamics.inference.regression.second_encoders import SecondEncoders
+from pprs_dynamics.inference.regression.drive_ranges import SecondEncoders, drive_range
 from pprs_dynamics.inference.regression.sensitivities import (
     BARE,
     HOMING,
@@ -46,7 +41,9 @@ from pprs_dynamics.inference.regression.sensitivities import (
     OF_DRIVES,
     OF_JOINTS,
     PRESENT,
+    ColumnCollector,
     Sensitivities,
+    stacked_columns,
 )
 from pprs_dynamics.inference.regression.terms import FullRate, OperatingPoint, Term
 from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table

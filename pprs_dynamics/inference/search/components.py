@@ -27,11 +27,11 @@ from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
     Component,
+    CostTerms,
     Course,
     PriorCosts,
     UnknownCandidate,
 )
-from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect, Windup
 from pprs_dynamics.physics.effects.effect import CatalogueEffect

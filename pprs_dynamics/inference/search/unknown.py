@@ -22,10 +22,9 @@ from scipy import fft
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.joint_fit import Columns, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block, term_gains
-from pprs_dynamics.inference.residuals.bins import LEAST_SHARE, MOST_SHARE
+from pprs_dynamics.inference.residuals.profiles import LEAST_SHARE, MOST_SHARE
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.candidates import PriorCosts, UnknownCandidate
-from pprs_dynamics.inference.search.cost_terms import CostTerms
+from pprs_dynamics.inference.search.candidates import CostTerms, PriorCosts, UnknownCandidate
 from pprs_dynamics.inference.search.patterns import (
     Family,
     Pattern,

@@ -41,6 +41,10 @@ class Robot(Protocol):
         """Names of the drives."""
 
     @property
+    def kind(self) -> str:
+        """Kind of the robot: effects say on which kinds they act."""
+
+    @property
     def turning(self) -> tuple[str, ...]:
         """Drives that turn."""
 
