@@ -205,10 +205,8 @@ def test_everything_on_the_screen_is_json(session: Session) -> None:
     assert found['errors']['lift_1']['now'] < found['errors']['lift_1']['before']
 
 
-def test_an_effect_is_adopted_refused_exported_and_taken_back(
-    recording: Path, tmp_path: Path,
-) -> None:
-    other = write_hidden(tmp_path / 'other.csv', 2)
+def test_an_effect_is_adopted_refused_exported_and_taken_back(tmp_path: Path) -> None:
+    recording, other = (write_hidden(tmp_path / f'{seed}.csv', seed, 6.0) for seed in (1, 2))
     session = Session.open([recording], validation=[other])
     given = dict(session.ticks.model.values)
     session.jobs.diagnose().result(300)
