@@ -21,12 +21,10 @@ from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,
     linear_prediction,
+    next_operating_point,
     squared,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.relinearisation import (
-    next_operating_point,
-)
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.inference.search.table import Row, tabulate
 from pprs_dynamics.measurement.files.recording import Recording

@@ -271,7 +271,7 @@ def added_descriptor(name: str) -> ParameterDescriptor:
     block, _, rest = name.partition('.')
     effect, _, place = rest.partition('.')
     if block == 'effects' and effect in CATALOGUE:
-        for parameter in (one.widest for one in CATALOGUE[effect].parameters):
+        for parameter in (parameter.widest for parameter in CATALOGUE[effect].parameters):
             if place.rpartition('.')[2] == parameter.name:
                 unit = f' [{parameter.unit}]' if parameter.unit else ''
                 descriptor = _descriptor(
