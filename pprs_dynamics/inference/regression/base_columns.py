@@ -82,7 +82,7 @@ class ReversalShape(BaseColumn):
 
 @dataclass(frozen=True)
 class ReferenceDirection(BaseColumn):
-    """A principal direction of what a reference run leaves unknown, of unit prior."""
+    """A principal direction of the uncertainty of a reference run, of unit prior."""
 
     in_model = False
 

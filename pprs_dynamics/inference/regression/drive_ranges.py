@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What drives did in recordings: strokes, speeds, delays, and what was measured beside."""
+"""What drives did in recordings: strokes, speeds, delays, further channels and encoders."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def drive_range(model: DriveModel, recordings: Sequence[FullRate], drive: int) -
 
 
 def _channels(recordings: Sequence[FullRate], drive: int) -> dict[str, tuple[float, float]]:
-    """Return the ranges of what was measured of a drive beside motion and effort."""
+    """Return the ranges of further channels of a drive."""
     found = {}
     for name in {name for recording in recordings for name in recording.channels}:
         values = np.concatenate([recording.channels[name][:, drive] for recording in recordings
@@ -81,7 +81,7 @@ def _delay(recording: FullRate, drive: int) -> float:
 
 @dataclass(frozen=True)
 class SecondEncoders:
-    """What encoders behind the gears tell of the drives that have one.
+    """Wind-up and clearance of the drives with an encoder behind the gear.
 
     Parameters
     ----------

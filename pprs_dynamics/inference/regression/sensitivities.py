@@ -149,13 +149,17 @@ class Sensitivities:
     def columns(self, forces: Any) -> dict[str, Array]:
         """Return columns by name, (K, N, D) each.
 
-        `NUMBERS` per standard deviation by which each number grows away from 0; `OF_DRIVES` what
-        other widths of turning over would change in every drive, and last a part that is alike
-        in both directions; `OF_JOINTS` the former in all passive joints; `HOMING` per metre that
-        each drive is measured too far, `INERTIA` per acceleration that it is measured too much;
-        the coefficients of each effect of `searched` by its name, and after `BARE` as they were if
-        friction did not follow the loads; those of effects that the given model has by their names
-        after `PRESENT`. What a kind of model does not have is left out.
+        What a kind of model does not have is missing.
+
+        - `NUMBERS`: per standard deviation by which each number grows away from 0.
+        - `OF_DRIVES`: other widths of reversal in every drive, and a part that is the same in
+          both directions.
+        - `OF_JOINTS`: other widths of reversal in all passive joints.
+        - `HOMING`: per metre that each drive is measured too far.
+        - `INERTIA`: per acceleration that each drive is measured too much.
+        - Names of `searched`: the coefficients of each effect.
+        - `BARE` + name: the same with friction that does not follow the loads.
+        - `PRESENT` + name: the coefficients of effects that the given model has.
 
         Parameters
         ----------
@@ -380,7 +384,7 @@ def passive_reversal_columns(friction: Effect, state: Any) -> Array:
 
 
 class Column(NamedTuple):
-    """Key of columns in a table, beside parts and variables."""
+    """Key of columns in a table, next to parts and variables."""
 
     name: str
 

@@ -45,7 +45,7 @@ class Profile:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Power spectrum of a drive's error beside that of its noise model.
+    """Power spectra of a drive's error and of its noise model.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ class CostTerms:
     Parameters
     ----------
     fit : float
-        What is left in units of its noise, and ln of the noise.
+        The residual in units of its noise, and ln of the noise.
     coefficients : float
         The prior of the coefficients: how far they are from its mean, and how much narrower than
         it they are known.
@@ -279,7 +279,7 @@ class UnknownCandidate:
 
     @property
     def name(self) -> str:
-        """What stands for it among the names of effects."""
+        """In lists of names of effects."""
         return f'unknown, {self.family.variable}'
 
     @property
@@ -321,8 +321,8 @@ class CandidateSet:
     nuisance : mapping of Component to tuple of Block
         Columns for what the components leave open, fitted with them.
     barred : str
-        Why it may not be: a body cannot be, a value is beyond its bounds, or a pattern may be the
-        lack of fit of the effects beside it; '' where it may.
+        Why it is inadmissible: no possible values come near, or a candidate may be the form error
+        of others; '' for an admissible set.
     """
 
     candidates: tuple[Candidate, ...]

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The model that a fitted set stands for, and its forces: by the linear fit, and exactly."""
+"""The model of a fitted set, its linear and exact forces, and linearisation around it."""
 
 from __future__ import annotations
 

@@ -225,7 +225,7 @@ class FittedSets:
                      + np.linalg.slogdet(block.precision)[1])
 
     def held(self, fitted: CandidateSet, index: Integers, values: Array) -> CandidateSet:
-        """Return a set with some coefficients (k,) as given, all else fitted beside them.
+        """Return a set with some coefficients (k,) as given, all else fitted with them.
 
         At the noise of the set, so that a bad value cannot hide in it.
         """

@@ -64,7 +64,7 @@ class Search:
     def run(self, start: Candidates = (), until_nonlinear: bool = False) -> CandidateSet:
         """Return the best set that the search reaches, by effects alone at first.
 
-        A pattern of no catalogue stands only beside what effects explain. `until_nonlinear`: where
+        Patterns of no catalogue are added after effects. `until_nonlinear`: where
         a nonlinear effect joins the search ends before its end, since what would come next might
         only make good that columns do not show it.
         """
@@ -151,7 +151,7 @@ class Search:
         return found
 
     def _replacements(self, best: CandidateSet) -> Iterator[Candidates]:
-        """Yield sets in which something else stands for candidates, or for one on a drive.
+        """Yield sets in which something else replaces candidates, or one on a drive.
 
         Under the noise of the set, so that a replacement that explains as much is seen to.
         """
@@ -170,9 +170,9 @@ class Search:
 
     def _instead_on_a_drive(self, best: CandidateSet, candidate: EffectCandidate,
                             ) -> Iterator[Candidates]:
-        """Yield sets in which another effect stands for one on one of its drives.
+        """Yield sets in which another effect replaces one on one of its drives.
 
-        There it, or some of its coefficients, may stand for the other one.
+        There it, or some of its coefficients, may imitate the other one.
         """
         for component in candidate.components if len(candidate.components) > 1 else ():
             fewer = [(other,) for other in self.fits.components.variants(component)
@@ -189,7 +189,7 @@ class Search:
                                    RECOVERED * (base.total - best.total) - REPLACED)
 
     def _two_for(self, best: CandidateSet, gone: EffectCandidate) -> Iterable[Candidates]:
-        """Yield sets in which two other effects stand for one that is more than one hypothesis."""
+        """Yield sets in which two other effects replace one that is more than one hypothesis."""
         def with_another(candidates: Candidates) -> list[Candidates]:
             found = self.scan.proposals(self.fits.at_noise_of(best, candidates), REPLACEMENTS + 1)
             return [more for more in found if all(
@@ -260,7 +260,7 @@ def _descended(fits: FittedSets, fitted: CandidateSet,
 
 
 def _on_more_drives(fits: FittedSets, fitted: CandidateSet) -> Iterator[Candidates]:
-    """Yield a set with one of its effects on another drive more, as it is where it is strongest."""
+    """Yield a set with an effect on one drive more, in the shape of its strongest drive."""
     for candidate in fitted.effects:
         if candidate.drives is None:
             continue
