@@ -224,8 +224,8 @@ def test_no_total_of_a_drive_is_negative_when_one_constraint_moves_another(inert
     moved = axis_motion(TIME)
     exact = DriveModel.from_parameters({**MODEL.values, **dict.fromkeys(
         (f'tolerances.axis.{key}' for key in ('mass', 'viscous', 'coulomb')), 1e-6)})
-    effort = exact.drive_forces(moved).total + MODEL.values['axis.mass'] * inertia * (
-        moved.acceleration) - 0.99 * MODEL.values['axis.viscous'] * moved.velocity
+    effort = exact.drive_forces(moved).total + MODEL.values['links.mass'][0] * inertia * (
+        moved.acceleration) - 0.99 * MODEL.values['friction.viscous'][0] * moved.velocity
     effort += np.random.default_rng(5).normal(0, 1.0, effort.shape)
     design = Design.of(exact, [Recording.from_arrays('run', TIME, moved.position, None, effort,
                                                      ('axis',))])
@@ -238,8 +238,8 @@ def test_no_total_of_a_drive_is_negative_when_one_constraint_moves_another(inert
     mass, viscous, more = (dict(zip(one.names, found.coefficients(one), strict=True))
                            for one in components)
     values, tiny = exact.values, 1e-6
-    assert values['axis.mass'] + mass['mass'] > -tiny
+    assert values['links.mass'][0] + mass['mass'] > -tiny
     for way in ('forward', 'backward'):
-        assert (values['axis.viscous'] + viscous['coefficient']
+        assert (values['friction.viscous'][0] + viscous['coefficient']
                 + more[f'viscous_{way}']) > -tiny
-        assert values['axis.coulomb'] + more[f'force_{way}'] > -tiny
+        assert values['friction.coulomb'][0] + more[f'force_{way}'] > -tiny

@@ -26,7 +26,8 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
 
 MODEL = DriveModel.load('config/single_axis.yaml')
-MASS, VISCOUS, COULOMB = (MODEL.values[f'axis.{key}'] for key in ('mass', 'viscous', 'coulomb'))
+OWN = 'links.mass', 'friction.viscous', 'friction.coulomb'
+MASS, VISCOUS, COULOMB = (MODEL.values[key][0] for key in OWN)
 TIME = np.arange(0, 20, 0.005)
 
 
@@ -53,7 +54,7 @@ def test_no_more_is_taken_away_than_there_is(name: str, names: tuple[str, ...], 
     recording = recorded(MODEL.drive_forces(moved).total + share * own * columns)
     # The model's own numbers are known, so that what is missing is the effect's alone.
     exact = DriveModel.from_parameters({**MODEL.values, **dict.fromkeys(
-        (f'tolerances.axis.{key}' for key in ('mass', 'viscous', 'coulomb')), 1e-6)})
+        (f'tolerances.{key}' for key in OWN), 1e-6)})
     fits = FittedSets(Design.of(exact, [recording]), DECISIONS)
     component = Component.of(catalogue()[name], 0, {}, names)
     found = fits.evaluate((EffectCandidate.of([component]),))
@@ -68,7 +69,7 @@ def test_no_more_is_taken_away_than_there_is(name: str, names: tuple[str, ...], 
 
 def test_what_can_only_be_nothing_does_not_void_what_is_there() -> None:
     """One direction may have less than nothing by chance; the other is told all the same."""
-    bare = DriveModel.from_parameters({**MODEL.values, 'axis.coulomb': 0.0})
+    bare = DriveModel.from_parameters({**MODEL.values, 'friction.coulomb': [0.0]})
     moved = axis_motion(TIME)
     forward = (1 + np.sign(moved.velocity)) / 2
     effort = bare.drive_forces(moved).total + COULOMB * forward + 0.1 * COULOMB * (1 - forward)
@@ -144,7 +145,7 @@ def test_a_gain_that_a_drive_may_have_is_one() -> None:
 def test_less_inertia_than_none_is_no_effect() -> None:
     """Efforts that decelerate where they should accelerate, with the friction that there is."""
     moved = axis_motion(TIME)
-    light = DriveModel.from_parameters({**MODEL.values, 'axis.mass': 1e-6})
+    light = DriveModel.from_parameters({**MODEL.values, 'links.mass': [1e-6]})
     effort = light.drive_forces(moved).total - 0.3 * MASS * moved.acceleration
     found = diagnose(MODEL, [recorded(effort)], as_it_is=True)
     assert found.verdict != 'effect'

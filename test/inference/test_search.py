@@ -9,6 +9,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from single_axis import AXIS, axis_values
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
@@ -20,22 +21,18 @@ from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,
     linear_prediction,
+    next_operating_point,
     squared,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.relinearisation import (
-    next_operating_point,
-)
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.inference.search.table import Row, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.robot_block import AXIS
 
-AXIS_VALUES = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0,
-               'friction.reversal_velocity': 0.001}
+AXIS_VALUES = {**axis_values(20.0, 40.0, 6.0, -2.0)}
 SMALL = ('coulomb_friction', 'viscous_friction', 'quadratic_friction', 'effort_offset',
          'drive_spring', 'drive_inertia', 'effort_gain')
 MODEL = DriveModel.load()

@@ -82,11 +82,11 @@ class SimulationResult(Result):
     def table(self) -> DataFrame:
         """Return a row per drive: range of position, velocity and effort."""
         drives = describe(self.recording).drives
-        return data_frame([{'lowest_position': one.position[0],
-                            'highest_position': one.position[1],
-                            'lowest_effort': (one.effort or (np.nan, np.nan))[0],
-                            'highest_effort': (one.effort or (np.nan, np.nan))[1]}
-                           for one in drives.values()], list(drives), 'drive')
+        return data_frame([{'lowest_position': drive.position[0],
+                            'highest_position': drive.position[1],
+                            'lowest_effort': (drive.effort or (np.nan, np.nan))[0],
+                            'highest_effort': (drive.effort or (np.nan, np.nan))[1]}
+                           for drive in drives.values()], list(drives), 'drive')
 
     def plot(self) -> Figure:
         """Return a picture: positions and efforts over time."""

@@ -83,11 +83,11 @@ def parameter_rows(answer: Adoption) -> list[tuple[str, str]]:
     With first moments of bodies that are sure where the mass is not.
     """
     effect = answer.request.effect
-    scales = {one.name: one.scale for one in effect.parameters}
-    rows = [(key, as_fitted(one.value, one.std, one.unit,
+    scales = {parameter.name: parameter.scale for parameter in effect.parameters}
+    rows = [(key, as_fitted(parameter.value, parameter.std, parameter.unit,
                             scales.get(effect.place_and_parameter(key)[1], inf)))
-            for key, one in answer.parameters.items() if one.value != 0.0]
-    return rows + [(key, with_uncertainty(one.value, one.std, one.unit)) for key, one in (
+            for key, parameter in answer.parameters.items() if parameter.value != 0.0]
+    return rows + [(key, with_uncertainty(entry.value, entry.std, entry.unit)) for key, entry in (
         (told.name, answer.moments[told.name])
         for told in sure_moments(effect, answer.parameters, answer.moments))]
 
@@ -118,8 +118,8 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
     before, after = answer.residuals_before, answer.residuals_after
     page = Page(f'{answer.effect}: ' + ('added to the model' if answer.adopted else 'refused'))
     page.text(headline(answer), 'lead')
-    page.sources(answer.before.source, [one.name for one in recordings],
-                 [one.name for one in validation])
+    page.sources(answer.before.source, [recording.name for recording in recordings],
+                 [recording.name for recording in validation])
     errors, fallen = rms_by_drive(before), rms_by_drive(after)
     with page.columns():
         page.errors([ErrorRow('all drives', answer.error_before, answer.error_after,
@@ -154,7 +154,7 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
     if answer.calibrated:
         with page.fold('Numbers of the model that changed within their tolerances'):
             page.table(('number', 'before', 'after'),
-                       [(one.label, with_uncertainty(one.before, 0.0, one.unit),
-                         with_uncertainty(one.after, one.std, one.unit))
-                        for one in answer.calibrated])
+                       [(number.label, with_uncertainty(number.before, 0.0, number.unit),
+                         with_uncertainty(number.after, number.std, number.unit))
+                        for number in answer.calibrated])
     return page

@@ -48,7 +48,8 @@ def comparison_view(comparison: Comparison, following: tuple[str, str], details:
         Everything, instead of at most 25 lines of 80 columns.
     beside : Beside, optional
     """
-    lines = [f'{number}. {one.text}' for number, one in enumerate(comparison.where, start=1)]
+    lines = [f'{number}. {statement.text}'
+             for number, statement in enumerate(comparison.where, start=1)]
     shown = lines if details else lines[:FIRST]
     parts = [_drives_table(comparison), escape(comparison.verdict), *map(escape, shown)]
     if not lines:
@@ -66,7 +67,8 @@ def comparison_view(comparison: Comparison, following: tuple[str, str], details:
 
 
 def _beside_table(comparison: Comparison, beside: Beside) -> Any:
-    rows = [*((name, one.rms, beside.drives.get(name)) for name, one in comparison.drives.items()),
+    rows = [*((name, drive.rms, beside.drives.get(name))
+              for name, drive in comparison.drives.items()),
             ('all', comparison.rms, beside.rms)]
     return text_table(
         ('drive', f'rms [{comparison.unit}]', f'rms, {beside.name}', 'change'),
@@ -120,7 +122,7 @@ def comparison_page(
                         f'Error, rms [{comparison.unit}]; dotted: the noise.'
                         + (f' Second bar: {beside.name}.' if beside else ''))
             if statements:
-                page.bullets([one.text for one in statements[:FIRST]], numbered=True)
+                page.bullets([statement.text for statement in statements[:FIRST]], numbered=True)
             else:
                 page.text(NOWHERE)
         if statements:
@@ -132,7 +134,7 @@ def comparison_page(
     if following[1] and comparison.is_beyond_noise:
         page.command(*following)
     page.folded_list(f'{len(statements) - FIRST} more places',
-                     [one.text for one in statements[FIRST:]])
+                     [statement.text for statement in statements[FIRST:]])
     with page.fold('Drive by drive'):
         page.table(*drives_table(comparison),
                    [drive.grade for drive in comparison.drives.values()])

@@ -66,7 +66,7 @@ def term_gains(S: Array, b: Array, precision: Array, mean: Array) -> Array:
     S : (n, k, k) array
         Whitened sums of products of the rows, less what is fitted already.
     b : (n, k) array
-        Whitened sums of products with what is left.
+        Whitened sums of products with the residual.
     precision : (n, k, k) array
         Of the prior.
     mean : (n, k) array
@@ -318,7 +318,7 @@ class NormalEquations:
         return gram, side
 
     def uncertainty(self, spectra: Array) -> Array:
-        """Return the covariance (P, P) that is told of coefficients, under noise spectra (D, B).
+        """Return the reported covariance (P, P) of coefficients, under noise spectra (D, B).
 
         A tolerance +-a says nothing of where within it a number lies: a variance of a^2 / 3 (Guide
         to the Expression of Uncertainty in Measurement, 4.3.7). The fit takes less, so that few

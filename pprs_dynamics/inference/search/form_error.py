@@ -6,7 +6,7 @@
 Real friction, springs and cords differ from the catalogue's forms by up to `Decisions.form_share`
 of their force. Masses, gravity and sensors are exact. A candidate is inadmissible if its force
 beyond all other candidates is smaller than the form error of these: the data cannot separate the
-two. Beside other candidates the input model's friction counts with `Decisions.own_form_share`.
+two. With other candidates the input model's friction counts with `Decisions.own_form_share`.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class FormErrors:
     def beside(self, fitted: CandidateSet, candidate: Candidate, drives: set[int],
                with_own: bool = True, forces: list[tuple[EffectCandidate, Squares]] | None = None,
                ) -> tuple[float, tuple[str, ...]]:
-        """Return the whitened square of the form errors beside a candidate, and whose they are.
+        """Return the whitened square of the form errors of other effects, and their names.
 
         Parameters
         ----------

@@ -15,7 +15,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, SINGLE_AXIS, CatalogueEffect, names
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, names
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM, SLIDE
 from pprs_dynamics.physics.mechanism.state import MechanismState
 
 ALONE = 'drive'  # name of one whose name does not matter
@@ -141,7 +142,7 @@ class DriveEffect(CatalogueEffect):
     linear (`shape`) enters the columns.
     """
 
-    acts_in = frozenset({PLATFORM, SINGLE_AXIS, ARM})
+    acts_in = frozenset({PLATFORM, SLIDE, MECHANISM})
 
     def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
         self.drives = {drive: dict(values) for drive, values in drives.items()}

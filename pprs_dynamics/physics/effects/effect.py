@@ -14,9 +14,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-
-# Kinds of models.
-PLATFORM, SINGLE_AXIS, ARM = 'platform', 'axis', 'arm'
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
 
 @dataclass(frozen=True)
@@ -207,12 +205,12 @@ class CatalogueEffect(Effect, metaclass=EffectType):
 
     Class attributes
     ----------------
-    card, arm_card : Card
-        The latter where an arm needs other words.
+    card, mechanism_card : Card
+        The latter where a mechanism needs other words than a 3-PPRS.
     needs_several_drives : bool
         Whether a single drive feels it as it feels another effect, always.
-    acts_in : set of {'platform', 'axis', 'arm'}
-        The kinds of models in which it can act: a 3-PPRS, a single axis, a serial arm.
+    acts_in : set of {'platform', 'slide', 'mechanism'}
+        The kinds of robots on which it can act: a 3-PPRS, one slide alone, every other one.
     linear, shape : tuple of Parameter
     parameters : tuple of Parameter
         Both.
@@ -255,7 +253,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     """
 
     card: ClassVar[Card]
-    arm_card: ClassVar[Card | None] = None
+    mechanism_card: ClassVar[Card | None] = None
     needs_several_drives: ClassVar[bool] = False
     acts_in: ClassVar[frozenset[str]] = frozenset({PLATFORM})
     linear: ClassVar[tuple[Parameter, ...]]
@@ -352,7 +350,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     @classmethod
     def card_in(cls, kind: str) -> Card:
         """Return the description for a kind of model."""
-        return cls.arm_card if kind == ARM and cls.arm_card is not None else cls.card
+        return cls.card if kind != MECHANISM else cls.mechanism_card or cls.card
 
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:

@@ -20,7 +20,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveRange, MeasurementEffect
-from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter, Wave
+from pprs_dynamics.physics.effects.effect import Card, Parameter, Wave
+from pprs_dynamics.physics.mechanism.places import MECHANISM
 
 TURN = 2 * math.pi
 
@@ -30,7 +31,7 @@ class EccentricEncoder(MeasurementEffect):
 
     name = 'eccentric_encoder'
     # Of a joint that turns, or of a drive whose motor is known to turn so often.
-    acts_in = frozenset({ARM})
+    acts_in = frozenset({MECHANISM})
     idealised = False
     nonlinear = True
     is_of_position = True

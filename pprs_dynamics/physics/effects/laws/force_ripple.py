@@ -61,7 +61,7 @@ class ForceRipple(DriveEffect):
         'coupling and repeat: cogging moves with the motor',
         'Van den Braembussche, Swevers, Van Brussel, Vanherck, Accurate tracking control of '
         'linear synchronous motor machine tool axes, Mechatronics 6, 1996')
-    arm_card = Card(
+    mechanism_card = Card(
         'A sin(2 pi q / p + phi) + A_2 sin(4 pi q / p + phi_2)',
         'a wave over the angle of the joint, always at the same places, both ways and at any '
         'speed; over time its frequency follows the speed',

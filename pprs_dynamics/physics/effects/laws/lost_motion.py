@@ -25,7 +25,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
 # On either side of the travel through the play, of its length: there the link may separate from the
 # flank. A polynomial through its motion before and after, as long as that, determines it.
@@ -40,7 +41,7 @@ class LostMotion(MeasurementEffect):
     """Backlash or play of what is between an encoder and the link that it is to measure."""
 
     name = 'lost_motion'
-    acts_in = frozenset({PLATFORM, ARM})
+    acts_in = frozenset({PLATFORM, MECHANISM})
     nonlinear = True
     not_linear_in: ClassVar[tuple[str, ...]] = ('play',)
     linear = (
