@@ -30,8 +30,9 @@ from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect
-from pprs_dynamics.physics.effects.effect import PLATFORM, CatalogueEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
+from pprs_dynamics.physics.mechanism.places import PLATFORM
 from pprs_dynamics.physics.three_pprs.forward_kinematics import (
     solve_forward_kinematics,
 )
@@ -192,7 +193,7 @@ def page(effect: type[CatalogueEffect]) -> str:
     rows = [f'| `{each.name}` | {each.symbol} | {each.unit} | {each.description} | '
             f'{"" if each.default is None else f"{each.default:g}"} |'
             for each in effect.parameters]
-    kinds = {'platform': '3-PPRS', 'axis': 'single axis', 'arm': 'arm or robot with loops'}
+    kinds = {'platform': '3-PPRS', 'slide': 'single axis', 'mechanism': 'arm or robot with loops'}
     return '\n'.join([
         f'# {effect.name}', '', (getdoc(effect) or '').splitlines()[0], '',
         '```text', card.equation, '```', '',

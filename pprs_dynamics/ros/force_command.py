@@ -79,7 +79,8 @@ _PARAMETERS = (
 
 def parameters_for(drives: int) -> tuple[NodeParameter, ...]:
     """Return the parameters of a node with so many drives."""
-    return tuple(replace(one, size=drives) if one.size else one for one in _PARAMETERS)
+    return tuple(replace(parameter, size=drives) if parameter.size else parameter
+                 for parameter in _PARAMETERS)
 
 
 class ForceCommand(NamedTuple):

@@ -87,8 +87,9 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._clocks: list[Timer] = []
         parameters: tuple[NodeParameter, ...] = PARAMETERS
         if is_mechanism(overrides(self)):
-            parameters = tuple(replace(one, default=ARM_WINDOW) if one.name == 'window' else one
-                               for one in PARAMETERS)
+            parameters = tuple(
+                replace(parameter, default=ARM_WINDOW) if parameter.name == 'window' else parameter
+                for parameter in PARAMETERS)
         self._settings = ModelParameters(self, parameters, self._use)
         node_values = self._settings.node_values
         prepare_beside(self, self._settings.model)

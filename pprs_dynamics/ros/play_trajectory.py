@@ -68,8 +68,9 @@ LONGEST_CATCH_UP = 0.1
 
 # Of an arm or a robot with loops: what goes with its model, given as to the other nodes.
 OF_JOINTS = tuple(
-    replace(one, default=EXCITATION, choices=(EXCITATION,)) if one.name == 'source' else one
-    for one in PARAMETERS if one.name not in ('file', 'lead_in'))
+    replace(parameter, default=EXCITATION, choices=(EXCITATION,))
+    if parameter.name == 'source' else parameter
+    for parameter in PARAMETERS if parameter.name not in ('file', 'lead_in'))
 
 
 class PlayTrajectoryNode(Node):

@@ -43,7 +43,7 @@ from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import drive_count, node_parameter
-from pprs_dynamics.ros.node.provenance import hardware_of
+from pprs_dynamics.ros.node.provenance import files_given, hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.senders import publishers_of
 from pprs_dynamics.ros.node.status import StatusReporter
@@ -73,14 +73,17 @@ class TrajectoryProxyNode(ExplainsRefusals):
         self._log = ThrottledLog(self)
         # Planners may leave derivatives out; feedforward, whose messages are short, refuses that.
         parameters = (ACTION, TIMEOUT, *(
-            replace(one, default=SPLINE) if one.name == 'missing_derivatives' else one
-            for one in parameters_for(drive_count(self)) if one.name in SHARED))
+            replace(parameter, default=SPLINE)
+            if parameter.name == 'missing_derivatives' else parameter
+            for parameter in parameters_for(drive_count(self)) if parameter.name in SHARED))
         self._settings = ModelParameters(self, parameters, lambda: None, drives=True)
         node_values = self._settings.node_values
         prepare(self._settings.model)
         self._counters = {'received': 0, 'passed_on': 0, 'refused': 0}
         self._status = StatusReporter(self, {'action': node_values['action']}, self._counters,
-                                      hardware_of(self._settings.model))
+                                      hardware_of(self._settings.model), self._refresh)
+        self._files = files_given(self.arguments)
+        self._refresh()
         self._relay = GoalRelay(self, FollowJointTrajectory, node_values['action'],
                                 lambda: self._settings.node_values['controller_timeout'])
         self._server = ActionServer(
@@ -89,11 +92,16 @@ class TrajectoryProxyNode(ExplainsRefusals):
         self._joints = RobotNames.of(self._settings.model).joints
         self._controller, self._hold_is_due = ControllerWatch(self._joints), False
         where = node_values['action'].rpartition('/')[0]
-        self._speed_scaling = 1.0  # the largest that the controller has told
+        self._speed_scaling = 1.0  # the largest that the controller has reported
         self._hold = publisher(self, JointTrajectory, f'{where}/joint_trajectory')
         subscription(self, JointTrajectoryControllerState, f'{where}/{STATE_TOPIC}',
                      self._on_controller)
         self._status.report('OK', 'WAITING', f'goals go to {node_values["action"]}')
+
+    def _refresh(self) -> None:
+        self._status.facts.update(
+            model={'files': self._files, 'sha256': self._settings.model.fingerprint},
+            changes=len(self._settings.history or ()))
 
     def _accept(self, goal: Any) -> GoalResponse:
         """Refuse a goal that breaks a rule, or asks for what the robot cannot do."""

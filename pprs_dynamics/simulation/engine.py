@@ -26,8 +26,7 @@ from pprs_dynamics.physics.mechanism.description import (
 )
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.mjcf import readable_spec
-from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
+from pprs_dynamics.physics.mechanism.tree_tables import JointFriction
 from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.robot_block import described_gravity
@@ -75,8 +74,6 @@ class MechanismEngine:
                    if reads_urdf and structure.links[name][0] and not _is_body(parameters)}
         if isinstance(model, PlatformMechanism):
             spec = mujoco.MjSpec.from_string(model.mjcf)
-        elif not model.is_described:
-            spec = _single_axis(mujoco, structure)
         elif is_mjcf:
             spec = readable_spec(mujoco, str(path))
         else:
@@ -398,15 +395,6 @@ def load_engine(purpose: str = 'the simulated robot') -> Any:
         # By default it writes MUJOCO_LOG.TXT into the user's folder; warnings are counted anyway.
         mujoco.set_mju_user_warning(lambda message: None)
     return mujoco
-
-
-def _single_axis(mujoco: Any, structure: Structure) -> Any:
-    """Return a carriage on a slide; its mass follows from the model's."""
-    spec, (joint,) = mujoco.MjSpec(), structure.description.joints.values()
-    carriage = spec.worldbody.add_body(name=joint.child)
-    carriage.mass, carriage.inertia, carriage.explicitinertial = LEAST, [LEAST] * 3, True
-    carriage.add_joint(name=joint.name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=joint.axis)
-    return spec
 
 
 def _is_body(parameters: Array) -> bool:

@@ -39,7 +39,8 @@ def error_on(model: DriveModel, recording: Path) -> float:
 def test_the_error_falls_and_the_secret_is_told_last(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, str(DEMO), str(tmp_path), '--seed', str(SEED), '--duration',
-         str(DURATION)], capture_output=True, text=True, env={**os.environ, 'COLUMNS': '160'})
+         str(DURATION)], capture_output=True, text=True, env={**os.environ, 'COLUMNS': '160'},
+        timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr
     hidden, = json.loads((tmp_path / 'truth.json').read_text())['effects']
     before, after = done.stdout.split(REVEALED)

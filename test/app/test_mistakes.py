@@ -60,7 +60,7 @@ MISTAKES = {
     'next-experiment run.csv --output x.yaml': ENDS + '.csv',
     'reproduce': '--output',
     'reproduce --output /dev/null/below': '/dev/null/below: cannot be a folder',
-    'reproduce --output x --model axis.yaml': 'single axis',
+    'reproduce --output x --model axis.yaml': 'must be a 3-PPRS',
     'simulate --output x.txt': ENDS + '.csv, .mcap, .db3',
     'simulate --output x.csv --noise -1': 'argument --noise: ',
     'simulate --output x.csv --path-seed -1': 'argument --path-seed: ',

@@ -80,7 +80,7 @@ def test_info_says_what_is_in_a_file_and_what_is_wrong_with_it(folder: Path) -> 
     for drive in DRIVES:
         assert drive in done.stdout
     content = json.loads((folder / 'info.json').read_text())['recordings'][0]
-    assert [finding['kind'] for finding in content['findings']] == ['gap']
+    assert 'gap' in [finding['kind'] for finding in content['findings']]
     assert len(content['segments']) == 2
     assert '1 gap' in done.stdout
 

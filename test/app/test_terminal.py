@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import shutil
@@ -111,16 +110,3 @@ def test_names_of_files_are_shown_and_written_as_they_are(folder: Path, name: st
     assert done.returncode == 0, done.stderr
     assert f'page: {shown.replace(".csv", ".html")}' in done.stdout.decode()
     (folder / page).read_text(encoding='utf-8')
-
-
-@pytest.mark.parametrize('place', [('info', '{}.csv'), ('info', 'a.csv', '--model', '{}.yaml'),
-                                   ('simulate', '--output', '{}.csv'), ('info', '--topic={}')])
-def test_a_name_that_would_fill_the_screen_is_shortened(
-    place: tuple[str, ...], capsys: pytest.CaptureFixture[str],
-) -> None:
-    from pprs_dynamics.app.commands.pprs import main
-
-    with contextlib.suppress(SystemExit):
-        assert main([part.format('a' * 5000) for part in place]) == 2
-    said = capsys.readouterr().err
-    assert 0 < len(said) < 900

@@ -103,9 +103,10 @@ def test_a_single_axis_has_the_same_session(tmp_path: Path) -> None:
     velocity, acceleration = np.gradient(position, time), np.gradient(
         np.gradient(position, time), time)
     values = DriveModel.load(AXIS).values
-    effort = (values['axis.mass'] * acceleration + values['axis.viscous'] * velocity
-              + values['axis.coulomb'] * np.tanh(velocity / values['friction.reversal_velocity'])
-              + values['axis.offset'] + SPRING * position
+    effort = (values['links.mass'][0] * acceleration + values['friction.viscous'][0] * velocity
+              + values['friction.coulomb'][0]
+              * np.tanh(velocity / values['friction.reversal_velocity'])
+              + values['friction.offset'][0] + SPRING * position
               + np.random.default_rng(0).normal(0, 0.3, len(time)))
     write_recording(tmp_path / 'axis.csv', Recording.from_arrays(
         'axis', time, position[:, None], velocity[:, None], effort[:, None], drives=('axis',)))

@@ -271,6 +271,7 @@ def test_adopt_refuse_export_undo(page: Page, folder: Path) -> None:
     (folder / 'elsewhere.csv').rename(run)
 
 
+@pytest.mark.slow
 def test_the_next_experiment_is_designed_and_downloaded(page: Page, folder: Path) -> None:
     page.tab.keyboard.press('4')
     page.tab.locator('#experiment-duration').fill('5')

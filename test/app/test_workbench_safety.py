@@ -303,13 +303,18 @@ def test_changes_are_pushed(bench: Workbench) -> None:
     with socket.create_connection(('127.0.0.1', bench.port), 30) as connection:
         connection.sendall(f'GET /api/events HTTP/1.1\r\nHost: {bench.host}\r\n'
                            f'Cookie: {bench.cookie}\r\n\r\n'.encode())
-        read = b''
+        read, end = b'', time.monotonic() + 60.0
+
+        def receive() -> bytes:
+            assert time.monotonic() < end
+            return connection.recv(4096)
+
         while b'data: 0' not in read:
-            read += connection.recv(4096)
+            read += receive()
         count = bench.settled()['version']
         bench.post('/api/tick', effect='payload_mass', revision=bench.screen()['revision'])
         while not any(int(number) > count for number in re.findall(rb'data: (\d+)\n', read)):
-            read += connection.recv(4096)
+            read += receive()
     bench.post('/api/tick', effect='payload_mass', is_ticked=False,
                revision=bench.screen()['revision'])
 

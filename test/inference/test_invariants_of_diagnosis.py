@@ -12,20 +12,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from planar_arm import planar_arm
+from single_axis import AXIS, axis_values
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.inference.adoption.loop import adopt_all
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.robot_block import AXIS
 
 RATE, DURATION = 200.0, 8.0  # [Hz, s]
 NOISE = 0.1  # [N]
 LATER = 4321.0  # [s] on the recording's clock
 # In units of effort: all of them are multiplied where the unit of effort is another.
-EFFORTS = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0}
-OTHERS = {'friction.reversal_velocity': 0.001}
+EFFORTS = 20.0, 40.0, 6.0, -2.0
 HIDDEN = {
     'nothing': {}, 'coulomb_friction': {'force': 1.2}, 'viscous_friction': {'coefficient': 12.0},
     'drive_spring': {'stiffness': 60.0, 'position': 0.02}, 'drive_inertia': {'mass': 2.0},
@@ -34,16 +33,14 @@ EFFECTS = [name for name in HIDDEN if name != 'nothing']
 
 
 def axis_model(scale: float = 1.0) -> DriveModel:
-    model = DriveModel.from_parameters(
-        {**OTHERS, **{key: scale * one for key, one in EFFORTS.items()}})
-    return model
+    return DriveModel.from_parameters(axis_values(*(scale * one for one in EFFORTS)))
 
 
 @cache
 def recorded(name: str, seed: int) -> Recording:
     """Return a recording of an axis with an effect, which differs by motion and noise."""
     effect = {f'effects.{name}.{AXIS}.{key}': one for key, one in HIDDEN[name].items()}
-    model = DriveModel.from_parameters({**EFFORTS, **OTHERS, **effect,
+    model = DriveModel.from_parameters({**axis_values(*EFFORTS), **effect,
                          'effects.active': [name] if effect else []})
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, DURATION, 1 / RATE)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from single_axis import AXIS
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.errors import MotionError
@@ -20,7 +21,6 @@ from pprs_dynamics.inference.diagnosis.live_diagnosis import (
 )
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
-from pprs_dynamics.physics.model.robot_block import AXIS
 
 RATE, LENGTH = 100.0, 20.0  # [Hz, s]
 SPRING = 300.0  # [N/m] that the model lacks
@@ -81,9 +81,9 @@ def test_a_change_is_claimed_on_the_second_window_that_shows_it_and_withdrawn_af
 
 def test_what_numbers_within_their_tolerance_explain_keeps_no_effect_alive() -> None:
     """The fit moves a mass that is known to 5 % only, which helps in every window."""
-    mass = axis().values['axis.mass']
-    model, robot = axis(**{'tolerances.axis.mass': 0.05}), axis(**{'axis.mass': 1.04 * mass})
-    pushed = axis(**{'axis.mass': 1.04 * mass, 'effects.active': ['drive_spring'],
+    mass = axis().values['links.mass'][0]
+    model, robot = axis(**{'tolerances.links.mass': 0.05}), axis(**{'links.mass': [1.04 * mass]})
+    pushed = axis(**{'links.mass': [1.04 * mass], 'effects.active': ['drive_spring'],
                      'effects.drive_spring.axis.stiffness': SPRING,
                      'effects.drive_spring.axis.position': 0.01})
     live = LiveDiagnosis(model)

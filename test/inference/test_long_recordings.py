@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from made_up_recordings import the_one
@@ -20,7 +22,7 @@ from pprs_dynamics.inference.residuals.long_recordings import (
 RATE = 100.0  # [Hz]: every sample is a block
 
 
-def axis(**effects: float) -> DriveModel:
+def axis(**effects: Any) -> DriveModel:
     model = DriveModel.load('config/single_axis.yaml')
     changed = DriveModel.from_parameters({**model.values, **{key.replace('__', '.'): value
                                               for key, value in effects.items()}})
@@ -94,7 +96,7 @@ def test_many_recordings_share_what_there_is() -> None:
 
 def test_an_hour_is_diagnosed_from_excerpts_and_compared_as_a_whole() -> None:
     given = DriveModel.load('config/single_axis.yaml')
-    whole = record(axis(axis__viscous=given.values['axis.viscous'] + 20.0), 3600.0)
+    whole = record(axis(friction__viscous=[given.values['friction.viscous'][0] + 20.0]), 3600.0)
     shares: list[float] = []
     answer = diagnose(given, whole, progress=lambda what, share: shares.append(share))
     assert answer.verdict == 'effect'

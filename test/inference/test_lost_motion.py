@@ -15,7 +15,6 @@ import pytest
 from planar_arm import planar_arm
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import UnknownNameError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
@@ -105,13 +104,6 @@ def test_loads_choose_the_flank() -> None:
     load = np.array([[5.0, -30.0], [5.0, 10.0]])
     error = effect.loaded_position_error(('slide_1', 'lift_1'), load)
     np.testing.assert_allclose(error, [[0.0, -0.002], [0.0, 0.002]], rtol=1e-12)
-
-
-def test_a_windup_of_nothing_in_an_older_file_is_none() -> None:
-    values = {'swing': {'backlash': 0.01, 'play': 0.0, 'windup': 0.0}}
-    assert LostMotion.from_file(values).drives == {'swing': {'backlash': 0.01, 'play': 0.0}}
-    with pytest.raises(UnknownNameError, match='windup'):
-        LostMotion.from_file({'swing': {**values['swing'], 'windup': 1e-5}})
 
 
 @pytest.mark.parametrize('size', [0.008, 0.03])

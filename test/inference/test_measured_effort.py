@@ -90,7 +90,7 @@ def platform_run() -> Run:
 
 def axis_run(gravity: float) -> Run:
     given = DriveModel.load('config/single_axis.yaml').values
-    model = DriveModel.from_parameters({**given, 'axis.gravity': gravity})
+    model = DriveModel.from_parameters({**given, 'robot.gravity': [0.0, 0.0, gravity]})
     time = np.arange(0, DURATION, 1 / RATE)
     q = np.zeros((3, len(time), 1))
     for rate, size in ((0.2, 0.1), (0.5, 0.05), (1.3, 0.01)):

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.inference.regression.collecting import Column, stacked_columns
+from pprs_dynamics.inference.regression.sensitivities import Column, stacked_columns
 from pprs_dynamics.inference.residuals.measuring import (
     join_tables,
     measure_residuals,

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from single_axis import AXIS, axis_values
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
@@ -23,11 +24,9 @@ from pprs_dynamics.inference.search.table import ModelTable
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.model.robot_block import AXIS
 
 TIME = np.arange(0.0, 8.0, 0.005)
-VALUES = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0,
-          'friction.reversal_velocity': 0.001}
+VALUES = axis_values(20.0, 40.0, 6.0, -2.0)
 HIDDEN = {
     'nothing': {},
     'spring': {'drive_spring': {'stiffness': 60.0, 'position': 0.02}},

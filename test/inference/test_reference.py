@@ -22,7 +22,7 @@ from pprs_dynamics.inference.diagnosis.diagnosis import SinceReference
 from pprs_dynamics.inference.diagnosis.sentences import word_reference
 from pprs_dynamics.inference.fit.reference import Reference, ReferenceRunError
 from pprs_dynamics.inference.fit.reference_runs import read_reference
-from pprs_dynamics.inference.regression.carried_over import CarriedOver
+from pprs_dynamics.inference.regression.base_columns import CarriedOver
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive

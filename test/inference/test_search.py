@@ -5,39 +5,34 @@
 
 from __future__ import annotations
 
-from itertools import chain, combinations, repeat
+from itertools import combinations
 
 import numpy as np
 import pytest
+from single_axis import AXIS, axis_values
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.regression import design as design_module
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.search import relinearisation
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,
     linear_prediction,
+    next_operating_point,
     squared,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.relinearisation import (
-    linearised,
-    next_operating_point,
-)
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.inference.search.table import Row, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.robot_block import AXIS
 
-AXIS_VALUES = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0,
-               'friction.reversal_velocity': 0.001}
+AXIS_VALUES = {**axis_values(20.0, 40.0, 6.0, -2.0)}
 SMALL = ('coulomb_friction', 'viscous_friction', 'quadratic_friction', 'effort_offset',
          'drive_spring', 'drive_inertia', 'effort_gain')
 MODEL = DriveModel.load()
@@ -173,26 +168,6 @@ def test_what_a_set_costs_by_its_exact_forces_does_not_depend_on_where_it_was_fo
     assert costs[0] < tilted.total
 
 
-def test_a_set_of_which_no_step_lowers_the_exact_error_stands_for_the_best_model_so_far(
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    fits = FittedSets(Design.of(MODEL, [recording_of({'base_tilt': {'x': 0.1, 'y': -0.05}})]),
-                      DECISIONS)
-    point = next_operating_point(fits, fits.evaluate((TILTED,)))
-    assert point is not None
-    around = FittedSets(fits.design.around(point), DECISIONS, fits.regression.error_scale)
-    free = around.evaluate((TILTED,))
-    # Far from linear, and every step leaves more than the point does.
-    losses = chain([100.0, 100.0, 0.0], repeat(100.0))
-    monkeypatch.setattr(relinearisation, 'squared', lambda *given: next(losses))
-    last, held = linearised(around, free)
-    assert last is around
-    assert not np.allclose(exact_forces(fits.design, fitted_model(around, free)),
-                           around.design.forces, atol=1e-3)
-    np.testing.assert_allclose(exact_forces(fits.design, fitted_model(around, held)),
-                               around.design.forces, atol=1e-6)
-    assert held.total > free.total
-
-
 def test_a_relinearised_set_is_on_the_drives_where_it_costs_least() -> None:
     hidden = {drive: {'zero': 0.004} for drive in DRIVES[:2]}
     fits = FittedSets(Design.of(MODEL, [recording_of({'homing_error': hidden})]), DECISIONS)
@@ -226,7 +201,7 @@ def test_a_wrench_on_guides_that_feel_it_hides_no_effect_and_makes_none() -> Non
 
 
 def test_coulomb_and_viscous_friction_are_two_and_not_one_that_is_asymmetric() -> None:
-    hidden = {'coulomb_friction': {'lift_1': {'force': 1.0}},
+    hidden = {'coulomb_friction': {'lift_1': {'force': 0.5}},
               'viscous_friction': {'lift_1': {'coefficient': 12.0}}}
     found = tabulate(MODEL, [recording_of(hidden)], DECISIONS)
     assert names(found.best.fitted) == ['coulomb_friction', 'viscous_friction']

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from single_axis import AXIS, axis_values
 
 from benchmarks.hidden.recordings import tolerant_model
 from pprs_dynamics import DriveModel, JointMotion
@@ -22,17 +23,16 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.robot_block import AXIS
 
 pytestmark = pytest.mark.slow
 
 # Powers of s and k by which base units scale.
 POWERS = {'1': (0.0, 0.0), 'rad': (0.0, 0.0), 'm': (1.0, 0.0), 's': (0.5, 0.0), 'N': (0.0, 1.0),
           'kg': (0.0, 1.0)}
-AXIS_VALUES = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0,
-               'friction.reversal_velocity': 0.001, 'tolerances.axis.mass': 0.02}
-UNITS = {'axis.mass': 'kg', 'axis.viscous': 'N s/m', 'axis.coulomb': 'N', 'axis.offset': 'N',
-         'friction.reversal_velocity': 'm/s', 'tolerances.axis.mass': '1'}
+AXIS_VALUES = {**axis_values(20.0, 40.0, 6.0, -2.0), 'tolerances.links.mass': 0.02}
+UNITS = {'links.mass': 'kg', 'friction.viscous': 'N s/m', 'friction.coulomb': 'N',
+         'friction.offset': 'N',
+         'friction.reversal_velocity': 'm/s', 'tolerances.links.mass': '1'}
 HIDDEN: dict[str, dict[str, Mapping[str, float]]] = {
     'nothing': {},
     'spring and mass': {'drive_spring': {'stiffness': 30.0, 'position': 0.02},

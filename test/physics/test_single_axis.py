@@ -6,14 +6,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from pprs_command import pprs
-from ros_processes import environment, executable
+from single_axis import AXIS, axis_values
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.errors import ModelError, MotionError
@@ -26,14 +25,14 @@ from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
+from pprs_dynamics.physics.model.keys import set_number
+from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import read_parameters
-from pprs_dynamics.physics.model.robot_block import AXIS
 
 CONFIG = Path(__file__).parents[2] / 'config'
 FILE = CONFIG / 'single_axis.yaml'
 MASS, VISCOUS, COULOMB, OFFSET, WIDTH = 20.0, 40.0, 6.0, -2.0, 0.001
-VALUES = {'axis.mass': MASS, 'axis.viscous': VISCOUS, 'axis.coulomb': COULOMB,
-          'axis.offset': OFFSET, 'friction.reversal_velocity': WIDTH}
+VALUES = axis_values(MASS, VISCOUS, COULOMB, OFFSET, width=WIDTH)
 SPRING, CENTRE = 55.0, 0.03  # N/m, m: hidden
 NOISE, RATE = 0.05, 500.0
 EQUAL = 1e-12
@@ -71,8 +70,7 @@ def bench(seed: int, hidden: bool = True, duration: float = 20.0, offset: float 
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a model file and two recordings of an axis with a hidden spring."""
     folder = tmp_path_factory.mktemp('axis')
-    lines = [f'    {key}: {value!r}' for key, value in VALUES.items()]
-    (folder / 'axis.yaml').write_text('\n'.join(['/**:', '  ros__parameters:', *lines, '']))
+    write_model(folder / 'axis.yaml', VALUES)
     write_recording(folder / 'run.csv', bench(1))
     write_recording(folder / 'other.mcap', bench(2, duration=12.0))
     return folder
@@ -81,7 +79,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize('gravity', [0.0, -9.81])
 def test_the_force_is_the_textbooks(gravity: float) -> None:
     time, q, q_dot, q_ddot = sweep(3.0)
-    model = DriveModel.from_parameters({**VALUES, 'axis.gravity': gravity})
+    model = DriveModel.from_parameters({**VALUES, 'robot.gravity': [0.0, 0.0, gravity]})
     forces = model.drive_forces(JointMotion(q[:, None], q_dot[:, None], q_ddot[:, None], time))
     np.testing.assert_allclose(forces.total[:, 0], textbook_force(q_dot, q_ddot, gravity),
                                rtol=0, atol=1e-9)
@@ -89,7 +87,8 @@ def test_the_force_is_the_textbooks(gravity: float) -> None:
 
 
 def test_a_vertical_axis_at_rest_is_held_against_its_weight() -> None:
-    model = DriveModel.from_parameters({**VALUES, 'axis.offset': 0.0, 'axis.gravity': -9.81})
+    model = DriveModel.from_parameters({**VALUES, 'friction.offset': [0.0],
+                                        'robot.gravity': [0.0, 0.0, -9.81]})
     rest = np.zeros((1, 1))
     assert model.drive_forces(JointMotion(rest, rest, rest)).total[0, 0] == MASS * 9.81
 
@@ -108,16 +107,16 @@ def test_an_effect_adds_its_closed_form_and_changes_nothing_else() -> None:
 
 
 def test_the_shipped_file_is_found_by_its_name() -> None:
-    assert DriveModel.load(FILE).kind == 'axis'
+    assert DriveModel.load(FILE).kind == 'slide'
     assert DriveModel.load('config/single_axis.yaml').values == DriveModel.load(FILE).values
 
 
 @pytest.mark.parametrize(('change', 'sentence'), [
-    ({'axis.mass': 0.0}, 'axis.mass is 0.0, must be greater than 0'),
-    ({'axis.coulomb': -1.0}, 'axis.coulomb is -1.0'),
-    ({'axis.masss': 1.0}, 'did you mean axis.mass?'),
+    ({'links.mass': [0.0]}, 'move a body: no link that it moves has a mass'),
+    ({'friction.coulomb': [-1.0]}, 'friction.coulomb is [-1.0]'),
+    ({'links.masss': [1.0]}, 'did you mean links.mass?'),
     ({'masses.platform': 1.0}, 'unknown key masses.platform'),
-    ({'tolerances.axis.mass': 2.0}, 'between 0 and 1'),
+    ({'tolerances.links.mass': 2.0}, 'between 0 and 1'),
     ({'tolerances.masses.payload': 0.1}, 'unknown key tolerances.masses.payload'),
     ({'effects.payload_mass.mass': 0.1}, 'be an effect that acts in a single axis'),
     ({'effects.homing_error.axis.zero': 0.001}, 'be an effect that acts in a single axis'),
@@ -136,14 +135,6 @@ def test_a_robot_has_no_drive_axis() -> None:
         DriveModel.from_parameters(values)
 
 
-def test_a_missing_key_of_an_axis_is_named() -> None:
-    for key in VALUES:
-        if key != 'axis.offset':
-            with pytest.raises(ModelError, match=f'{key} is missing'):
-                DriveModel.from_parameters(
-                    {name: value for name, value in VALUES.items() if name != key})
-
-
 def test_motion_comes_from_positions_of_the_drive_alone() -> None:
     time, _, q_dot, q_ddot = sweep(20.0, 1)
     found = reconstruct(DriveModel.from_parameters(VALUES), bench(1))
@@ -160,9 +151,11 @@ def test_a_recording_of_other_drives_is_refused_by_name() -> None:
 
 
 def test_columns_of_numbers_are_what_the_model_changes_by() -> None:
-    tolerances = {f'tolerances.{key}': 0.1 for key in VALUES}
+    tolerances = {f'tolerances.{key}': 0.1 for key in (
+        'links.mass', 'friction.viscous', 'friction.coulomb', 'friction.offset',
+        'friction.reversal_velocity')}
     model = DriveModel.from_parameters(
-        {**VALUES, 'axis.gravity': -9.81, 'tolerances.axis.gravity': 0.1,
+        {**VALUES, 'robot.gravity': [0.0, 0.0, -9.81], 'tolerances.robot.gravity': 0.1,
                          **tolerances})
     design = Design.of(model, [bench(1)])
     for column in design.base:
@@ -171,8 +164,9 @@ def test_columns_of_numbers_are_what_the_model_changes_by() -> None:
         value, moved = column.number.value, 0.001
         # Away from 0 by a share of one standard deviation.
         after = value + np.sign(value) * moved * column.number.deviation
-        other = Design.of(DriveModel.from_parameters(
-            {**model.values, column.number.key: after}), [bench(1)])
+        values = dict(model.values)
+        set_number(values, column.number.key, column.number.element, float(after))
+        other = Design.of(DriveModel.from_parameters(values), [bench(1)])
         change = (other.residuals.model - design.residuals.model)[:, 0] / moved
         np.testing.assert_allclose(column.rows[0], change, rtol=0,
                                    atol=2e-3 * np.abs(change).max())
@@ -199,7 +193,7 @@ def test_a_number_below_zero_of_a_robot_moves_the_way_it_is_told_to() -> None:
 
 
 def test_an_offset_that_is_known_roughly_is_found_within_its_tolerance() -> None:
-    model = DriveModel.from_parameters({**VALUES, 'tolerances.axis.offset': 1.0})
+    model = DriveModel.from_parameters({**VALUES, 'tolerances.friction.offset': 1.0})
     design = Design.of(model, [bench(3, hidden=False, offset=-0.5)])
     found = FittedSets(design, DECISIONS).evaluate(())
     place, number = next((k, column.number) for k, column in enumerate(design.base)
@@ -241,7 +235,7 @@ def test_diagnose_names_the_hidden_effect_and_writes_a_model_that_has_it(folder:
     stiffness = values['axis.stiffness']
     assert abs(stiffness['value'] - SPRING) < 4 * stiffness['std'] + 0.01 * SPRING
     better = DriveModel.load(folder / 'better.yaml')
-    assert better.kind == 'axis'
+    assert better.kind == 'slide'
     assert better.values['effects.active'] == ('drive_spring',) or better.values[
         'effects.active'] == ['drive_spring']
     after = pprs('compare', 'other.mcap', '--model', 'better.yaml', '--json', 'after.json',
@@ -266,14 +260,3 @@ def test_nothing_is_missing_where_nothing_is(folder: Path) -> None:
     assert done.returncode == 0, done.stderr
     found = json.loads((folder / 'right.json').read_text())
     assert (found['verdict'], found['effects']) == ('adequate', [])
-
-
-@pytest.mark.parametrize('node', ['feedforward', 'monitor', 'simulated_robot'])
-def test_a_node_refuses_an_axis_in_one_sentence(node: str, ros_domain: int) -> None:
-    done = subprocess.run(
-        [executable(node), '--ros-args', '--params-file', str(FILE)],
-        env=environment(ros_domain), capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2
-    assert next(line for line in done.stderr.splitlines() if 'axis.' in line).count(
-        'needs a 3-PPRS') == 1
-    assert 'Traceback' not in done.stderr

@@ -25,7 +25,7 @@ from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.mechanism.tree_equations import DETERMINANT, Data
+from pprs_dynamics.physics.mechanism.tree_tables import DETERMINANT, Data
 
 SAMPLES = 30
 ROBOTS = {'hexapod': robots.hexapod, 'delta': robots.delta, 'five_bar': robots.five_bar,

@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+import json
 import signal
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,15 +17,16 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Duration
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench
-from node_bench import Bench, bench, overrides
+from node_bench import LATCHED, Bench, bench, overrides
 from rclpy.parameter import Parameter
 from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.physics.model.parameter_file import read_parameters
+from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.monitor import MonitorNode
 
@@ -196,6 +199,25 @@ def test_the_executable_takes_an_arms_file_and_finds_the_urdf_beside_it(
         assert process.wait(10) == 0
     np.testing.assert_allclose([one.data for one in commands], model.drive_forces(moved).total,
                                rtol=0, atol=EQUAL)
+
+
+def test_two_nodes_in_one_process_each_have_their_own_files(tmp_path: Path) -> None:
+    """A relative URDF counts from the file of its node, not from that of the other."""
+    interval = sys.getswitchinterval()
+    with bench() as running:
+        for name in ('left', 'right'):
+            (tmp_path / name).mkdir()
+            given = arm.write_arm(tmp_path / name, **FRICTION)
+            node: Any = running.add(FeedforwardNode, namespace=name, cli_args=[
+                '--ros-args', '--params-file', str(given)])
+            assert node.get_parameter('robot.urdf').value == str(given.with_name('made_up.urdf'))
+            status: list[Any] = []
+            running.probe.create_subscription(
+                String, f'/{name}/feedforward/status',
+                lambda message, status=status: status.append(json.loads(message.data)), LATCHED)
+            assert running.spin_until(lambda status=status: status)
+            assert status[-1]['model']['files'][0]['file'] == str(given)
+    assert sys.getswitchinterval() == interval
 
 
 def test_the_monitor_tells_what_the_model_of_an_arm_lacks(

@@ -149,20 +149,6 @@ class TestTrajectoryProxy:
             assert objection(taken[0], settings(), NOW) == ''
             assert list(taken[0].joint_names) == list(DRIVES)
 
-    @pytest.mark.nodes
-    def test_points_without_derivatives_get_them_from_a_spline(self, action: Any) -> None:
-        with controller(action) as (bench, client, taken):
-            times = np.arange(0, 40) / 20.0
-            expected = DriveModel.load().drive_forces(HelicalPath().motion(times))
-            goal = action.Goal()
-            goal.trajectory.joint_names = list(DRIVES)
-            for time, position in zip(times, expected.drive_motion[0], strict=True):
-                goal.trajectory.points.append(point(time, position, np.zeros(0), np.zeros(0)))
-            result = answered(bench, client, goal)
-            assert result.result.error_code == 0, result.result.error_string
-            efforts = np.array([one.effort for one in taken[0].points])
-            # A spline's ends know nothing of what came before.
-            np.testing.assert_allclose(efforts[8:-9], expected.total[8:-8], atol=0.05)
 
     @pytest.mark.nodes
     def test_a_goal_that_breaks_a_rule_is_refused_when_it_is_asked(self, action: Any) -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 import time
 from itertools import pairwise
 from typing import Any
@@ -84,37 +83,6 @@ def test_the_process_answers_and_is_started_anew_where_it_was_killed() -> None:
     finally:
         worker.close()
     assert not worker.busy
-
-
-def test_a_window_is_given_away_at_once_whatever_the_process_does() -> None:
-    model, worker = DriveModel.load(), DiagnosisWorker()
-    count = 30_000  # a minute at 500 Hz, more than a pipe holds
-    still = StreamWindow(EPOCH + np.arange(count) * SECOND // 500, np.zeros((count, 6)),
-                         np.zeros((count, 6)))
-
-    def submit() -> None:
-        giving = threading.Thread(
-            target=worker.submit, args=(model.values, model.source, still), daemon=True)
-        giving.start()
-        giving.join(10.0)
-        assert not giving.is_alive()
-
-    try:
-        submit()
-        assert 'stands' in waited_for(worker)['note']
-        os.kill(worker._process.pid, signal.SIGSTOP)
-        submit()
-        assert worker.poll() is None
-        os.kill(worker._process.pid, signal.SIGCONT)
-        assert 'stands' in waited_for(worker)['note']
-        os.kill(worker._process.pid, signal.SIGSTOP)
-        submit()
-        os.kill(worker._process.pid, signal.SIGKILL)  # as the system does where memory runs out
-        assert 'ended' in waited_for(worker)['error']
-    finally:
-        if worker._process is not None:
-            worker._process.kill()
-        worker.close()
 
 
 def waited_for(worker: DiagnosisWorker) -> dict[str, Any]:

@@ -81,24 +81,6 @@ def test_stale_commands_are_held_without_an_effect_that_fails_at_rest(package: A
 
 
 @pytest.mark.nodes
-def test_a_rejected_message_leaves_no_trace_in_the_memory(package: ModuleType) -> None:
-    with feedforward_bench(**parameters('worn_brake')) as node:
-        def samples() -> int:
-            return int(node.node._feedforward._memory.memories['worn_brake']['slide_2']['samples'])
-
-        node.answer(message_of(MOTION))
-        assert samples() == 1
-        # The whole trajectory passes, and the step of the memory to its first point fails.
-        fail(package, 'columns_2')
-        node.send(message_of(MOTION))
-        assert node.counters['EFFECT'] == 1
-        assert samples() == 1
-        fail(package, 'nowhere')
-        node.answer(message_of(MOTION))
-        assert samples() == 2
-
-
-@pytest.mark.nodes
 @pytest.mark.parametrize('place', ['__init__', 'drive_memory'])
 def test_a_parameter_that_an_effect_fails_at_is_refused_with_the_reason(
     package: ModuleType, place: str,

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 from node_bench import bench, overrides
 from ros_processes import executable, node_process
 from std_msgs.msg import Float64MultiArray
@@ -72,22 +71,6 @@ def test_a_supervisor_leads_it_through_its_states(
     assert supervisor.change(Transition.TRANSITION_UNCONFIGURED_SHUTDOWN)
     assert supervisor.state() == 'finalized'
     assert node.wait_for_status(code='FINALIZED')
-
-
-def test_a_transition_that_rclpy_raises_at_is_refused(
-    supervised: tuple[FeedforwardBench, Supervisor],
-) -> None:
-    node, supervisor = supervised
-    service, = (each for each in node.node.services if each.srv_name.endswith('/change_state'))
-
-    def raises(request: ChangeState.Request, response: ChangeState.Response) -> None:
-        raise RuntimeError('Transition is not registered.')
-
-    # As rclpy of Jazzy does at an activation before the configuration.
-    allowed, service.callback = service.callback, node.node._refusing(raises)
-    assert not supervisor.change(Transition.TRANSITION_ACTIVATE)
-    service.callback = allowed
-    assert supervisor.change(Transition.TRANSITION_CONFIGURE)
 
 
 def held(motion: PlatformMotion) -> np.ndarray:

@@ -22,7 +22,7 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS
 
@@ -202,18 +202,6 @@ def test_damaged_messages_are_counted_explained_silent_and_survived(
     assert all(np.isfinite(command.data).all() for command in feedforward.commands)
     # EFFECT is no message's fault: test_failing_effects.py
     assert {code for code in REJECTIONS if not feedforward.counters[code]} == {'EFFECT'}
-
-
-def test_independent_chains_refuse_near_a_right_angle_and_never_publish_its_force() -> None:
-    upright = np.array([[0.05, 0.0, 0.5]])  # cos u_1 = (0.15 - 0.05 - 0.1) / 0.3 = 0
-    twist = np.array([[0.1, 0.2, 0.3]])
-    with feedforward_bench(friction__approach='independent_chains') as node:
-        motion = PlatformMotion(upright, [[0, 0, 0, 1.0]], twist, twist, twist, twist)
-        node.send(message_of(motion))
-        assert node.node._counters['SINGULAR'] == 1
-        away = PlatformMotion(upright - [[0.1, 0, 0]], [[0, 0, 0, 1.0]], twist, twist, twist, twist)
-        assert np.abs(node.answer(message_of(away))).max() < 100.0
-        assert len(node.commands) == 1
 
 
 def test_a_parameter_change_acts_on_the_next_message_and_a_bad_one_on_none(

@@ -17,7 +17,6 @@ from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
-    ListParameters,
     SetParameters,
     SetParametersAtomically,
 )
@@ -98,15 +97,6 @@ def test_effects_come_and_go_with_their_topics_while_running(caller: Caller) -> 
     assert node.answer(MESSAGE) == plain.tolist()
 
 
-def test_an_effect_of_measurement_enters_no_command(caller: Caller) -> None:
-    plain = caller.node.answer(MESSAGE)
-    assert caller.set('effects.effort_gain.lift_1.gain', 0.2).successful
-    result = caller.set('effects.active', ['effort_gain'])
-    assert result.successful, result.reason
-    assert caller.node.answer(MESSAGE) == plain
-    assert not caller.bench.probe.count_publishers('/feedforward/effort/effort_gain')
-
-
 REFUSED = [
     ('masses.payload', -1.0, 'masses.payload is -1.0, must be at least 0'),
     ('masses.paylod', 1.0, 'did you mean masses.payload'),
@@ -129,23 +119,6 @@ def test_what_is_not_allowed_is_refused_with_name_value_and_rule(caller: Caller)
         assert not result.successful, name
         assert told in result.reason
     assert caller.node.answer(MESSAGE) == plain
-
-
-def test_every_parameter_says_what_it_is_and_numbers_say_their_range(caller: Caller) -> None:
-    assert caller.set('effects.effort_offset.lift_1.force', 0.1).successful
-    names = caller.call(ListParameters, 'list_parameters').result.names
-    own = [name for name in names if not name.startswith(('qos_overrides.', 'use_sim_time',
-                                                          'start_type_description_service'))]
-    assert {'command_timeout', 'geometry.rod_length', 'effects.active',
-            'effects.effort_offset.lift_1.force'} <= set(own)
-    described = caller.call(DescribeParameters, 'describe_parameters', names=own).descriptors
-    for descriptor in described:
-        assert descriptor.description, descriptor.name
-        assert descriptor.additional_constraints.startswith('must '), descriptor.name
-    ranges = {each.name: each.floating_point_range for each in described}
-    assert ranges['feedforward_scale'][0].to_value == 1.0
-    assert ranges['masses.payload'][0].from_value == 0.0
-    assert ranges['effects.effort_offset.lift_1.force'][0].to_value > 0
 
 
 def types(caller: Caller, *names: str) -> list[int]:
@@ -173,13 +146,6 @@ def test_whole_numbers_and_empty_lists_keep_the_declared_type(caller: Caller) ->
     empty = caller.set('effort_limits', [])
     assert empty.successful, empty.reason
     assert types(caller, *names) == wanted
-
-
-def test_the_ledger_of_a_model_is_no_parameter() -> None:
-    with feedforward_bench(history__step_01__effect='coulomb_friction',
-                           history__step_01__error_before=1.0) as node:
-        assert not node.node.get_parameters_by_prefix('history')
-        assert node.answer(MESSAGE)
 
 
 def test_topics_have_the_qos_that_is_asked_for() -> None:

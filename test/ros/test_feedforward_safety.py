@@ -15,7 +15,6 @@ from feedforward_bench import EQUAL, feedforward_bench, message_of, random_motio
 from node_bench import overrides
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
@@ -75,21 +74,6 @@ def test_clamping_never_lets_a_number_through_that_is_none() -> None:
         assert node.counters['OUTPUT'] == 1
         node.answer(message_of(motion))
         assert len(node.commands) == 1
-
-
-def test_the_scale_multiplies_everything_that_goes_out_and_what_is_compared_with_limits() -> None:
-    limits = (np.abs(FORCES.total).max(axis=0) * 0.5).tolist()
-    with feedforward_bench(feedforward_scale=0.25, effort_limits=limits) as node:
-        part = node.bench.listen(JointState, '/feedforward/effort/rigid_body')
-        assert node.bench.spin_until(
-            lambda: node.node.count_subscribers('/feedforward/effort/rigid_body'))
-        found = node.answer(message_of(MOTION))
-        np.testing.assert_allclose(found, 0.25 * FORCES.total[0], rtol=0, atol=EQUAL)
-        assert node.bench.spin_until(lambda: part and node.joint_trajectory)
-        np.testing.assert_allclose(
-            part[-1].effort, 0.25 * FORCES.parts['rigid_body'][0], rtol=0, atol=EQUAL)
-        np.testing.assert_allclose([p.effort for p in node.joint_trajectory[-1].points],
-                                   0.25 * FORCES.total, rtol=0, atol=EQUAL)
 
 
 @pytest.mark.parametrize('action', ['hold_gravity', 'zero', 'silent'])
@@ -202,20 +186,6 @@ def test_warnings_come_before_the_rejection() -> None:
         assert status['singularity_margin'] == pytest.approx(0.1, abs=0.01)
         node.send(message_of(at(sine(-0.1), 0.5)))
         assert node.counters['SINGULAR'] == 1
-
-
-def test_beyond_the_range_of_a_measured_curve_is_announced() -> None:
-    curve = 'effects__measured_curve__lift_1__'
-    height = 0.3 * np.sqrt(1 - 1 / 36)
-    with feedforward_bench(**{
-            'effects__active': ['measured_curve'], f'{curve}variable': 'position',
-            f'{curve}from': 0.1, f'{curve}to': 0.3,
-            f'{curve}values': [0.0, 1.0, 1.0, 0.0]}) as node:
-        node.answer(message_of(at(0.0, 0.2 + height)))
-        assert node.wait_for_status(code='OK')
-        node.answer(message_of(at(0.0, 0.4 + height)))
-        status = node.wait_for_status(code='CURVE', level='WARN')
-        assert 'lift_1: position 0.4 is outside of 0.1 to 0.3' in status['message']
 
 
 def test_late_messages_are_rejected_and_do_not_keep_alive() -> None:

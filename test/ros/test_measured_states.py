@@ -137,13 +137,3 @@ def test_what_breaks_a_rule_in_a_part_is_refused_and_the_rest_goes_on(robot: Rob
     assert len(robot.said) == 2
     assert robot.said[1].startswith('NON_FINITE')
     robot.check([k * PERIOD for k in range(6) if k != 3])
-
-
-def test_a_gap_is_one_also_in_a_stream_that_is_ahead_of_the_others(robot: Robot) -> None:
-    robot.send(['a'], -PERIOD)
-    for k in range(40):
-        if not 20 < k < 26:
-            robot.send(['b', 'c'], k * PERIOD)
-    for k in range(39):
-        robot.send(['a'], k * PERIOD)
-    robot.check([k * PERIOD for k in range(39) if not 20 < k < 26])

@@ -136,25 +136,6 @@ def test_efforts_beyond_the_limits_saturate_and_are_told(robot: RobotBench) -> N
     assert np.abs([state.effort for state in robot.states]).max() < 101.0
 
 
-def test_wrong_efforts_are_refused(robot: RobotBench) -> None:
-    for data in ([1.0] * 5, [float('inf')] * 6, []):
-        robot.efforts.publish(Float64MultiArray(data=data))
-    assert robot.bench.spin_until(lambda: robot.node._counters['refused'] == 3)
-
-
-def test_without_a_timeout_the_last_setpoint_stays_in_force() -> None:
-    goal = REST + np.array([0, 0, 0, 0.01, 0.01, 0.01])
-    with bench() as running:
-        robot = RobotBench(running, command_timeout=0.0)
-        robot.setpoint.publish(robot.command(goal))
-        assert running.spin_until(robot.says('OK'))
-        assert running.spin_until(lambda: np.allclose(robot.position, goal, rtol=0, atol=5e-4), 20)
-        running.spin_for(0.5)
-        codes = [status['code'] for status in running.status]
-        assert 'HOLD' not in codes[codes.index('OK'):]
-        np.testing.assert_allclose(robot.position, goal, atol=5e-4)
-
-
 def test_a_hidden_effect_acts() -> None:
     with bench() as running:
         robot = RobotBench(running, hidden_effects=['effort_offset'], seed=4, effort_noise=0.0,

@@ -165,8 +165,9 @@ def test_a_simulated_axis_moves_its_mass_against_the_friction_of_its_file() -> N
     values, v = AXIS.values, run.motion.velocity
     width = values['friction.reversal_velocity']
     assert run.effort == pytest.approx(
-        values['axis.mass'] * run.motion.acceleration + values['axis.viscous'] * v
-        + values['axis.coulomb'] * np.tanh(v / width) + values['axis.offset'], abs=1e-8)
+        values['links.mass'][0] * run.motion.acceleration + values['friction.viscous'][0] * v
+        + values['friction.coulomb'][0] * np.tanh(v / width) + values['friction.offset'][0],
+        abs=1e-8)
 
 
 @pytest.mark.parametrize('name', NAMES)

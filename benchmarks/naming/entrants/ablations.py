@@ -26,10 +26,10 @@ from pprs_dynamics.inference.search.candidates import (
     DURING,
     SINCE,
     CandidateSet,
+    CostTerms,
     Course,
     PriorCosts,
 )
-from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.table import Row

@@ -99,8 +99,8 @@ class AdoptionResult(Result):
     def table(self) -> DataFrame:
         """Return a row per parameter: its value, std and unit."""
         found = self.adoption.parameters
-        return data_frame([{'value': one.value, 'std': one.std, 'unit': one.unit}
-                           for one in found.values()], list(found), 'parameter')
+        return data_frame([{'value': entry.value, 'std': entry.std, 'unit': entry.unit}
+                           for entry in found.values()], list(found), 'parameter')
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, after, and the noise."""
@@ -174,10 +174,10 @@ class AdoptionRunResult(Result):
     def table(self) -> DataFrame:
         """Return a row per step: the effect, whether it was adopted, errors [N], the reason."""
         return data_frame([
-            {'effect': one.effect, 'adopted': one.adopted, 'error_before': one.error_before,
-             'error_after': one.error_after, 'held_out_before': one.held_out_before,
-             'held_out_after': one.held_out_after, 'reason': one.reason}
-            for one in self.run.steps])
+            {'effect': step.effect, 'adopted': step.adopted, 'error_before': step.error_before,
+             'error_after': step.error_after, 'held_out_before': step.held_out_before,
+             'held_out_after': step.held_out_after, 'reason': step.reason}
+            for step in self.run.steps])
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before all, after all, and the noise.

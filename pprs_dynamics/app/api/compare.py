@@ -74,7 +74,7 @@ class ComparisonResult(Result):
         """Return what `pprs compare --json` writes."""
         content = {**self.comparison.to_dict(), 'verdict': self.verdict,
                    'effort_looks_like': effort_looks_like(
-                       one.findings for one in self.inputs.fitted)}
+                       recording.findings for recording in self.inputs.fitted)}
         return content if self.beside is None else {**content, 'beside': self.beside.to_dict()}
 
     def view(self, details: bool = False) -> Any:
@@ -105,9 +105,10 @@ class ComparisonResult(Result):
     def table(self) -> DataFrame:
         """Return a row per drive: rms, bias, peak, noise [N], relative error and grade."""
         drives = self.comparison.drives
-        return data_frame([{'rms': one.rms, 'relative': one.relative, 'bias': one.bias,
-                            'peak': one.peak, 'noise': one.noise_floor, 'grade': one.grade,
-                            'unit': one.unit} for one in drives.values()], list(drives), 'drive')
+        return data_frame([{'rms': drive.rms, 'relative': drive.relative, 'bias': drive.bias,
+                            'peak': drive.peak, 'noise': drive.noise_floor, 'grade': drive.grade,
+                            'unit': drive.unit} for drive in drives.values()],
+                          list(drives), 'drive')
 
     def plot(self) -> Figure:
         """Return a picture: error and noise of every drive, and the worst drive over time."""
@@ -115,9 +116,9 @@ class ComparisonResult(Result):
 
         drives = self.comparison.drives
         figure = plot_errors(
-            {'error': {name: one.rms for name, one in drives.items()},
-             'noise': {name: one.noise_floor for name, one in drives.items()
-                       if one.noise_floor is not None}},
+            {'error': {name: drive.rms for name, drive in drives.items()},
+             'noise': {name: drive.noise_floor for name, drive in drives.items()
+                       if drive.noise_floor is not None}},
             self.comparison.unit, rows=2)
         worst = max(drives, key=lambda name: drives[name].unexplained)
         d, residuals = self.residuals.drives.index(worst), self.residuals
@@ -129,7 +130,7 @@ class ComparisonResult(Result):
 
     @property
     def _next(self) -> tuple[str, str]:
-        other = no_measurements(one.findings for one in self.inputs.fitted)
+        other = no_measurements(recording.findings for recording in self.inputs.fitted)
         if other and not self.inputs.as_it_is:
             return measure_first(other, self.inputs.files)
         if self.comparison.little:

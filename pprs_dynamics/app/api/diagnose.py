@@ -78,15 +78,16 @@ class DiagnosisResult(Result):
 
         after, _ = measure_residuals(self.fitted, self.inputs.fitted)
         return diagnosis_page(
-            self.diagnosis, self._words, after, [one.name for one in self.inputs.fitted],
-            [one.name for one in self.inputs.held_out], self._rivals)
+            self.diagnosis, self._words, after,
+            [recording.name for recording in self.inputs.fitted],
+            [recording.name for recording in self.inputs.held_out], self._rivals)
 
     def table(self) -> DataFrame:
         """Return a row per parameter of each missing effect: its value, std, unit, evidence."""
         return data_frame([
-            {'effect': found.name, 'parameter': key, 'value': one.value, 'std': one.std,
-             'unit': one.unit, 'evidence': found.evidence}
-            for found in self.effects for key, one in found.parameters.items()])
+            {'effect': found.name, 'parameter': key, 'value': each.value, 'std': each.std,
+             'unit': each.unit, 'evidence': found.evidence}
+            for found in self.effects for key, each in found.parameters.items()])
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, with the effects, and the noise."""

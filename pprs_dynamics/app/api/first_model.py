@@ -147,7 +147,7 @@ def first_model(
     path = Path(robot)
     is_mjcf = _root_tag(path) == 'mujoco'
     description = _description(path, is_mjcf)
-    given, files = _grouped([Path(one) for one in recordings])
+    given, files = _grouped([Path(recording) for recording in recordings])
     contents = look_into(files.get(POSITION, given[0])) if given else None
     movable = [joint.name for joint in description.joints.values()
                if joint.kind not in (FIXED, FLOATING) and joint.mimic is None]
@@ -179,7 +179,7 @@ def first_model(
 
     def written() -> tuple[str, DriveModel]:
         text = _text(path, Path(output), is_mjcf, description, base or root_of(description),
-                     branch, chosen, names, columns, guessed, [one.name for one in given],
+                     branch, chosen, names, columns, guessed, [path.name for path in given],
                      CURRENT in found, questions)
         return text, DriveModel.from_parameters(parse_parameters(text, output), source=str(output))
 
@@ -273,7 +273,7 @@ def _branch(description: Description, tool: str, recorded: Collection[str],
         raise FirstModelError(f'{description.path}: no joint of it moves, must have one that does')
     if len(likely) == 1:
         return likely[0], []
-    return likely[0], [f'the load may be on {" or ".join(one.tool for one in likely)}: '
+    return likely[0], [f'the load may be on {" or ".join(branch.tool for branch in likely)}: '
                        f'{likely[0].tool} was taken, --tool LINK takes another']
 
 
@@ -288,7 +288,7 @@ def _drives(description: Description, path: Path, is_mjcf: bool, branch: Branch,
         return tuple(name for name in branch.names if name in recorded) or branch.names
     # What loops determine is not driven.
     driven = recorded or (_actuated(path) if is_mjcf else {
-        joint for one in description.transmissions for joint in one.joints})
+        joint for transmission in description.transmissions for joint in transmission.joints})
     found = tuple(name for name in description.joints if name in driven)
     if not found:
         raise FirstModelError(
@@ -314,15 +314,15 @@ def _grouped(recordings: Sequence[Path]) -> tuple[list[Path], dict[str, Path]]:
     folder = recordings[0] if len(recordings) == 1 else None
     if folder is not None and folder.is_dir() and not is_lerobot(folder) and not (
             folder / 'metadata.yaml').is_file():
-        inside = sorted(one for one in folder.iterdir() if one.is_file())
-        if not any(is_storage(one) for one in inside):
+        inside = sorted(file for file in folder.iterdir() if file.is_file())
+        if not any(is_storage(file) for file in inside):
             files = _by_quantity(inside)
             if POSITION not in files:
                 raise FirstModelError(
-                    f'{folder}: its files ({", ".join(one.name for one in inside[:12])}) are no '
+                    f'{folder}: its files ({", ".join(file.name for file in inside[:12])}) are no '
                     'bag, and none is called as positions are (position.csv, q.csv)')
             return [folder], files
-    if len(recordings) > 1 and not any(is_storage(one) for one in recordings):
+    if len(recordings) > 1 and not any(is_storage(recording) for recording in recordings):
         files = _by_quantity(recordings)
         if len(files) == len(recordings) and POSITION in files:
             return [files[POSITION]], files
@@ -347,7 +347,7 @@ def _names(contents: Contents, joints: Sequence[str]) -> Names:
     known = dict.fromkeys(name for of in contents.joints.values() for name in of)
     known.update(dict.fromkeys(
         name.rpartition('/')[0].rpartition('/')[2] for name in (
-            one.title for one in contents.series) if name.endswith(f'/{POSITION}')))
+            column.title for column in contents.series) if name.endswith(f'/{POSITION}')))
     same = [joint for joint in joints if joint in known]
     if same:
         return Names({joint: joint for joint in same})
@@ -390,7 +390,7 @@ def _by_numbers(contents: Contents, drives: Sequence[str]) -> Names:
 
 def _mentioned(contents: Contents, joints: Sequence[str]) -> set[str]:
     """Return the joints whose names are in the titles of columns."""
-    titles = [words_of(one.title) for one in contents.series]
+    titles = [words_of(column.title) for column in contents.series]
     found = set()
     for joint in joints:
         words = words_of(joint)
@@ -423,7 +423,7 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: N
     if guess.time is not None and guess.time not in TIME_COLUMNS:
         lines.append(f'time: {scalar(guess.time)}')
     is_bag = bool(contents.series) and all(
-        str(one.column).startswith('/') for one in contents.series)
+        str(each.column).startswith('/') for each in contents.series)
     if guess.time is None and not is_bag:
         lines.append(_rate(path, guess.rate))
     return ([*lines, *_drive_lines(guess, drives, contents.decimal)], guess.notes,
@@ -443,15 +443,15 @@ def _file_columns(path: Path, files: Mapping[str, Path], drives: Sequence[str],
     """Return the same of files of one quantity each."""
     inside = {kind: look_into(file) for kind, file in files.items()}
     inside.update(_in_turn(files, inside, len(drives)))
-    guesses = {kind: guess_columns(one.series, drives, kind, movable, rate)
-               for kind, one in inside.items() if kind != FILE_TIME}
+    guesses = {kind: guess_columns(file.series, drives, kind, movable, rate)
+               for kind, file in inside.items() if kind != FILE_TIME}
     merged = Guess(
-        guesses[POSITION].time, {key: column for one in guesses.values()
-                                 for key, column in one.columns.items()},
-        {key: scale for one in guesses.values() for key, scale in one.scales.items()},
-        guesses[POSITION].time_scale, [note for kind, one in guesses.items()
+        guesses[POSITION].time, {key: column for guess in guesses.values()
+                                 for key, column in guess.columns.items()},
+        {key: scale for guess in guesses.values() for key, scale in guess.scales.items()},
+        guesses[POSITION].time_scale, [note for kind, guess in guesses.items()
                                        for note in (f'{files[kind].name}: {note}'
-                                                    for note in one.notes)])
+                                                    for note in guess.notes)])
     lines = []
     if FILE_TIME in inside:
         series = inside[FILE_TIME].series
@@ -473,11 +473,11 @@ def _in_turn(files: Mapping[str, Path], inside: Mapping[str, Contents], count: i
     if FILE_TIME not in files or count < 2:
         return
     times = len(read_column(files[FILE_TIME]))
-    for kind, one in inside.items():
-        if kind != FILE_TIME and len(one.series) == 1 and not one.has_header:
+    for kind, file in inside.items():
+        if kind != FILE_TIME and len(file.series) == 1 and not file.has_header:
             values = read_column(files[kind])
             if len(values) == count * times:
-                yield kind, replace(one, series=tuple(
+                yield kind, replace(file, series=tuple(
                     Series(f'1[{k}]', f'{kind} {k}', values[k::count]) for k in range(count)))
 
 

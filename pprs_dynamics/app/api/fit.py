@@ -66,12 +66,13 @@ class FitResult(Result):
         """Return the page of `pprs fit --report`."""
         from pprs_dynamics.app.report.fit_report import fit_page
 
-        return fit_page(self.inputs.model, self.fit, [one.name for one in self.inputs.fitted],
-                        [one.name for one in self.inputs.held_out])
+        return fit_page(self.inputs.model, self.fit,
+                        [recording.name for recording in self.inputs.fitted],
+                        [recording.name for recording in self.inputs.held_out])
 
     def table(self) -> DataFrame:
         """Return a row per fitted number: before, after, std, unit."""
-        return data_frame([one.to_dict() for one in self.fit.numbers])
+        return data_frame([number.to_dict() for number in self.fit.numbers])
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, after and held out."""

@@ -122,7 +122,7 @@ class Inputs:
                             for listed in (recordings, validate))
         _refuse_repeats(fitted, [], ONCE)
         _refuse_repeats(held_out, fitted, OTHER)
-        paths = frozenset(one.name for one in (*fitted, *held_out) if one.is_path)
+        paths = frozenset(entry.name for entry in (*fitted, *held_out) if entry.is_path)
         return cls(found, _named(fitted), _named(held_out), paths, base, name, topic or '')
 
     def checked(self) -> Inputs:
@@ -135,8 +135,8 @@ class Inputs:
             with `as_it_is`.
         """
         def each(recordings: Mapping[str, Recording]) -> dict[str, Recording]:
-            return {name: with_mistakes(self.model, one, refuse=not self.as_it_is)
-                    if name in self.paths else one for name, one in recordings.items()}
+            return {name: with_mistakes(self.model, recording, refuse=not self.as_it_is)
+                    if name in self.paths else recording for name, recording in recordings.items()}
         return replace(self, recordings=each(self.recordings), validation=each(self.validation))
 
     def within_memory(self) -> Inputs:
@@ -155,15 +155,15 @@ class Inputs:
                 raise
             # Of several that it may hold.
             more = Inputs.of(self.model, path, topic=self.topic, as_it_is=self.as_it_is)
-        _refuse_repeats([_Read(str(path), one, True) for one in more.fitted],
-                        [_Read(name, one, True) for name, one in
+        _refuse_repeats([_Read(str(path), recording, True) for recording in more.fitted],
+                        [_Read(name, entry, True) for name, entry in
                          {**self.recordings, **self.validation}.items()], ONCE)
         if self.reference is not None:
             from pprs_dynamics.inference.fit.reference_runs import OTHER as OTHER_RUN
 
-            _refuse_repeats([_Read(str(path), one, True) for one in more.fitted],
-                            [_Read(one.name, one, True) for one in self.reference.recordings],
-                            OTHER_RUN)
+            _refuse_repeats([_Read(str(path), recording, True) for recording in more.fitted],
+                            [_Read(recording.name, recording, True)
+                             for recording in self.reference.recordings], OTHER_RUN)
         if is_held_out:
             return replace(self, validation={**self.validation, **more.recordings},
                            paths=self.paths | more.paths)
@@ -181,7 +181,7 @@ class Inputs:
         if name not in {**self.recordings, **self.validation}:
             raise InputError(f'no recording {displayed(name)}, must be one of '
                              f'{", ".join(map(displayed, (*self.recordings, *self.validation)))}')
-        fewer, held_out = ({key: one for key, one in given.items() if key != name}
+        fewer, held_out = ({key: recording for key, recording in given.items() if key != name}
                            for given in (self.recordings, self.validation))
         return replace(self, recordings=fewer, validation=held_out,
                        paths=self.paths - {name}).require_recordings()
@@ -204,12 +204,12 @@ class Inputs:
         return replace(
             self, reference=read_reference(model or self.model, runs,
                                            [*self.fitted, *self.held_out], self.as_it_is),
-            reference_paths=tuple(str(one) for one in runs if not isinstance(one, Recording)))
+            reference_paths=tuple(str(run) for run in runs if not isinstance(run, Recording)))
 
     @property
     def fitted_to(self) -> tuple[str, ...]:
         """Those of the recordings that the model was fitted to, by what its file says."""
-        hashes = {one.sha256 for one in reference_files(self.model.values, self.model.source)}
+        hashes = {file.sha256 for file in reference_files(self.model.values, self.model.source)}
         return tuple(displayed(name) for name in self.recordings
                      if hashes and name in self.paths and fingerprint(name) in hashes)
 
@@ -227,8 +227,8 @@ class Inputs:
         for name in () if self.as_it_is else self.recordings:
             found = no_measurements([self.recordings[name].findings])
             if found:
-                raise MisreadError(displayed(name), [one.what for one in found],
-                                   [one.line for one in found])
+                raise MisreadError(displayed(name), [entry.what for entry in found],
+                                   [entry.line for entry in found])
         return self.require_recordings()
 
     @property
@@ -258,8 +258,8 @@ class Inputs:
         from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
 
         def entries(recordings: Mapping[str, Recording]) -> tuple[RecordingEntry, ...]:
-            return tuple(RecordingEntry.of(one, name if name in self.paths else None)
-                         for name, one in recordings.items())
+            return tuple(RecordingEntry.of(recording, name if name in self.paths else None)
+                         for name, recording in recordings.items())
         return LedgerBook(entries(self.recordings), entries(self.validation))
 
 
@@ -288,9 +288,9 @@ class _Read(NamedTuple):
 
 def _read_all(model: DriveModel, given: Given, topic: str | None, progress: Progress | None,
               ) -> list[_Read]:
-    return [_Read(one.name, one, False) if isinstance(one, Recording)
-            else _Read(str(one), _read(model, one, topic, progress), True)
-            for one in listed_recordings(given)]
+    return [_Read(entry.name, entry, False) if isinstance(entry, Recording)
+            else _Read(str(entry), _read(model, entry, topic, progress), True)
+            for entry in listed_recordings(given)]
 
 
 def listed_recordings(given: Given) -> Sequence[File | Recording]:
@@ -303,23 +303,24 @@ def _require_kinds(recordings: Given, validate: Given) -> None:
     for name, given in (('recordings', recordings), ('validate', validate)):
         listed = (listed_recordings(given) if isinstance(
             given, (str, PathLike, Recording, Sequence)) else [given])
-        for one in listed:
-            if not isinstance(one, (Recording, str, PathLike)):
-                raise InputError(f'{name}: one is of type {type(one).__name__}, must be a path or '
-                                 'a Recording (Recording.from_arrays makes one of arrays)')
+        for entry in listed:
+            if not isinstance(entry, (Recording, str, PathLike)):
+                kind = type(entry).__name__
+                raise InputError(f'{name}: one is of type {kind}, must be a path or a Recording '
+                                 '(Recording.from_arrays makes one of arrays)')
 
 
 def _named(found: Sequence[_Read]) -> dict[str, Recording]:
     """Return recordings by name; of those from memory two may have the same."""
     named: dict[str, Recording] = {}
-    for one in found:
-        same = sum(other.name == one.name for other in found[:len(named)])
-        named[f'{one.name} ({same + 1})' if same else one.name] = one.recording
+    for entry in found:
+        same = sum(other.name == entry.name for other in found[:len(named)])
+        named[f'{entry.name} ({same + 1})' if same else entry.name] = entry.recording
     return named
 
 
 def _refuse_repeats(found: Sequence[_Read], earlier: Sequence[_Read], rule: str) -> None:
-    repeat = find_repeat([one.recording for one in found], [one.recording for one in earlier])
+    repeat = find_repeat([entry.recording for entry in found], [each.recording for each in earlier])
     if repeat is not None:
         index, clause = repeat
         raise UnreadableFileError(found[index].name, f'{clause}, but {rule}')

@@ -96,7 +96,7 @@ class ExperimentResult(Result):
         if isinstance(self.design, ArmExcitation):
             return data_frame([{'limit': name, 'use': share}
                                for name, share in self.design.limits.items()])
-        return data_frame([one.to_dict() for one in self.design.contests])
+        return data_frame([contest.to_dict() for contest in self.design.contests])
 
     def plot(self) -> Figure:
         """Return a picture: where the platform or every joint goes."""

@@ -61,7 +61,8 @@ def run(options: argparse.Namespace) -> int:
         screen.print(f'page: {shown(options.report)}')
     if options.json:
         write_json(options.json, {
-            **content, 'effort_looks_like': effort_looks_like(one.findings for one in summaries),
+            **content,
+            'effort_looks_like': effort_looks_like(summary.findings for summary in summaries),
             'recordings': [asdict(summary) for summary in summaries]})
     return 0
 
@@ -77,7 +78,7 @@ def show_recordings(model: DriveModel, paths: Sequence[str], topic: str | None, 
             screen.print(table)
         for finding in summary.findings:
             screen.print(f'[yellow]![/] {shown(finding.text)}')
-        others = [one for one in summary.findings if isinstance(one, OtherReading)]
+        others = [finding for finding in summary.findings if isinstance(finding, OtherReading)]
         if line := columns_line(others, model.recorded.columns is not None):
             screen.print(f'  if so, write into the model file  {shown(line)}')
         for finding in summary.findings:

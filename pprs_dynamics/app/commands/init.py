@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
         return 1
     _, summaries = show_recordings(first.model, list(map(str, first.recordings)), None, screen)
     screen.print(f'model: {shown(options.output)} (read its comments: they say what was guessed)')
-    names = ' '.join(quote(str(one)) for one in first.recordings) or 'RECORDING'
+    names = ' '.join(quote(str(recording)) for recording in first.recordings) or 'RECORDING'
     model = quote(options.output)
     if first.has_efforts:
         screen.print(f'[bold]Next[/] pprs fit {names} --model {model} --output base.yaml')

@@ -51,8 +51,6 @@ examples:
   pprs simulate --output run.mcap --effect stribeck_friction
   pprs COMMAND --help
 """
-# Characters of an error: ten lines of a terminal, more than any sentence with usual names has.
-LONGEST_SENTENCE = 800
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -155,14 +153,7 @@ def _choose_model(options: argparse.Namespace) -> bool:
 
 def _say(sentence: str, given: Sequence[str]) -> None:
     command = next((f' {word}' for word in given if word in COMMANDS), '')
-    print(f'pprs{command}: {_short(sentence)}', file=sys.stderr)
-
-
-def _short(sentence: str) -> str:
-    """Return a sentence without the middle of a name or value that would fill the screen."""
-    if len(sentence) <= LONGEST_SENTENCE:
-        return sentence
-    return f'{sentence[:LONGEST_SENTENCE // 2]}…{sentence[-LONGEST_SENTENCE // 2:]}'
+    print(f'pprs{command}: {sentence}', file=sys.stderr)
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
@@ -177,7 +168,7 @@ class OneLineParser(argparse.ArgumentParser):
         """End with status 2."""
         unknown = re.match(r'unrecognized arguments: (--[^\s=]+)', message)
         hint = suggestion(unknown[1], self._options()) if unknown else ''
-        self.exit(2, f'{self.prog}: {_short(message)}{hint}\n')
+        self.exit(2, f'{self.prog}: {message}{hint}\n')
 
     def _options(self) -> list[str]:
         """Return the options of the command that was called, and of this parser."""
@@ -193,12 +184,6 @@ class OneLineParser(argparse.ArgumentParser):
             raise argparse.ArgumentError(action, f'unknown {action.metavar or "value"} {value!r}'
                                          f'{suggestion(str(value), known)}, must be one of '
                                          f'{", ".join(known)}')
-
-    def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
-        """Return the value of an argument; of `--model=--` argparse itself makes an empty list."""
-        if action.option_strings and arg_strings == ['--']:
-            raise argparse.ArgumentError(action, 'expected one argument')
-        return super()._get_values(action, arg_strings)
 
 
 def _formatter(prog: str) -> argparse.HelpFormatter:

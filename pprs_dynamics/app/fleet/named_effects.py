@@ -86,7 +86,7 @@ def _terms(design: Design, regression: Regression, request: EffectRequest) -> It
         else:
             # The best of the shapes tried, beside the model alone.
             alone = regression.fit(())
-            yield max(terms, key=lambda one: regression.gain(alone, _block(regression, one)))
+            yield max(terms, key=lambda term: regression.gain(alone, _block(regression, term)))
 
 
 def _block(regression: Regression, term: Term) -> Block:

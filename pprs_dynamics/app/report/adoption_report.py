@@ -83,11 +83,11 @@ def parameter_rows(answer: Adoption) -> list[tuple[str, str]]:
     With first moments of bodies that are sure where the mass is not.
     """
     effect = answer.request.effect
-    scales = {one.name: one.scale for one in effect.parameters}
-    rows = [(key, as_fitted(one.value, one.std, one.unit,
+    scales = {parameter.name: parameter.scale for parameter in effect.parameters}
+    rows = [(key, as_fitted(parameter.value, parameter.std, parameter.unit,
                             scales.get(effect.place_and_parameter(key)[1], inf)))
-            for key, one in answer.parameters.items() if one.value != 0.0]
-    return rows + [(key, with_uncertainty(one.value, one.std, one.unit)) for key, one in (
+            for key, parameter in answer.parameters.items() if parameter.value != 0.0]
+    return rows + [(key, with_uncertainty(entry.value, entry.std, entry.unit)) for key, entry in (
         (told.name, answer.moments[told.name])
         for told in sure_moments(effect, answer.parameters, answer.moments))]
 
@@ -118,43 +118,43 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
     before, after = answer.residuals_before, answer.residuals_after
     page = Page(f'{answer.effect}: ' + ('added to the model' if answer.adopted else 'refused'))
     page.text(headline(answer), 'lead')
-    page.sources(answer.before.source, [one.name for one in recordings],
-                 [one.name for one in validation])
+    page.sources(answer.before.source, [recording.name for recording in recordings],
+                 [recording.name for recording in validation])
     errors, fallen = rms_by_drive(before), rms_by_drive(after)
     with page.columns():
         page.errors([ErrorRow('all drives', answer.error_before, answer.error_after,
                               answer.noise_floor),
                      *(ErrorRow(name, errors[name], fallen[name], answer.noise_floors.get(name))
                        for name in errors)],
-                    f'Error on the recordings, rms [{answer.unit}], before (grey) and with it '
-                    '(blue); dotted: the noise.')
+                    f'Error on the recordings, rms [{answer.unit}], before (grey) and with the '
+                    'effect (blue); dotted: the noise.')
         most = max(answer.noise_floors, key=lambda name: errors[name] - fallen[name], default='')
         if most:
             page.figure(before_and_after(before, after, before.drives.index(most),
                                          answer.noise_floors[most]),
-                        f'{most}, where it changes most: effort and error, before and with it.',
+                        f'{most}, where the error falls most: effort and error.',
                         over_time=True)
     if answer.curve is not None:
         page.figure(curve_with_band(answer), 'The measured curve with two standard deviations, '
                     'and the residual of the model without it. It is a correction table, not a '
                     'cause. Beyond the measured range it is constant.')
     if command and answer.adopted:
-        page.command('See what is still missing', command)
-    page.table(*errors_table(answer, 'error on'), caption='What was fitted to, and what decides.')
+        page.command('Look for further effects', command)
+    page.table(*errors_table(answer, 'error on'), caption='Errors on fitted and on held-out data.')
     page.bullets(answer.remarks)
     if answer.parameters:
         page.table(('parameter', '± two standard deviations'), parameter_rows(answer),
-                   caption='Its values')
+                   caption='Fitted values')
     forces = {effect.name: after.parts[effect.name] for effect in answer.after.effects
               if isinstance(effect, CatalogueEffect) and effect.name in after.parts}
     if any(np.any(force) for force in forces.values()):
-        with page.fold('What each added effect contributes'):
-            add_contributions(page, after, forces, 'What each added effect contributes.')
+        with page.fold('Contribution of each added effect'):
+            add_contributions(page, after, forces, 'Contribution of each added effect.')
     add_every_drive(page, before, after, answer.noise_floors, f'before and with {answer.effect}')
     if answer.calibrated:
-        with page.fold('Numbers of the model that move within their tolerances'):
+        with page.fold('Numbers of the model that changed within their tolerances'):
             page.table(('number', 'before', 'after'),
-                       [(one.label, with_uncertainty(one.before, 0.0, one.unit),
-                         with_uncertainty(one.after, one.std, one.unit))
-                        for one in answer.calibrated])
+                       [(number.label, with_uncertainty(number.before, 0.0, number.unit),
+                         with_uncertainty(number.after, number.std, number.unit))
+                        for number in answer.calibrated])
     return page

@@ -26,15 +26,17 @@ HIGH = 0.5  # use of a limit, from which on it is shown
 def contests_table(experiment: Experiment) -> PlainTable:
     """Return pairs of effects with their evidence, now and expected."""
     return ('if the truth is', 'and the rival', 'evidence now', 'expected', 'chance'), [
-        (one.truth, one.rival, f'{one.now:.0f}', f'{one.expected:.0f}', f'{one.probability:.0%}')
-        for one in experiment.contests]
+        (contest.truth, contest.rival, f'{contest.now:.0f}', f'{contest.expected:.0f}',
+         f'{contest.probability:.0%}')
+        for contest in experiment.contests]
 
 
 def accuracies_table(experiment: Experiment) -> PlainTable:
     """Return numbers with their standard deviations, before and after."""
     return ('number', 'before', 'after', 'matters from', 'unit'), [
-        (one.label, _number(one.before), _number(one.after), f'{one.scale:.3g}', one.unit)
-        for one in experiment.accuracies]
+        (accuracy.label, _number(accuracy.before), _number(accuracy.after),
+         f'{accuracy.scale:.3g}', accuracy.unit)
+        for accuracy in experiment.accuracies]
 
 
 def limit_rows(experiment: Experiment) -> list[tuple[str, str]]:

@@ -32,8 +32,9 @@ def errors_table(model: DriveModel, fit: BaseFit) -> PlainTable:
 def numbers_table(fit: BaseFit) -> PlainTable:
     """Return the fitted numbers."""
     return ('number', 'drive', 'before', 'after', '± two std', 'unit'), [
-        (one.key, one.drive, plain(one.before), plain(one.after),
-         plain(2 * one.std) if isfinite(one.std) else '', one.unit) for one in fit.numbers]
+        (number.key, number.drive, plain(number.before), plain(number.after),
+         plain(2 * number.std) if isfinite(number.std) else '', number.unit)
+        for number in fit.numbers]
 
 
 def fit_view(model: DriveModel, fit: BaseFit, details: bool = False) -> Any:
@@ -68,7 +69,7 @@ def fit_page(model: DriveModel, fit: BaseFit, recordings: Sequence[str],
                 'Error, rms, before (grey) and with the fitted numbers (blue).')
     page.table(*errors_table(model, fit))
     page.text(f'Held out: {HELD_OUT[fit.held_out_on]}.', 'note')
-    page.bullets([sentence(one) for one in fit.told])
+    page.bullets([sentence(entry) for entry in fit.told])
     with page.fold('Every number'):
         page.table(*numbers_table(fit))
     return page

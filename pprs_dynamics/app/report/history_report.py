@@ -56,7 +56,7 @@ def details(step: Step) -> list[str]:
         found.append(f'{", ".join(step.rivals)} would explain the recordings as well')
     if step.forced:
         found.append(f'forced, in spite of this: {"; ".join(step.objections)}')
-    return [one for one in found if one]
+    return [entry for entry in found if entry]
 
 
 def _first_of(labels: Sequence[str]) -> str:

@@ -48,8 +48,8 @@ def mechanism_lines(model: DriveModel) -> list[str]:
         f'{counted(found["degrees_of_freedom"], "degree of freedom")}, '
         f'{counted(len(s.drives), "drive")} ({", ".join(s.drives)}){held}']
     if s.loops:
-        lines.append('loops: ' + ', '.join(f'{one["name"]} ({one["type"]}, {one["a"]} on '
-                                           f'{one["b"]})' for one in found['loops']))
+        lines.append('loops: ' + ', '.join(f'{entry["name"]} ({entry["type"]}, {entry["a"]} on '
+                                           f'{entry["b"]})' for entry in found['loops']))
         lines.append(f'{found["independent_rows"]} independent rows close them at home; condition '
                      f'number {found["condition_number"]:.3g} (lengths in units of '
                      f'{s.size:.3g} m)')

@@ -36,8 +36,8 @@ def claims_table(claims: Iterable[Claim]) -> Any:
 
 def recording_table(summary: Summary, units: Sequence[DriveUnits]) -> list[Any]:
     """Return what is in a recording, drive by drive; drives of one kind in one table."""
-    return [_recording_table(summary, kind, [name for name, one in zip(
-        summary.drives, units, strict=True) if one == kind]) for kind in dict.fromkeys(units)]
+    return [_recording_table(summary, kind, [name for name, entry in zip(
+        summary.drives, units, strict=True) if entry == kind]) for kind in dict.fromkeys(units)]
 
 
 def _recording_table(summary: Summary, units: DriveUnits, drives: Sequence[str]) -> Any:

@@ -107,7 +107,7 @@ def shares_in(mask: Mask, fits: TickFits, view: ViewState) -> list[Share]:
         paid = max(offer.evidence, 0.0) / offer.gain if offer.gain > 0 else 0.0
         shares.append(Share(offer.candidate.name, names_of(offer.candidate, fits.drives),
                             explained, explained * paid))
-    return sorted(shares, key=lambda one: (-one.net, -one.explained))
+    return sorted(shares, key=lambda share: (-share.net, -share.explained))
 
 
 def _on(ticks: Ticks, drives: Sequence[str] | None) -> Mask:

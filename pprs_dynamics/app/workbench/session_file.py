@@ -87,10 +87,10 @@ class SavedSession:
             'recordings': _named(given.recordings), 'held_out': _named(given.validation),
             'topic': given.topic, 'as_it_is': given.as_it_is,
             'has_reference': given.reference is not None,
-            'reference': None if references is None else [str(Path(one).absolute())
-                                                          for one in references],
-            'ticks': [{'effect': one.effect, 'drives': one.drives, 'values': dict(one.values)}
-                      for one in self.ticks]}, indent=1))
+            'reference': None if references is None else [str(Path(path).absolute())
+                                                          for path in references],
+            'ticks': [{'effect': tick.effect, 'drives': tick.drives, 'values': dict(tick.values)}
+                      for tick in self.ticks]}, indent=1))
 
     @classmethod
     def read(cls, path: str | PathLike[str]) -> SavedSession:
@@ -119,9 +119,9 @@ class SavedSession:
                           for which in ('given', 'now'))
             recordings, held_out = (dict(found[which]) for which in ('recordings', 'held_out'))
             reference = tuple(found['reference'] or ()) if found['has_reference'] else None
-            ticks = tuple(SavedTick(one['effect'], None if one['drives'] is None
-                                    else tuple(one['drives']), dict(one['values']))
-                          for one in found['ticks'])
+            ticks = tuple(SavedTick(entry['effect'], None if entry['drives'] is None
+                                    else tuple(entry['drives']), dict(entry['values']))
+                          for entry in found['ticks'])
             topic, as_it_is = found['topic'] or None, bool(found['as_it_is'])
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise UnreadableFileError(

@@ -25,9 +25,13 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
-from pprs_dynamics.inference.search.fitted_model import exact_forces, fitted_model, linear_residual
+from pprs_dynamics.inference.search.fitted_model import (
+    exact_forces,
+    fitted_model,
+    linear_residual,
+    linearised,
+)
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.relinearisation import relinearised
 from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
@@ -176,15 +180,16 @@ class TickFits:
             scanned = components.local[d].offers(found.fit).get(effect.name)
             if scanned is not None:
                 return scanned[0]
-        there = [one for one in components.spanning if one.effect is effect and one.drive == d]
+        there = [component for component in components.spanning
+                 if component.effect is effect and component.drive == d]
         # All have the same prior cost.
-        return max(there, key=lambda one: self.fits.regression.gain(
-            found.fit, components.block(one)), default=None)
+        return max(there, key=lambda component: self.fits.regression.gain(
+            found.fit, components.block(component)), default=None)
 
     def _proposed(self, found: CandidateSet) -> list[EffectCandidate]:
         """Return every effect on the drives where it reduces the cost of a set most."""
         added = (sets[-1] for sets in self.scan.proposals(found, least=-np.inf))
-        return [one for one in added if isinstance(one, EffectCandidate)]
+        return [candidate for candidate in added if isinstance(candidate, EffectCandidate)]
 
     def offers(self, found: CandidateSet) -> list[Offer]:
         """Return the gain of every effect that is not in a set, the best first."""
@@ -192,8 +197,8 @@ class TickFits:
         # A fit that was ended before it stood still has the deviance of the noise before.
         found = self.at(found.effects, found)
         with self._scanning:
-            return sorted((self.offer(found, one) for one in self._proposed(found)
-                           if one.effect not in there), key=lambda one: -one.evidence)
+            return sorted((self.offer(found, candidate) for candidate in self._proposed(found)
+                           if candidate.effect not in there), key=lambda offer: -offer.evidence)
 
     def offer(self, found: CandidateSet, candidate: EffectCandidate) -> Offer:
         """Return the gain of one candidate in addition to a set, at its noise."""
@@ -204,10 +209,10 @@ class TickFits:
     def with_chosen(self, tick: Tick) -> EffectCandidate:
         """Return a tick's candidate in the shapes that somebody chose."""
         placements = []
-        for one in tick.best.components:
-            shape = {name: tick.chosen.get((one.drive, name), value)
-                     for name, value in one.shape}
-            placements.append(replace(one, shape=tuple(sorted(shape.items()))))
+        for component in tick.best.components:
+            shape = {name: tick.chosen.get((component.drive, name), value)
+                     for name, value in component.shape}
+            placements.append(replace(component, shape=tuple(sorted(shape.items()))))
         return EffectCandidate.of(placements)
 
     # Fits
@@ -256,9 +261,9 @@ class TickFits:
         values: dict[str, dict[str, float]] = {}
         for candidate in found.effects:
             mine = values[candidate.name] = {}
-            for one in candidate.components:
-                every = {**one.values(found.coefficients(one)), **one.parameters}
-                mine.update({self.key(one.drive, name): float(value)
+            for component in candidate.components:
+                every = {**component.values(found.coefficients(component)), **component.parameters}
+                mine.update({self.key(component.drive, name): float(value)
                              for name, value in every.items()})
         return values
 
@@ -284,7 +289,7 @@ class TickFits:
         """
         fits, parameters = self.fits, None
         if is_free and any(c.effect.nonlinear for c in found.effects):
-            fits, found = relinearised(fits, found)
+            fits, found = linearised(fits, found)
             parameters = {c.name: estimate(fits, found, c, True).parameters for c in found.effects}
         model = fitted_model(fits, found)
         return Exact(model, self.measured - exact_forces(fits.design, model), parameters)

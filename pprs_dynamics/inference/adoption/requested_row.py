@@ -19,8 +19,7 @@ from pprs_dynamics.inference.search.candidates import EffectCandidate
 from pprs_dynamics.inference.search.decisions import outside_cost
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate, estimate_present
 from pprs_dynamics.inference.search.estimates import calibrations as moved_numbers
-from pprs_dynamics.inference.search.fitted_model import model_at, parts_of
-from pprs_dynamics.inference.search.relinearisation import linearised
+from pprs_dynamics.inference.search.fitted_model import linearised, model_at, parts_of
 from pprs_dynamics.inference.search.reversal_widths import with_widths
 from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.inference.search.table import ModelTable, Row
@@ -80,7 +79,7 @@ def requested_row(table: ModelTable, request: EffectRequest, margin: float) -> R
         raise PlacementError(f'{", ".join(standing)} hardly moved in the recordings' if standing
                              else f'{request.name} has no force in these recordings')
     fitted = fits.refined(fits.evaluate((*rest, EffectCandidate.of(chosen))))
-    return Row(*linearised(fits, fitted, alone=True), 0.0)
+    return Row(*linearised(fits, fitted), 0.0)
 
 
 def _candidate(row: Row, request: EffectRequest) -> EffectCandidate | None:

@@ -21,8 +21,8 @@ from pprs_dynamics.inference.diagnosis.quantities import in_unit, plain
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_scatter, word_statement
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
-from pprs_dynamics.inference.residuals.bins import MOST_SHARE
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
+from pprs_dynamics.inference.residuals.profiles import MOST_SHARE
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 from pprs_dynamics.inference.search.candidates import PriorCosts, UnknownCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions, outside_cost

@@ -39,8 +39,7 @@ from pprs_dynamics.inference.diagnosis.statements import (
     place_of,
     place_on,
 )
-from pprs_dynamics.inference.search.candidates import SINCE
-from pprs_dynamics.inference.search.cost_terms import CostTerms
+from pprs_dynamics.inference.search.candidates import SINCE, CostTerms
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter

@@ -24,9 +24,8 @@ from pprs_dynamics.inference.search.explained_effort import (
     explained_shares,
     little_explained,
 )
-from pprs_dynamics.inference.search.fitted_model import fitted_model
+from pprs_dynamics.inference.search.fitted_model import fitted_model, linearised
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.relinearisation import relinearised
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.numbers import finite
@@ -193,7 +192,7 @@ def _fitted(model: DriveModel, recordings: Sequence[Recording],
     # As in a diagnosis without any effect: the tolerance is the prior, and how friction turns over
     # is left free.
     fits = FittedSets(Design.of(model, recordings), DECISIONS)
-    fits, found = relinearised(fits, fits.evaluate(()))
+    fits, found = linearised(fits, fits.evaluate(()))
     return fitted_model(fits, found), tuple(
         FittedNumber(one.label, '', one.before, one.after, one.std, one.unit)
         for one in calibrations(fits, found, {})), ()

@@ -46,8 +46,11 @@ from pprs_dynamics.inference.fit.repeating_forces import (
     Waves,
     motion_of,
 )
-from pprs_dynamics.inference.regression.base_columns import BaseColumn, ReferenceDirection
-from pprs_dynamics.inference.regression.carried_over import CarriedOver
+from pprs_dynamics.inference.regression.base_columns import (
+    BaseColumn,
+    CarriedOver,
+    ReferenceDirection,
+)
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.residuals.bands import LEAST_OPEN, DriveSeries, OpenForces

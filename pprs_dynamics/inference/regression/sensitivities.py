@@ -12,11 +12,13 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.terms import FullRate
+from pprs_dynamics.inference.residuals.reconstruction import Reconstruction
 from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
@@ -24,7 +26,7 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect, Parame
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.forces import ACTIVE_FRICTION, PASSIVE_FRICTION
+from pprs_dynamics.physics.model.forces import ACTIVE_FRICTION, PASSIVE_FRICTION, Forces
 from pprs_dynamics.physics.model.keys import GAIN
 from pprs_dynamics.system.parallel import each
 
@@ -147,13 +149,17 @@ class Sensitivities:
     def columns(self, forces: Any) -> dict[str, Array]:
         """Return columns by name, (K, N, D) each.
 
-        `NUMBERS` per standard deviation by which each number grows away from 0; `OF_DRIVES` what
-        other widths of turning over would change in every drive, and last a part that is alike
-        in both directions; `OF_JOINTS` the former in all passive joints; `HOMING` per metre that
-        each drive is measured too far, `INERTIA` per acceleration that it is measured too much;
-        the coefficients of each effect of `searched` by its name, and after `BARE` as they were if
-        friction did not follow the loads; those of effects that the given model has by their names
-        after `PRESENT`. What a kind of model does not have is left out.
+        What a kind of model does not have is missing.
+
+        - `NUMBERS`: per standard deviation by which each number grows away from 0.
+        - `OF_DRIVES`: other widths of reversal in every drive, and a part that is the same in
+          both directions.
+        - `OF_JOINTS`: other widths of reversal in all passive joints.
+        - `HOMING`: per metre that each drive is measured too far.
+        - `INERTIA`: per acceleration that each drive is measured too much.
+        - Names of `searched`: the coefficients of each effect.
+        - `BARE` + name: the same with friction that does not follow the loads.
+        - `PRESENT` + name: the coefficients of effects that the given model has.
 
         Parameters
         ----------
@@ -375,3 +381,53 @@ def passive_reversal_columns(friction: Effect, state: Any) -> Array:
         state.reversal, rate=factor * state.reversal.rate,
         slide=factor * state.reversal.slide))) - before
         for factor in PASSIVE_WIDTHS])
+
+
+class Column(NamedTuple):
+    """Key of columns in a table, next to parts and variables."""
+
+    name: str
+
+
+def stacked_columns(tables: list[dict[Any, Array]]) -> dict[str, Array]:
+    """Take the columns out of tables, (k, D, M) each by name."""
+    stacked: dict[str, Array] = {}
+    for key in [key for key in tables[0] if isinstance(key, Column)]:
+        stacked[key.name] = np.concatenate([table.pop(key) for table in tables]).transpose(1, 2, 0)
+    return stacked
+
+
+class ColumnCollector:
+    """Called chunk by chunk: gives columns to be treated, and keeps what drives did."""
+
+    def __init__(self, sensitivities: Sensitivities, reconstruction: Reconstruction) -> None:
+        self.sensitivities = sensitivities
+        # A gain changes nothing of efforts that were not recorded as currents.
+        self.without_gain = [k for k, number in enumerate(sensitivities.numbers)
+                             if number.key == GAIN
+                             and np.isnan(reconstruction.gain[number.element])]
+        self.share = reconstruction.recorded_share(sensitivities.model)
+        self.sensors = [effect.name for effect in sensitivities.model.effects
+                        if isinstance(effect, MeasurementEffect)]
+        self.kept: list[tuple[Array, ...]] = []
+
+    def __call__(self, forces: Forces) -> dict[Column, Array]:
+        s: Any = forces.mechanism
+        effort = forces.total - sum((forces.parts[name] for name in self.sensors),
+                                    np.zeros_like(forces.total))
+        self.kept.append((s.velocity, s.acceleration, s.direction, s.friction_load,
+                          s.transmitted, effort))
+        columns = self.sensitivities.columns(forces)
+        columns[NUMBERS][self.without_gain] = 0.0
+        # Views: copies of all columns at full rate would take longer than their means.
+        return {Column(name): (column if np.all(self.share == 1) else self.share * column)
+                .transpose(1, 0, 2) for name, column in columns.items()}
+
+    def full_rate(self, reconstruction: Reconstruction) -> FullRate:
+        """Return what the drives did, with positions as the mechanism has them."""
+        velocity, acceleration, direction, load, transmitted, effort = (
+            np.concatenate(arrays) for arrays in zip(*self.kept, strict=True))
+        return FullRate(
+            reconstruction.time, reconstruction.position, velocity, acceleration, direction, load,
+            transmitted, effort, reconstruction.effort, reconstruction.segments,
+            reconstruction.treat, reconstruction.start, reconstruction.channels)

@@ -76,8 +76,8 @@ class FullRate:
     """What the drives did at every sample of a recording, in segments; (N, D) arrays.
 
     `effort` is what the model's drives apply, before any sensor; `effort_measured` the
-    recording's; `start` the time at which the recording began [s]; `channels` what was measured
-    beside.
+    recording's; `start` the time at which the recording began [s]; `channels` further
+    measurements.
     """
 
     time: Array
@@ -126,7 +126,7 @@ class OperatingPoint:
     base : (P,) array
         Coefficients of the base columns; those of reversals are 0.
     effects : tuple of PlacedEffect
-        What it has beside the given model, or otherwise.
+        That it has in addition to the given model, or with other values.
     """
 
     model: DriveModel

@@ -100,7 +100,7 @@ class LiveComparison:
         return self._bridged_before + (0 if self._live is None else self._live.bridged)
 
     def push(self, time: float, position: ArrayLike, effort: ArrayLike) -> None:
-        """Take one sample, drives in order, as it is recorded; effort NaN means no measurement."""
+        """Take one recorded sample, drives in order; effort NaN means no measurement."""
         if self._live is None:
             self._learn(time, position, effort)
             return

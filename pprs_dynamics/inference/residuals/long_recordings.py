@@ -4,10 +4,9 @@
 """Excerpts of recordings that are longer than what a search can hold in memory.
 
 A search keeps some thousands of columns, a number each for every block of every drive: an hour
-would take tens of gigabytes and as many minutes. Stretches keep all frequencies up to the
-blocks' own, which longer blocks would not, and what many minutes more would tell is a smaller
-uncertainty alone. Where a robot does the same for hours they are chosen by how much it moves,
-never by how it errs.
+would take tens of gigabytes and as many minutes. Stretches contain all frequencies up to that of
+the blocks, unlike longer blocks. More minutes would only reduce the uncertainty. Where a robot does
+the same for hours they are chosen by how much it moves, never by how it errs.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ STRETCHES, SHORTEST_STRETCH = 12, 5.0
 def excerpts_within_memory(model: DriveModel, recordings: Sequence[Recording]) -> list[Recording]:
     """Return recordings of which no more is used than a search can hold.
 
-    What is left out is among their findings. Those that are short enough stay as they are, and so
+    Their findings name the omitted part. Those that are short enough stay as they are, and so
     do excerpts.
     """
     whole = [recording for recording in recordings if not _is_excerpt(recording)]
@@ -113,7 +112,7 @@ def _excerpt(recording: Recording, share: float) -> Recording:
 
 
 def _pieces(recording: Recording, length: int) -> list[slice]:
-    """Return the segments in pieces of a length; what is left of one and half as long is one."""
+    """Return the segments in pieces of a length; a remainder of half that length is one."""
     pieces = []
     for part in recording.segments:
         starts = list(range(part.start, part.stop, length))

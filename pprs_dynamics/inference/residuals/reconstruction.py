@@ -54,7 +54,7 @@ class FollowedMotion(NamedTuple):
     jumps: np.ndarray
 
     def notes(self, time: Array) -> list[str]:
-        """Return what was found, in words; time (N,) [s]."""
+        """Return the findings as sentences; time (N,) [s]."""
         notes = []
         if np.any(self.near_branch):
             notes.append(
@@ -101,7 +101,8 @@ class Reconstruction(DriveMotion):
     motion : PlatformMotion or JointMotion
         Without times, which need not increase from segment to segment; `chunks` has them.
     effort : (N, D) array
-        As measured [N]; NaN where it was not, and where a drive stands that tells nothing then.
+        As measured [N]; NaN where it was not, and where a drive stands whose effort then means
+        nothing.
     treat : Treatment
         What effort and model both get: values (N, k) -> (M, k).
     near_branch : (N,) bool array
@@ -115,8 +116,8 @@ class Reconstruction(DriveMotion):
     start : float
         Time of the recording's first sample, which may be dropped here [s].
     channels : mapping of str to (N, D) array
-        What was measured of the drives beside, between its samples by straight lines; NaN in drives
-        where it never was.
+        Further channels of the drives, interpolated by straight lines; NaN in drives that lack
+        them.
     recorded : Recording
         What it is of.
     read : DriveMotion
@@ -390,7 +391,7 @@ def _applied_gain(recording: Recording) -> Array:
 
 
 def _channels(recording: Recording, index: Array) -> dict[str, Array]:
-    """Return what was measured beside motion and effort, at some samples, (N, D) by name."""
+    """Return further channels at some samples, (N, D) by name."""
     found = {}
     for name, values in recording.channels.items():
         filled = np.full((len(index), values.shape[1]), np.nan)

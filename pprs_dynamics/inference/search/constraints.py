@@ -184,7 +184,7 @@ class Constraints:
         return Inequalities(np.concatenate(rows)[finite], b[finite])
 
     def _bounds_of(self, component: Component) -> Array:
-        """Return the least and largest of each coefficient beside the input model's, (2, k)."""
+        """Return the least and largest of each coefficient minus the input model's, (2, k)."""
         if component not in self._bounds:
             turns = units_of(self.design.given, component.drive).turns
             kinds = {p.name: p.of(turns) for p in (*component.effect.coefficients,

@@ -161,8 +161,8 @@ def _amid_motion(fits: FittedSets, times: Sequence[float]) -> list[float]:
 def _bases(fits: FittedSets, best: CandidateSet) -> list[tuple[CandidateSet, float]]:
     """Return a set and no set at all, with what each costs more than the set.
 
-    What a set of constant forms imitates is hardly seen beside it: an offer may have to make good
-    all that it does.
+    A set of constant forms may imitate an onset. Without it an onset has to explain all of its
+    force.
     """
     if not best.candidates:
         return [(best, 0.0)]
@@ -175,7 +175,7 @@ def _offers(fits: FittedSets, bases: Sequence[tuple[CandidateSet, float]],
             courses: Iterable[Course]) -> Iterator[_Offer]:
     """Yield effects with the course that lowers the deviance most, by the force that they had.
 
-    Beside each of the `bases`, less what that one costs.
+    With each of the `bases`, less its cost.
     """
     residuals, shape = fits.design.residuals, fits.design.residuals.measured.shape
     courses = list(courses)
@@ -216,7 +216,7 @@ def _best_of_each(offers: list[_Offer]) -> list[_Offer]:
 
 
 def _rests(base: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
-    """Yield what may stand beside a candidate: all else, and all but what imitates it."""
+    """Yield the rest of a set with a candidate: all others, and all that cannot imitate it."""
     effects = tuple(effect for effect in base.effects if effect.effect is not candidate.effect)
     rests: list[Candidates] = [tuple(effect for effect in effects if effect.course), effects,
                                (*effects, *base.unknowns)]

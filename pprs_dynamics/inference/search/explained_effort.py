@@ -67,13 +67,13 @@ def little_explained(model: DriveModel, residuals: Residuals, left: Array | None
     Parameters
     ----------
     model : DriveModel
-        Its width of reversal tells motion from rest.
+        Its width of reversal separates motion from rest.
     residuals : Residuals
     left : (M, D) array, optional
         See `explained_shares`.
     decisions : Decisions, optional
     noise : mapping of str to float, optional
-        Rms of the noise of the drives, as far as it is known [N]: no model explains it.
+        Rms of the noise of the drives, where it is known [N]: no model explains it.
     """
     little = {}
     for name, share in explained_shares(residuals, left).items():

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The velocity within which each drive's friction turns over, from what a set leaves.
+"""The velocity within which each drive's friction turns over, from the residual of a set.
 
-Friction that turns over in another width than the model's is no effect that is missing, but it
-leaves an error at every reversal. In the fits it is carried by columns that span all widths; here
+Friction that turns over in another width than the model's is no missing effect, but it makes an
+error at every reversal. In the fits it is carried by columns that span all widths; here
 it becomes one number per drive.
 """
 

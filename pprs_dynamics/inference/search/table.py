@@ -17,28 +17,28 @@ from functools import cached_property
 import numpy as np
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.regression.carried_over import CarriedOver
+from pprs_dynamics.inference.regression.base_columns import CarriedOver
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import (
     DURING,
     Candidate,
     CandidateSet,
+    CostTerms,
     EffectCandidate,
     RowKey,
 )
-from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.courses import fit_courses
 from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
 from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,
+    has_nonlinear,
     linear_prediction,
+    linearised,
     squared,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.neighbours import of_same_names
-from pprs_dynamics.inference.search.relinearisation import has_nonlinear, linearised
-from pprs_dynamics.inference.search.search import Search, patterns_of
+from pprs_dynamics.inference.search.search import Search, of_same_names, patterns_of
 from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
@@ -72,7 +72,7 @@ class Row:
         around, moved = fits, fitted
         try:
             for _ in range(MOST_STEPS):
-                around, moved = linearised(around, moved, alone=True)
+                around, moved = linearised(around, moved)
                 before, moved = moved, of_same_names(around, moved)
                 if moved is before:
                     break

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, ClassVar, Self
@@ -15,7 +15,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, SINGLE_AXIS, CatalogueEffect, names
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, names
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM, SLIDE
 from pprs_dynamics.physics.mechanism.state import MechanismState
 
 ALONE = 'drive'  # name of one whose name does not matter
@@ -141,7 +142,7 @@ class DriveEffect(CatalogueEffect):
     linear (`shape`) enters the columns.
     """
 
-    acts_in = frozenset({PLATFORM, SINGLE_AXIS, ARM})
+    acts_in = frozenset({PLATFORM, SLIDE, MECHANISM})
 
     def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
         self.drives = {drive: dict(values) for drive, values in drives.items()}
@@ -328,6 +329,24 @@ class MeasurementEffect(DriveEffect):
         return bool(np.any(unit.position_error((ALONE,), np.zeros((1, 1))))
                     or np.any(unit.loaded_position_error((ALONE,), np.ones((1, 1)))))
 
+    def by_drive(self, drives: Sequence[str], values: Array,
+                 change: Callable[[Array, dict[str, float]], Array]) -> Array:
+        """Return changes of the values of the drives that have the effect, (N, D), else 0.
+
+        Parameters
+        ----------
+        drives : sequence of str
+        values : (N, D) array
+        change : callable
+            From values (N,) and parameters of a drive to its changes (N,).
+        """
+        found = np.zeros_like(values)
+        for name, parameters in self.drives.items():
+            if name in drives:
+                k = drives.index(name)
+                found[:, k] = change(values[:, k], parameters)
+        return found
+
     def position_error(self, drives: Sequence[str], position: Array) -> Array:
         """Return the errors of measured positions, to be subtracted, (N, D) [m, rad].
 
@@ -370,6 +389,18 @@ class MeasurementEffect(DriveEffect):
     def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
                memory: Any = None) -> Array:
         """Return the measured effort where the drives apply `effort`, (N, D) [N]."""
+        measured = effort.copy()
+        for name, parameters in self.drives.items():
+            k = drives.index(name)
+            measured[:, k] = self.drive_sensed(
+                effort[:, k], time, parameters,
+                self.drive_memory() if memory is None else memory[name])
+        return measured
+
+    @classmethod
+    def drive_sensed(cls, effort: Array, time: Array | None, parameters: Mapping[str, float],
+                     memory: Any) -> Array:
+        """Return the measured effort of one drive that applies `effort`, (N,) [N]."""
         return effort
 
     def seen(self, effort: Array, state: MechanismState, memory: Any = None) -> Array:

@@ -10,13 +10,11 @@ import math
 from abc import ABC, ABCMeta, abstractmethod
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-
-# Kinds of models.
-PLATFORM, SINGLE_AXIS, ARM = 'platform', 'axis', 'arm'
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
 
 @dataclass(frozen=True)
@@ -175,6 +173,15 @@ class Card:
     reference: str
 
 
+class Wave(NamedTuple):
+    """Names of the amplitude and phase of a wave, and of its coefficients A cos phi, A sin phi."""
+
+    amplitude: str
+    phase: str
+    sine: str
+    cosine: str
+
+
 class EffectType(ABCMeta):
     """Type of the effects of the catalogue.
 
@@ -198,12 +205,12 @@ class CatalogueEffect(Effect, metaclass=EffectType):
 
     Class attributes
     ----------------
-    card, arm_card : Card
-        The latter where an arm needs other words.
+    card, mechanism_card : Card
+        The latter where a mechanism needs other words than a 3-PPRS.
     needs_several_drives : bool
         Whether a single drive feels it as it feels another effect, always.
-    acts_in : set of {'platform', 'axis', 'arm'}
-        The kinds of models in which it can act: a 3-PPRS, a single axis, a serial arm.
+    acts_in : set of {'platform', 'slide', 'mechanism'}
+        The kinds of robots on which it can act: a 3-PPRS, one slide alone, every other one.
     linear, shape : tuple of Parameter
     parameters : tuple of Parameter
         Both.
@@ -241,10 +248,12 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         Name of the effect that does the same where the load of a drive does not vary.
     alike : tuple of tuple of str
         Groups of places at which the effect does the same in every motion.
+    waves : tuple of Wave
+        Parameters that are fitted as sine and cosine.
     """
 
     card: ClassVar[Card]
-    arm_card: ClassVar[Card | None] = None
+    mechanism_card: ClassVar[Card | None] = None
     needs_several_drives: ClassVar[bool] = False
     acts_in: ClassVar[frozenset[str]] = frozenset({PLATFORM})
     linear: ClassVar[tuple[Parameter, ...]]
@@ -264,6 +273,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     is_of_one_place: ClassVar[bool] = False
     at_one_load: ClassVar[str] = ''
     alike: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    waves: ClassVar[tuple[Wave, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         if hasattr(cls, 'linear'):
@@ -340,18 +350,26 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     @classmethod
     def card_in(cls, kind: str) -> Card:
         """Return the description for a kind of model."""
-        return cls.arm_card if kind == ARM and cls.arm_card is not None else cls.card
+        return cls.card if kind != MECHANISM else cls.mechanism_card or cls.card
 
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
         """Return the coefficients that belong to parameters."""
-        return {c.name: values[c.name] if c.default is None else values.get(c.name, c.default)
+        given = dict(values)
+        for amplitude, phase, sine, cosine in cls.waves:
+            given[sine] = values[amplitude] * math.cos(values[phase])
+            given[cosine] = values[amplitude] * math.sin(values[phase])
+        return {c.name: given[c.name] if c.default is None else given.get(c.name, c.default)
                 for c in cls.coefficients}
 
     @classmethod
     def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
         """Return the linear parameters that belong to coefficients."""
-        return dict(coefficients)
+        found = dict(coefficients)
+        for amplitude, phase, sine, cosine in cls.waves:
+            a, b = found.pop(sine), found.pop(cosine)
+            found[amplitude], found[phase] = math.hypot(a, b), math.atan2(b, a)
+        return found
 
     @classmethod
     def hypotheses(cls, names: tuple[str, ...]) -> frozenset[Hashable]:

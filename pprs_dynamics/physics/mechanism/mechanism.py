@@ -19,21 +19,23 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.description import PARAMETERS, inertial_in
+from pprs_dynamics.physics.mechanism.description import PARAMETERS, PRISMATIC, inertial_in
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.passive_joints import friction_table, passive_joints
-from pprs_dynamics.physics.mechanism.places import BodyPlace, PassiveJoint
+from pprs_dynamics.physics.mechanism.places import MECHANISM, SLIDE, BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.tool_pose import ToolPose
-from pprs_dynamics.physics.mechanism.tree_equations import WORST_CONDITION, JointFriction, Loads
+from pprs_dynamics.physics.mechanism.tree_equations import WORST_CONDITION
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
+from pprs_dynamics.physics.mechanism.tree_tables import JointFriction, Loads
 
 POSITION_STEP = 1e-4  # [rad, m] of a drive, for derivatives by its position
+LEAST_GRAVITY = 1e-9  # [m/s^2] along a slide, below which its share is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +58,6 @@ class Mechanism:
         At which loads of joints rub [m], where known.
     motors : mapping of str to (D,) sequence
         Turns of motors per turn of each drive, of motors that move more than one.
-    load_is_known : bool
-        Whether what rubs in the drives is what they carry, and no preload.
     """
 
     structure: Structure
@@ -67,7 +67,6 @@ class Mechanism:
     gravity: tuple[float, float, float]
     radii: Mapping[str, float] = field(default_factory=dict)
     motors: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    load_is_known: bool = True
 
     @property
     def masses(self) -> Array:
@@ -188,6 +187,24 @@ class Mechanism:
     def drives(self) -> tuple[str, ...]:
         """Names of the drives."""
         return self.structure.drives
+
+    @property
+    def kind(self) -> str:
+        """Whether it is one slide alone, or any other mechanism."""
+        structure = self.structure
+        return SLIDE if structure.kinds == (PRISMATIC,) and not structure.loops else MECHANISM
+
+    @cached_property
+    def load_is_known(self) -> bool:
+        """Whether friction follows what the drives carry.
+
+        On a slide alone that no gravity pulls, preload rubs, and the weight on its guide.
+        """
+        if self.kind == MECHANISM:
+            return True
+        row = self.structure.rows[self.structure.drives[0]]
+        t = self.structure.tables
+        return bool(abs(t.axis[row] @ t.place_R[row].T @ self.gravity_row) > LEAST_GRAVITY)
 
     @property
     def motions(self) -> tuple[type, ...]:

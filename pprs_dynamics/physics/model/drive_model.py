@@ -27,24 +27,23 @@ from pprs_dynamics.drives import DriveUnits, RecordedDrives
 from pprs_dynamics.errors import EffectError, MotionError
 from pprs_dynamics.physics.effects.catalogue import find_effect
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, SINGLE_AXIS, CatalogueEffect, Effect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.places import MECHANISM
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION
 from pprs_dynamics.physics.model.effects_block import added_effects
 from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState, total_force
 from pprs_dynamics.physics.model.keys import (
-    AXIS,
     EFFORT_UNITS,
     FILES,
     GAIN,
     ROBOT,
     Key,
-    is_axis,
     is_mechanism,
     keys_of,
     title_of,
@@ -60,7 +59,7 @@ from pprs_dynamics.physics.model.recorded_names import (
     joint_names,
     recorded_columns,
 )
-from pprs_dynamics.physics.model.robot_block import read_axis, read_mechanism, require_drives
+from pprs_dynamics.physics.model.robot_block import read_mechanism, require_drives
 
 # Reversals of friction take a hundredth of a period; what is faster is ripple of motor and gear.
 BLOCKS_PER_PERIOD = 100.0
@@ -75,7 +74,7 @@ class DriveModel:
     robot : Mechanism or ThreePprs
         Bodies and joints; effects take their parameters from it.
     effects : tuple of Effect
-        What acts beside the rigid body; the model's own friction comes first.
+        What acts in addition to the rigid body; the model's own friction comes first.
     reversal : Reversal
     limits : DriveLimits
     values : mapping
@@ -118,8 +117,8 @@ class DriveModel:
         Parameters
         ----------
         parameters : mapping
-            E.g. {'geometry.rod_length': 0.3, ...}; keys of nodes are ignored. With keys of `axis`
-            it is a single axis, with keys of `robot` an arm or a robot with loops.
+            E.g. {'geometry.rod_length': 0.3, ...}; keys of nodes are ignored. Keys of
+            `robot` describe an axis, an arm or a robot with loops, others a 3-PPRS.
         source : str
             Named in errors; the path of a description counts from its folder.
 
@@ -132,12 +131,10 @@ class DriveModel:
             require_drives(parameters)
             values = checked_values(parameters)
             robot: Any
-            if is_mechanism(parameters):
-                robot, own, reversal, limits = read_mechanism(values, Path(source).parent)
-            else:
-                robot, own, reversal, limits = (read_axis if is_axis(parameters)
-                                                else read_platform)(values)
-            effects = (*own, *added_effects(parameters, _kind(values), robot))
+            robot, own, reversal, limits = (
+                read_mechanism(values, Path(source).parent) if is_mechanism(parameters)
+                else read_platform(values))
+            effects = (*own, *added_effects(parameters, robot))
             loaded = robot
             for effect in effects:
                 if isinstance(effect, BodyEffect):
@@ -148,9 +145,9 @@ class DriveModel:
 
     @property
     def kind(self) -> str:
-        """One of 'platform', 'axis', 'arm'."""
-        return (PLATFORM if self.robot.structure is None else ARM if self.is_described
-                else SINGLE_AXIS)
+        """One of 'platform', 'slide', 'mechanism'; effects say in which of them they act."""
+        kind: str = self.robot.kind
+        return kind
 
     @property
     def drives(self) -> tuple[str, ...]:
@@ -176,12 +173,12 @@ class DriveModel:
     @property
     def block(self) -> str:
         """Block of its file that describes the robot; '' for that of the paper."""
-        return ROBOT if is_mechanism(self.values) else AXIS if is_axis(self.values) else ''
+        return ROBOT if is_mechanism(self.values) else ''
 
     @property
     def is_described(self) -> bool:
-        """Whether its bodies and joints are those of a description, as of a URDF."""
-        return self.block not in ('', AXIS)
+        """Whether all that it is follows from a description: no 3-PPRS, and no slide alone."""
+        return self.kind == MECHANISM
 
     @property
     def units(self) -> tuple[DriveUnits, ...]:
@@ -392,7 +389,7 @@ class DriveModel:
 
     @cached_property
     def _added(self) -> tuple[Effect, ...]:
-        """Effects that the one pass leaves to be added."""
+        """Effects that are not part of the one pass."""
         own = self._one_pass.OWN
         return tuple(effect for effect in self.effects if not isinstance(effect, own))
 
@@ -530,11 +527,7 @@ class DriveModel:
         return np.sum(errors, axis=0) if errors else np.zeros_like(transmitted)
 
     def windup_error(self, transmitted: Array, windup: Array) -> Array:
-        """Return what second encoders say beside that, of position and its rates, (3, N, D)."""
+        """Return the further errors of second encoders, of position and its rates, (3, N, D)."""
         errors: Array = np.sum([one.windup_error(self.drives, transmitted, windup)
                                 for one in self.misreadings], axis=0)
         return errors
-
-
-def _kind(values: Mapping[str, Any]) -> str:
-    return ARM if is_mechanism(values) else SINGLE_AXIS if is_axis(values) else PLATFORM

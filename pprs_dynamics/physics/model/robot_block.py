@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -20,15 +19,11 @@ from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.description import (
-    PARAMETERS,
-    PRISMATIC,
     REVOLUTE,
     Description,
     Frame,
-    Joint,
     Loop,
     Transmission,
-    body_at,
 )
 from pprs_dynamics.physics.mechanism.evaluation import not_compiling_yet
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
@@ -41,7 +36,6 @@ from pprs_dynamics.physics.model.limits import DriveLimits
 from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
 from pprs_dynamics.system.package_files import located
 
-AXIS = 'axis'  # the joint, and drive, of a single axis
 # Joints whose motors do not move one joint each.
 COUPLED = ('differential', 'fourbar')
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] where no description has it
@@ -72,15 +66,6 @@ def read_mechanism(values: dict[str, Any], folder: Path,
                     AxisOffset(values['friction.offset']), *passive_friction(structure, values)),
             Reversal(width, values['friction.reversal_rate'], values['friction.reversal_slide']),
             joint_limits(structure))
-
-
-def read_axis(values: Mapping[str, Any],
-              ) -> tuple[Mechanism, tuple[Effect, ...], Reversal, DriveLimits]:
-    """Return a single axis, its own friction, its smoothing and limits, from checked values."""
-    robot = axis_mechanism(values['axis.mass'], gravity_in_efforts(values, 'axis.gravity'))
-    return (robot, (AxisFriction(values['axis.viscous'], values['axis.coulomb']),
-                    AxisOffset(values['axis.offset'])),
-            Reversal(values['friction.reversal_velocity']), joint_limits(robot.structure))
 
 
 def joint_limits(structure: Structure) -> DriveLimits:
@@ -118,36 +103,6 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
                 if key.startswith(('robot.home.', 'robot.loops.', LOCKED)))
     return _structure(description, values['robot.base'], values['robot.tool'],
                       values[DRIVES_KEY], own)
-
-
-def axis_mechanism(mass: float, gravity: float) -> Mechanism:
-    """Return a carriage on a slide, at the slope at which gravity along it is what is given.
-
-    Parameters
-    ----------
-    mass : float
-        [kg]
-    gravity : float
-        Along the positive direction [m/s^2]. Without any, what rubs is preload and the weight on
-        the guide, constant and unknown.
-    """
-    g = max(abs(gravity), -STANDARD_GRAVITY[2])
-    structure = _slide(gravity / g)
-    rows = np.array([structure.rows[AXIS]])
-    carriage = body_at(mass, (0.0, 0.0, 0.0), np.zeros((3, 3)))[None]
-    return Mechanism(structure, rows, carriage, np.zeros(1), (0.0, 0.0, -g),
-                     load_is_known=gravity != 0)
-
-
-@lru_cache(maxsize=64)
-def _slide(down: float) -> Structure:
-    """Return the structure of an axis; `down`, the sine of its slope."""
-    carriage = body_at(1.0, (0.0, 0.0, 0.0), np.zeros((3, 3)))
-    joint = Joint(AXIS, PRISMATIC, 'base', 'carriage', Frame(),
-                  np.array([math.sqrt(1 - down * down), 0.0, -down]))
-    return build_structure(
-        Description('', {'base': np.zeros(PARAMETERS), 'carriage': carriage}, {AXIS: joint}, ''),
-        'base', 'carriage', (AXIS,))
 
 
 @lru_cache(maxsize=64)
@@ -205,7 +160,7 @@ def coupled(description: Description) -> list[Transmission]:
 
 
 def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return keys and values that the file leaves to the description, complete with defaults.
+    """Return keys and values that a description gives where the file is silent, with defaults.
 
     Raises
     ------

@@ -19,7 +19,7 @@ from pprs_dynamics.drives import COUNT, DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.evaluation import KernelParameters
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.places import BodyPlace, PassiveJoint
+from pprs_dynamics.physics.mechanism.places import PLATFORM, BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
@@ -98,6 +98,7 @@ class ThreePprs:
     armature: ClassVar[Array] = np.zeros(COUNT)
     motions: ClassVar[tuple[type, ...]] = (PlatformMotion,)
     turning: ClassVar[tuple[str, ...]] = ()
+    kind: ClassVar[str] = PLATFORM
 
     @property
     def passive_joints(self) -> tuple[PassiveJoint, ...]:

@@ -140,11 +140,11 @@ def transforms(stamp: int, base: str, links: Sequence[str], poses: Array, prefix
     """
     found = []
     for link, (x, y, z, *turn) in zip(links, poses.tolist(), strict=True):
-        one = TransformStamped(child_frame_id=prefix + link)
-        one.header.stamp, one.header.frame_id = time(stamp), prefix + base
-        one.transform.translation = Vector3(x=x, y=y, z=z)
-        one.transform.rotation = Quaternion(**dict(zip('xyzw', turn, strict=True)))
-        found.append(one)
+        transform = TransformStamped(child_frame_id=prefix + link)
+        transform.header.stamp, transform.header.frame_id = time(stamp), prefix + base
+        transform.transform.translation = Vector3(x=x, y=y, z=z)
+        transform.transform.rotation = Quaternion(**dict(zip('xyzw', turn, strict=True)))
+        found.append(transform)
     return found
 
 

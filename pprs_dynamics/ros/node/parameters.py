@@ -27,7 +27,6 @@ from pprs_dynamics.physics.model.keys import (
     LARGEST,
     Key,
     as_list,
-    is_axis,
     is_mechanism,
     keys_of,
 )
@@ -138,7 +137,7 @@ def drive_count(node: Node) -> int:
 
 def has_model(given: Mapping[str, Any]) -> bool:
     """Return whether a robot is among the parameters given, and not only changes of the paper's."""
-    return is_mechanism(given) or is_axis(given) or any(
+    return is_mechanism(given) or any(
         name.startswith('geometry.') for name in given)
 
 
@@ -158,10 +157,6 @@ def declare_model(node: Node, arguments: Sequence[str]) -> list[str]:
         For a key that is missing or breaks its rule.
     """
     given = overrides(node)
-    if is_axis(given):
-        key = next(name for name in given if is_axis((name,)))
-        raise ModelError(key, given[key], 'not be given: this needs a 3-PPRS, and a single axis is '
-                         'for pprs compare, diagnose, adopt, fit and history')
     for key in FILES:
         if isinstance(given.get(key), str) and given[key]:
             given[key] = str(located(given[key], folder_of(key, arguments)))
@@ -276,7 +271,7 @@ def added_descriptor(name: str) -> ParameterDescriptor:
     block, _, rest = name.partition('.')
     effect, _, place = rest.partition('.')
     if block == 'effects' and effect in CATALOGUE:
-        for parameter in (one.widest for one in CATALOGUE[effect].parameters):
+        for parameter in (parameter.widest for parameter in CATALOGUE[effect].parameters):
             if place.rpartition('.')[2] == parameter.name:
                 unit = f' [{parameter.unit}]' if parameter.unit else ''
                 descriptor = _descriptor(

@@ -192,12 +192,10 @@ def _sort_platform(model: DriveModel, sorting: _Sorting) -> None:
 
 def _sort_arm(model: DriveModel, sorting: _Sorting) -> None:
     """Sort rotors and friction, also of passive joints; of these no loads."""
-    friction = 'friction' if model.is_described else model.block
-    sorting.keep(f'{friction}.viscous', model.drives, DAMPING)
-    sorting.keep(f'{friction}.coulomb', model.drives, FRICTION)
-    sorting.drop(f'{friction}.offset')
-    if model.is_described:
-        sorting.keep('robot.armature', model.drives, ARMATURE)
+    sorting.keep('friction.viscous', model.drives, DAMPING)
+    sorting.keep('friction.coulomb', model.drives, FRICTION)
+    sorting.drop('friction.offset')
+    sorting.keep('robot.armature', model.drives, ARMATURE)
     for key in model.values:
         name, _, parameter = key.removeprefix('friction.joints.').rpartition('.')
         if not key.startswith('friction.joints.') or parameter == 'radius':
@@ -210,11 +208,4 @@ def _sort_arm(model: DriveModel, sorting: _Sorting) -> None:
 
 def _under_standard_gravity(model: DriveModel, sorting: _Sorting) -> None:
     """Take the gravity that is assumed where a file has none."""
-    if model.is_described:
-        sorting.exchange('robot.gravity', STANDARD_GRAVITY)
-    elif model.moves_joints:
-        # The axis is put at a slope that gives its share of it.
-        most, along = -STANDARD_GRAVITY[2], model.values['axis.gravity']
-        sorting.exchange('axis.gravity', min(max(along, -most), most))
-    else:
-        sorting.exchange('gravity', STANDARD_GRAVITY)
+    sorting.exchange('robot.gravity' if model.moves_joints else 'gravity', STANDARD_GRAVITY)

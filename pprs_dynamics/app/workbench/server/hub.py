@@ -178,7 +178,7 @@ class Hub:
         SessionError
             For an ending that no reader has, or after too many uploads.
         """
-        ending = next((one for one in ENDINGS if name.lower().endswith(one)), None)
+        ending = next((ending for ending in ENDINGS if name.lower().endswith(ending)), None)
         if ending is None:
             raise SessionError(f'a recording must end in {", ".join(ENDINGS)}')
         with self._lock:

@@ -16,8 +16,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
+from pprs_dynamics.physics.mechanism.places import MECHANISM
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 
 
@@ -25,7 +26,7 @@ class CoupledDrives(StructureEffect):
     """Friction of a motor that moves more than one joint, by the map of the model file."""
 
     name = 'coupled_drives'
-    acts_in = frozenset({ARM})
+    acts_in = frozenset({MECHANISM})
     is_friction = True
     is_of_one_place = True
     linear = ()

@@ -27,7 +27,7 @@ class DriveInertia(DriveEffect):
         'force must grow fourfold; a payload would act on all drives and at rest, this does not',
         'Khalil and Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002, '
         'on the inertia of rotors')
-    arm_card = Card(
+    mechanism_card = Card(
         'm q_ddot',
         'an error that follows the acceleration of this joint alone',
         'the rotor: its inertia times the square of the gear ratio acts at the joint, often more '

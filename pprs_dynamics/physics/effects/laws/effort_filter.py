@@ -72,27 +72,23 @@ class EffortFilter(MeasurementEffect):
         """Return the last time, and what goes into each lag and comes out of it last."""
         return {'time': None, 'states': None}
 
-    def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
-               memory: Any = None) -> Array:
-        """Return the filtered effort, (N, D), of a filter that had settled at the first sample."""
+    @classmethod
+    def drive_sensed(cls, effort: Array, time: Array | None, parameters: Mapping[str, float],
+                     memory: Any) -> Array:
+        """Return the filtered effort, (N,), of a filter that had settled at the first sample."""
         if time is None or not len(time):
             return effort
-        filtered = effort.copy()
-        for name, values in self.drives.items():
-            index = drives.index(name)
-            past = self.drive_memory() if memory is None else memory[name]
-            is_first = past['time'] is None
-            times = time if is_first else np.concatenate(([past['time']], time))
-            step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-            signal, states = effort[:, index], []
-            for k in range(LAGS):
-                entered, left = (signal[0], signal[0]) if is_first else past['states'][k]
-                smooth = lag(signal, step, values['time_constant'] / LAGS, entered, left)
-                states.append((float(signal[-1]), float(smooth[-1])))
-                signal = smooth
-            filtered[:, index] = signal
-            past.update(time=float(time[-1]), states=states)
-        return filtered
+        is_first = memory['time'] is None
+        times = time if is_first else np.concatenate(([memory['time']], time))
+        step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+        signal, states = effort, []
+        for k in range(LAGS):
+            entered, left = (signal[0], signal[0]) if is_first else memory['states'][k]
+            smooth = lag(signal, step, parameters['time_constant'] / LAGS, entered, left)
+            states.append((float(signal[-1]), float(smooth[-1])))
+            signal = smooth
+        memory.update(time=float(time[-1]), states=states)
+        return signal
 
 
 def lag(signal: Array, step: float, time_constant: float, entered: float, left: float) -> Array:

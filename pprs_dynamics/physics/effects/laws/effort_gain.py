@@ -11,7 +11,7 @@ robots, J. Dynamic Systems, Measurement, and Control 136 (2014).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from pprs_dynamics.arrays import Array
@@ -39,10 +39,8 @@ class EffortGain(MeasurementEffect):
         'Gautier and Briot, Global identification of joint drive gains and dynamic parameters '
         'of robots, 2014')
 
-    def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
-               memory: Any = None) -> Array:
+    @classmethod
+    def drive_sensed(cls, effort: Array, time: Array | None, parameters: Mapping[str, float],
+                     memory: Any) -> Array:
         """Return (1 + g) F."""
-        scaled = effort.copy()
-        for name, values in self.drives.items():
-            scaled[:, drives.index(name)] *= 1 + values['gain']
-        return scaled
+        return (1 + parameters['gain']) * effort

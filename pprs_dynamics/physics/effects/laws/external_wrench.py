@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 
 FORCES = tuple(f'force_{axis}' for axis in 'xyz')
@@ -29,7 +30,7 @@ class ExternalWrench(BodyEffect):
     """
 
     name = 'external_wrench'
-    acts_in = frozenset({PLATFORM, ARM})
+    acts_in = frozenset({PLATFORM, MECHANISM})
     nonlinear = True
     linear = (
         *(Parameter(name, f'F_{name[-1]}', 'N', f'force to overcome along {name[-1]} of base',
@@ -47,7 +48,7 @@ class ExternalWrench(BodyEffect):
         'and look whether the same force is found. Only accelerations tell a downward force '
         'from a payload',
         'Tsai, Robot Analysis, 1999')
-    arm_card = Card(
+    mechanism_card = Card(
         'tau = J^T (F, M), F and M in base at the origin of the tool',
         'errors that depend on the pose alone, whatever the speed, in the proportions of the '
         'Jacobian of the tool',

@@ -32,7 +32,7 @@ class LoadFriction(DriveEffect):
         'grow with the load (if it does not: coulomb_friction); clean and lubricate, and repeat',
         'Hamon, Gautier, Garrec, Dynamic identification of robots with a dry friction model '
         'depending on load and velocity, IROS, 2010')
-    arm_card = Card(
+    mechanism_card = Card(
         'dmu |tau| sgn(q_dot), tau what the gear transmits: without friction and the rotor',
         'a step at each reversal that is higher where the joint carries more weight or accelerates '
         'more',

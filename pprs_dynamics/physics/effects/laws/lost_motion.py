@@ -18,14 +18,15 @@ M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash - a survey
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Self
+from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
 # On either side of the travel through the play, of its length: there the link may separate from the
 # flank. A polynomial through its motion before and after, as long as that, determines it.
@@ -40,7 +41,7 @@ class LostMotion(MeasurementEffect):
     """Backlash or play of what is between an encoder and the link that it is to measure."""
 
     name = 'lost_motion'
-    acts_in = frozenset({PLATFORM, ARM})
+    acts_in = frozenset({PLATFORM, MECHANISM})
     nonlinear = True
     not_linear_in: ClassVar[tuple[str, ...]] = ('play',)
     linear = (
@@ -64,31 +65,15 @@ class LostMotion(MeasurementEffect):
         'Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica '
         '38, 2002')
 
-    @classmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
-        """Build it from `{drive: {parameter: value}}`; a wind-up of 0, once in files, is none."""
-        return super().from_file({drive: (
-            {name: value for name, value in block.items() if (name, value) != ('windup', 0.0)}
-            if isinstance(block, Mapping) else block) for drive, block in values.items()}
-            if isinstance(values, Mapping) else values, complete)
-
     def position_error(self, drives: Sequence[str], position: Array) -> Array:
         """Return how far encoders are ahead because of play, (N, D) [m, rad]."""
-        error = np.zeros_like(position)
-        for name, values in self.drives.items():
-            if values['play'] and name in drives:
-                k = drives.index(name)
-                error[:, k] = position[:, k] - behind_play(position[:, k], values['play'])
-        return error
+        return self.by_drive(drives, position, lambda q, own: (
+            q - behind_play(q, own['play']) if own['play'] else np.zeros_like(q)))
 
     def loaded_position_error(self, drives: Sequence[str], transmitted: Array) -> Array:
         """Return how far encoders are ahead because of loads, (N, D) [m, rad]."""
-        error = np.zeros_like(transmitted)
-        for name, values in self.drives.items():
-            if name in drives:
-                k = drives.index(name)
-                error[:, k] = values['backlash'] / 2 * np.sign(transmitted[:, k])
-        return error
+        return self.by_drive(drives, transmitted, lambda load, own: (
+            own['backlash'] / 2 * np.sign(load)))
 
 
 def behind_play(position: Array, play: float) -> Array:

@@ -67,21 +67,18 @@ class TimeDelay(MeasurementEffect):
         """Return the past: times and efforts that are not yet measured."""
         return {'time': np.zeros(0), 'effort': np.zeros(0)}
 
-    def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
-               memory: Any = None) -> Array:
+    @classmethod
+    def drive_sensed(cls, effort: Array, time: Array | None, parameters: Mapping[str, float],
+                     memory: Any) -> Array:
         """Return F(t - d) by straight lines between samples and beyond them."""
         if time is None:
             return effort
-        late = effort.copy()
-        for name, values in self.drives.items():
-            index = drives.index(name)
-            past = self.drive_memory() if memory is None else memory[name]
-            t = np.concatenate((past['time'], time))
-            F = np.concatenate((past['effort'], effort[:, index]))
-            late[:, index] = shifted(t, F, values['delay'])[len(past['time']):]
-            kept = t >= t[-1] - 1.1 * max(values['delay'], 0.0) - 0.01
-            past['time'], past['effort'] = t[kept], F[kept]
-        return late
+        before = len(memory['time'])
+        t = np.concatenate((memory['time'], time))
+        F = np.concatenate((memory['effort'], effort))
+        kept = t >= t[-1] - 1.1 * max(parameters['delay'], 0.0) - 0.01
+        memory['time'], memory['effort'] = t[kept], F[kept]
+        return shifted(t, F, parameters['delay'])[before:]
 
 
 def shifted(time: Array, values: Array, delay: float) -> Array:
