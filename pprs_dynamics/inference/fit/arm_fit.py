@@ -225,17 +225,6 @@ def _with(model: DriveModel, inertial: Array, own: Array, width: Array) -> Drive
     return DriveModel.from_parameters(values, model.source)
 
 
-def numbers_at(model: DriveModel, motion: JointMotion) -> Array:
-    """Return the columns of all numbers in a motion, (M, n, P), as `ArmColumns.numbers`."""
-    position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
-    width = model.reversal.widths(len(model.drives))
-    joints = np.stack((acceleration, velocity, np.asarray(smooth_sign(velocity, width)),
-                       np.ones_like(velocity)), axis=-1)
-    numbers: Array = np.concatenate((model.robot.regressor(position, velocity, acceleration),
-                                     of_passive(model, motion), _of_each(joints)), axis=2)
-    return numbers
-
-
 def own_passive(model: DriveModel) -> tuple[PassiveJoint, ...]:
     """Return the passive joints of loops whose friction is not that of another joint.
 

@@ -38,7 +38,7 @@ from scipy.spatial import cKDTree
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.fit.arm_fit import ArmColumns, base_prior, numbers_at
+from pprs_dynamics.inference.fit.arm_fit import ArmColumns, base_prior
 from pprs_dynamics.inference.fit.repeating_forces import (
     Integers,
     Process,
@@ -54,7 +54,7 @@ from pprs_dynamics.inference.regression.base_columns import (
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.residuals.bands import LEAST_OPEN, DriveSeries, OpenForces
-from pprs_dynamics.inference.residuals.measuring import MOTION, join_tables, treated_table
+from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
 from pprs_dynamics.inference.residuals.reconstruction import (
     CHUNK,
     Reconstruction,
@@ -64,10 +64,8 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.reference_keys import DIRECTIONS, RESIDUAL
-from pprs_dynamics.system.plain_text import displayed
+from pprs_dynamics.physics.model.reference_keys import DIRECTIONS
 
 # Tried: in standard deviations of the positions, and in turns of the directions.
 LENGTHS = tuple((position, speed) for position in (0.5, 1.5) for speed in (0.7, 2.0))
@@ -83,7 +81,6 @@ LEAST_REPEATS = 0.1  # of the process in two runs, below which nothing of it is 
 FINER = 8  # points for each sample of a reference, among which the nearest is looked for
 OCTAVES = 6  # of frequency, in each of which another share of what no process tells comes back
 BLOCKS = 4  # of a single reference, each predicted from the others
-MOST_KEPT = 400  # means of a reference that a model file keeps
 MOST_DIRECTIONS = 24  # that become columns of all drives together
 
 
@@ -154,23 +151,6 @@ class Reference:
                            tuple(recordings))
 
     @classmethod
-    def of_residual(cls, model: DriveModel, text: str, kept: str = '') -> Reference:
-        """Return the fit of what a model file keeps of its reference runs; errors as `of`."""
-        count = len(model.drives)
-        content = _as_array(text, RESIDUAL).T
-        if content.shape[1] != 5 * count + 2:
-            raise ReferenceRunError(f'{RESIDUAL}: it is of {(content.shape[1] - 2) // 5} drives, '
-                                    f'must be of {count}: fit the model again')
-        time, record = np.cumsum(content[:, 0]), np.rint(content[:, 1]).astype(int)
-        motion = dict(zip(MOTION, np.split(content[:, 2:2 + 3 * count], 3, axis=1), strict=True))
-        error, measured = np.split(content[:, 2 + 3 * count:], 2, axis=1)
-        residuals = Residuals(model.drives, time, record, measured, measured - error, {}, motion,
-                              float(np.median(content[1:, 0])), model.units)
-        numbers = numbers_at(model, JointMotion(*(motion[name] for name in MOTION))) if (
-            model.is_described) else None
-        return cls._fitted(model, residuals, numbers, kept, (displayed(model.source),), ())
-
-    @classmethod
     def _fitted(cls, model: DriveModel, residuals: Residuals, numbers: Array | None, kept: str,
                 named: tuple[str, ...], recordings: tuple[Recording, ...]) -> Reference:
         names = ', '.join(named)
@@ -214,24 +194,6 @@ class Reference:
             return ''
         values, axes = np.linalg.eigh(self.fit.covariance[:told, :told])
         return _as_text(self.base[:, :told] @ (axes * np.sqrt(np.maximum(values, 0.0))))
-
-    @property
-    def residual(self) -> str:
-        """Motion, errors and efforts of the recordings, means over many samples, as a text."""
-        residuals = self.regression.residuals
-        known = np.isfinite(residuals.measured).all(axis=1)
-        size = -(-int(known.sum()) // MOST_KEPT)
-        blocks = np.concatenate([
-            np.flatnonzero(known & (residuals.record == one))[
-                :int(np.sum(known & (residuals.record == one))) // size * size].reshape(-1, size)
-            for one in np.unique(residuals.record)])
-        content = np.concatenate((
-            *(residuals.variables[name] for name in MOTION), residuals.error,
-            residuals.measured), axis=1)[blocks].mean(axis=1)
-        time = residuals.time[blocks].mean(axis=1)
-        return _as_text(np.concatenate((
-            np.diff(time, prepend=time[:1])[:, None], residuals.record[blocks[:, :1]],
-            content), axis=1).T)
 
     @property
     def note(self) -> str:
