@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where the model fails: patterns of each drive's error that stand out against its noise.
+"""Where the model fails: patterns of each drive's error that its noise does not explain.
 
-The same noise, criterion and patterns as in the search for missing effects, without any effect:
-per drive, the pattern that lowers the cost most is stated, what its variable can carry is taken
-out with it, and the search goes on until nothing lowers the cost.
+Noise, criterion and patterns are those of the search for missing effects, without any effect. The
+pattern that lowers the cost most is stated first. The columns of its variable then join the fit,
+until no pattern lowers the cost.
 """
 
 from __future__ import annotations

@@ -8,14 +8,13 @@ r"""What a reference run says of another recording: its forces known in part, an
     y_r = X_r \theta + \delta(s_r) + n_r, \qquad
     y_l = X_l \theta + \rho\,\delta(s_l) + \sqrt{1 - \rho^2}\,\delta'(s_l) + n_l
 
-y are the errors of the model, theta the numbers of its base, and delta what no number of it
-explains but repeats: in each drive the sum of two Gaussian processes, one over the states of all
-drives, s = (q / l_q, tanh(v / v_0) / l_v), and one over its own, which other paths meet again, of
-standard deviations sigma of the drive's own; and of waves over its own position, finer than any
-length, as gears and motors have them. delta' is drawn anew for every run. Given y_r, X_l theta +
-delta(s_l) is Gaussian: its mean is carried over, and the principal directions of its covariance
-are columns of unit prior. Near the states of the reference the errors of the base cancel; far from
-them what is known is what the prior says.
+y are the errors of the model, theta the numbers of its base, and delta the repeatable error. Delta
+is in each drive the sum of two Gaussian processes, over the states of all drives,
+s = (q / l_q, tanh(v / v_0) / l_v), and over its own. Waves over its own position are added, as
+gears and motors have them. delta' is drawn anew for every run. Given y_r, X_l theta + delta(s_l) is
+Gaussian: its mean is carried over, and the principal directions of its covariance are columns of
+unit prior. Near the states of the reference the errors of the base cancel. Far from them the prior
+decides.
 
 The processes are those of `repeating_forces`; of features of states that the reference does not
 know it says nothing.
