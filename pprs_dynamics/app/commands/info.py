@@ -19,7 +19,7 @@ from pprs_dynamics.app.report.mechanism_description import (
     mechanism_lines,
     write_mechanism_page,
 )
-from pprs_dynamics.app.report.tables import recording_table
+from pprs_dynamics.app.report.tables import reading_table, recording_table
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.readings.findings import (
     Mistake,
@@ -68,13 +68,14 @@ def run(options: argparse.Namespace) -> int:
 
 
 def show_recordings(model: ForceModel, paths: Sequence[str], topic: str | None, screen: Any,
-                    ) -> list[Summary]:
-    """Print what is in recordings, and what is wrong with them."""
+                    by_column: bool = False) -> list[Summary]:
+    """Print what is in recordings, drive by drive or column by column, and what is wrong."""
     with staged_bar(screen) as progress:
         recordings = [read_checked(model, path, topic, progress) for path in paths]
     summaries = [describe(recording) for recording in recordings]
     for summary in summaries:
-        for table in recording_table(summary, model.units):
+        for table in ([reading_table(summary, model.recorded)] if by_column
+                      else recording_table(summary, model.units)):
             screen.print(table)
         for finding in summary.findings:
             screen.print(f'[yellow]![/] {shown(finding.text)}')

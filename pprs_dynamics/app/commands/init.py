@@ -64,7 +64,8 @@ def run(options: argparse.Namespace) -> int:
         for line in first.questions:
             screen.print(f'  {shown(line)}')
         return 1
-    summaries = show_recordings(first.model, [str(one) for one in first.recordings], None, screen)
+    summaries = show_recordings(first.model, [str(one) for one in first.recordings], None, screen,
+                                by_column=True)
     screen.print(f'model: {shown(options.output)} (read its comments: they say what was guessed)')
     names = ' '.join(quote(str(one)) for one in first.recordings) or 'RECORDING'
     model = quote(options.output)

@@ -71,6 +71,8 @@ class Guess:
         What was decided and why, for comments.
     rate : float, optional
         Samples per second of a table without times [Hz].
+    effort_kind : str
+        Where names tell another one than measured or current; else empty.
     """
 
     time: Column | None
@@ -79,6 +81,7 @@ class Guess:
     time_scale: float | None = None
     notes: list[str] = field(default_factory=list)
     rate: float | None = None
+    effort_kind: str = ''
 
 
 def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str | None = None,
@@ -123,7 +126,13 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     by_column = {one.column: one for one in series}
     scales = {key: scale for key, column in columns.items()
               if (scale := _scale(by_column[column].title, key[1])) is not None}
-    guess = Guess(None if time is None else time.column, columns, scales, time_scale, notes, rate)
+    outside = [column for (_, kind), column in columns.items() if kind == EFFORT
+               and {*words_of(by_column[column].title)} & table.FROM_OUTSIDE]
+    if outside:
+        notes.append(f'{by_column[outside[0]].title} is an external torque by its name, from which '
+                     'a model was taken out')
+    guess = Guess(None if time is None else time.column, columns, scales, time_scale, notes, rate,
+                  table.EXTERNAL if outside else '')
     return guess if quantity else _judge_velocities(guess, by_column, time, rate)
 
 
@@ -262,7 +271,7 @@ def _fit(key: tuple[str, ...], members: dict[str, Column], quantity: str, given:
         fits = False
     if not fits or {*key} & table.OTHERS:
         return (-1.0,)
-    return (float(len(members)), float(not {*key} & table.COMMANDS),
+    return (float(len(members)), float(not {*key} & (table.COMMANDS | table.FROM_OUTSIDE)),
             float(bool({*key} & table.MEASURED)), -float(len(key)))
 
 

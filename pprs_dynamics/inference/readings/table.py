@@ -124,6 +124,8 @@ OTHERS = frozenset((
 COMMANDS = frozenset((
     'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'des', 'desired', 'ref',
     'reference', 'goal', 'setpoint', 'sp', 'set', 'demand', 'demanded'))
+# These tell of torques from outside, as a driver estimates them: taken where nothing else is there.
+FROM_OUTSIDE = frozenset(('ext', 'external', 'contact'))
 LETTERS = {'a': 'actual', 'm': 'measured', 'd': 'desired', 'c': 'commanded', 'r': 'reference'}
 MEASURED = frozenset((
     'meas', 'measured', 'actual', 'act', 'real', 'fb', 'feedback', 'msr', 'sensor', 'link'))
