@@ -115,10 +115,10 @@ def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]
     kinds = {mistake.kind for mistake in mistakes}
     if not mistakes:
         mistakes += find_scales(model, contents)
-    # What explains the efforts well is in the right unit, whatever limits say.
-    if (not kinds & {'position_unit', 'drive_order', 'ambiguous'}
-            and search.plain_left > table.GOOD_FIT):
-        mistakes += _of_strokes(model, recording, search.strokes)
+    if not kinds & {'position_unit', 'drive_order', 'ambiguous'}:
+        # Angles that explain the efforts well are in the right unit, whatever limits say.
+        mistakes += _of_strokes(model, recording, search.strokes,
+                                search.plain_left > table.GOOD_FIT)
     if not kinds & {'position_unit', 'position_sign', 'reversed_time'}:
         mistakes += _of_velocities(model, recording, excerpts.get(
             1.0 if best is None else best.time_unit))
@@ -394,7 +394,7 @@ def position_scales(model: ForceModel, reading: Reading) -> Scales:
 
 
 def _of_strokes(model: ForceModel, recording: Recording, strokes: tuple[Array, Array],
-                ) -> Iterator[Defect]:
+                with_angles: bool) -> Iterator[Defect]:
     """Yield positions far beyond the strokes, which no effort is needed to recognise."""
     lower, upper = strokes
     drives, ends = recording.drives, np.maximum(-lower, upper)
@@ -402,7 +402,7 @@ def _of_strokes(model: ForceModel, recording: Recording, strokes: tuple[Array, A
     for turns, names in ((False, table.LENGTHS), (True, table.ANGLES)):
         alike = [k for k, units in enumerate(model.units) if units.turns == turns]
         far = tuple(k for k in alike if reach[k] > table.FAR * ends[k])
-        if not far:
+        if not far or (turns and not with_angles):
             continue
         # Encoders of a robot's turning joints count alike; its rails may not.
         group = tuple(alike) if turns else far

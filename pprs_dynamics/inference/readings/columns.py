@@ -419,6 +419,9 @@ def _chains(links: Links, count: int) -> dict[str, list[int]]:
     """Return positions and velocities by derivatives; empty where not each joint has both."""
     with np.errstate(invalid='ignore'):
         derived = (links.correlation > table.ALIKE) & (links.slope > 0)
+        # What has a velocity is followed by it best: an effort may resemble a position.
+        derived &= links.correlation > np.nanmax(np.where(
+            derived, links.correlation, -1.0), axis=0) - table.AS_WELL
         same = links.alike > table.COPY
     np.fill_diagonal(derived, False)
     # What is asked for moves as what is measured, which the velocity follows more exactly.
@@ -466,12 +469,22 @@ def _layout(values: Array, time: Array, count: int) -> dict[str, list[int]]:
                                   -p, layout, p, e, links[p]))
     if not found:
         return {}
-    _, _, layout, p, e, of_p = max(found, key=lambda one: (round(one[0], 2), one[1]))
+    # Of those that explain as much the one whose positions are smoothest, as no effort is.
+    most = max(found, key=lambda one: one[0])[0] - table.CLEAR
+    _, _, layout, p, e, of_p = min(
+        (one for one in found if one[0] >= most), key=lambda one: (
+            _roughness(values[:, one[2][one[3]]]), -one[1]))
     kinds = {POSITION: layout[p]}
     speeds = [b for b in range(number) if b not in (p, e) and of_p[b]]
     if speeds:
         kinds[VELOCITY] = layout[speeds[0]]
     return {**kinds, EFFORT: layout[e]}
+
+
+def _roughness(values: Array) -> float:
+    """Return the size of third differences over that of the first ones: small for a motion."""
+    moved = np.std(np.diff(values, axis=0), axis=0)
+    return float(np.median(np.std(np.diff(values, 3, axis=0), axis=0) / np.maximum(moved, 1e-300)))
 
 
 def _linked(values: Array, block: Sequence[int], other: Sequence[int], time: Array) -> bool:
@@ -493,30 +506,37 @@ def _is_known(links: Links, place: int, used: Collection[int]) -> bool:
 
 
 def _explained(efforts: Array, position: Array, time: Array) -> float:
-    """Return the share of efforts that gravity, friction and inertia of any size explain."""
+    """Return the share of efforts that gravity, friction and inertia of any size explain.
+
+    Positions may be in any unit of angles.
+    """
     known = (np.isfinite(efforts).all(axis=1) & np.isfinite(position).all(axis=1)
              & np.isfinite(time))
     efforts, position, time = efforts[known], position[known], time[known]
+    swing = np.var(efforts, axis=0)
+    moves = swing > 0
     if len(time) < table.LEAST_ROWS or not np.all(np.diff(time) > 0):
         return 0.0
+    if not np.any(moves):
+        return -1.0
     half = max(1, len(time) // 400)
     speed = np.zeros_like(position)
     speed[half:-half] = (position[2 * half:] - position[:-2 * half]) / (
         time[2 * half:] - time[:-2 * half])[:, None]
-    rate = np.gradient(speed, time, axis=0)
-    total = np.cumsum(position, axis=1)
     width = root_mean_square(speed) / 10 or 1.0
-    columns = np.column_stack([
-        np.ones(len(time)), np.sin(position), np.cos(position), np.sin(total), np.cos(total),
-        speed, np.tanh(speed / width), rate])
-    columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    rest = efforts - columns @ np.linalg.lstsq(columns, efforts, rcond=1e-8)[0]
-    swing = np.var(efforts, axis=0)
-    moves = swing > 0
-    if not np.any(moves):
-        return -1.0
-    # What is explained exactly is computed from positions: no measurement.
-    return float(np.mean(1 - np.var(rest, axis=0)[moves] / swing[moves]))
+    rate = np.gradient(speed, time, axis=0)
+    common = [np.ones(len(time)), speed, np.tanh(speed / width), rate]
+    shares = []
+    for unit in (1.0, *table.ANGLES):
+        angle = unit * position
+        total = np.cumsum(angle, axis=1)
+        columns = np.column_stack([
+            *common, np.sin(angle), np.cos(angle), np.sin(total), np.cos(total),
+            *(each * rate for each in np.cos(angle).T[1:, :, None])])
+        columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        rest = efforts - columns @ np.linalg.lstsq(columns, efforts, rcond=1e-8)[0]
+        shares.append(np.mean(1 - np.var(rest, axis=0)[moves] / swing[moves]))
+    return float(max(shares))
 
 
 # ------------------------------------------------------------------------------------ units

@@ -141,6 +141,7 @@ TIME_WORDS = {'ms': 1e-3, 'msec': 1e-3, 'millis': 1e-3, 'milliseconds': 1e-3, 'u
 # --------------------------------------------------------------------- columns by their numbers
 
 COPY = 0.995  # correlation of the changes of a column with those of what it was asked to be
+AS_WELL = 0.02  # difference of correlations that says nothing
 UNLIKE = 0.5  # correlation below which a column that is called a velocity is none
 SAME_UNIT = 0.05  # relative distance of a slope from a unit's
 CLEAR = 0.05  # share of the explained efforts by which one block of columns must win
