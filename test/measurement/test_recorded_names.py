@@ -200,7 +200,8 @@ def test_tables_by_their_own_columns(run: Any, tmp_path: Path, suffix: str) -> N
     time, position, effort = run
     path = written(tmp_path / f'run{suffix}', time, 1e3 * position, effort)
     scales = {f'columns.{drive}.position_scale': 1e-3 for drive in DRIVES}
-    recording = read_with(with_keys(**COLUMNS, **scales, **{'columns.lift_3.effort_scale': 2.0}), path)
+    keys = {**COLUMNS, **scales, 'columns.lift_3.effort_scale': 2.0}
+    recording = read_with(with_keys(**keys), path)
     np.testing.assert_allclose(recording.position, position, rtol=1e-12)
     np.testing.assert_allclose(recording.effort[:, :5], effort[:, :5], rtol=1e-12)
     np.testing.assert_allclose(recording.effort[:, 5], 2 * effort[:, 5], rtol=1e-12)

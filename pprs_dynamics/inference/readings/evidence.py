@@ -307,6 +307,16 @@ def _fast_noise(recording: Recording, drive: int) -> float:
                      np.min(np.diff(values)) / np.sqrt(12)))
 
 
+def rigid_factor(effort: Array, parts: Parts, drive: int) -> float:
+    """Return the factor of a model's inertia and gravity together in efforts, (N,); 0 for none."""
+    known = np.isfinite(effort) & np.isfinite(parts.inertia[:, drive])
+    rigid, velocity, direction = (part[known, drive] for part in (
+        parts.inertia + parts.gravity, parts.velocity, parts.direction))
+    is_steady = np.std(rigid) < table.STEADY * root_mean_square(rigid)
+    return fitted(effort[known], [rigid, velocity, direction, *(
+        [] if is_steady else [np.ones_like(rigid)])])[0][0]
+
+
 def fitted(effort: Array, columns: Sequence[Array]) -> tuple[list[float], list[float], float]:
     """Return coefficients, their doubts and the residual's root mean square.
 

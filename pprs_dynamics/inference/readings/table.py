@@ -53,7 +53,8 @@ REVERSAL = 0.2
 FRICTION, FRICTION_MOST = 3.0, 9.0
 # Prior costs of mistakes [nats].
 COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'position_offset': 8.0,
-        'reversed_time': 8.0, 'time_unit': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0}
+        'reversed_time': 8.0, 'time_unit': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
+        'drive_constant': 10.0}
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
 OUTSIDE, FAR_OUTSIDE = 4.0, 8.0  # of positions beyond a stroke, and far beyond it
