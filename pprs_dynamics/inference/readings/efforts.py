@@ -90,7 +90,7 @@ def find_scales(model: ForceModel, contents: Mapping[str, Shares]) -> list[Other
 def gain_line(scales: Sequence[float]) -> str:
     """Return the lines for efforts that are so many times what they should be: currents."""
     return ('effort_kind: current, and beside urdf or mjcf  gain: ['
-            + ', '.join(f'{1 / scale:.3g}' for scale in scales) + ']')
+            + ', '.join('1.0' if scale == 1 else f'{1 / scale:.3g}' for scale in scales) + ']')
 
 
 def _unit(model: ForceModel, what: str, factors: Array) -> OtherReading:
