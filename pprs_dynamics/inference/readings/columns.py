@@ -72,7 +72,7 @@ class Guess:
     rate : float, optional
         Samples per second of a table without times [Hz].
     effort_kind : str
-        Where names tell another one than measured or current; else empty.
+        By their names, where it is neither measured nor current; else empty.
     """
 
     time: Column | None

@@ -114,7 +114,7 @@ def likelihood(effort: Array, parts: Parts, drive: int, scale: float, masses: fl
     """Return how likely efforts, (N,), are `scale` times those of a drive; None where all is 0.
 
     Inertia and gravity are the model's within a relative tolerance of its masses, friction
-    opposes the motion with any size, and a constant is small beside them.
+    opposes the motion with any size, and a constant is small in comparison.
     """
     columns = [part[:, drive] for part in (parts.inertia, parts.gravity, parts.others,
                                            parts.velocity, parts.direction)]

@@ -87,7 +87,7 @@ class Defect:
     count : int
         How many samples, places, columns, ... it concerns.
     what : str
-        What was found, as a clause.
+        The defect, as a clause.
     spans : tuple of (start, end)
         Where, in the recording's time [s]; the first 100 places. Empty where it has no place.
     drives : tuple of str

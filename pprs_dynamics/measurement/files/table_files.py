@@ -118,7 +118,7 @@ def _source(path: Path, columns: RecordedColumns, prefix: str = '') -> str:
 
 
 def _time_column(table: Table, columns: RecordedColumns) -> Column | None:
-    """Return the column of times; None where a rate stands for them."""
+    """Return the column of times; None where a rate replaces it."""
     if columns.time is not None:
         _require(table, [columns.time])
         return columns.time
@@ -404,12 +404,12 @@ def files_of(path: Path, names: Mapping[str, str]) -> dict[str, Path]:
     path : Path
         Their folder, or one of them.
     names : mapping
-        By quantity; * stands for what recordings in one folder differ in.
+        By quantity; * is the part in which recordings of one folder differ.
 
     Raises
     ------
     UnreadableFileError
-        Where one is missing, or cannot be told.
+        Where one is missing, or several fit.
     """
     if path.is_dir():
         folder, star = path, None
