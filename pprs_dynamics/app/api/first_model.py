@@ -65,7 +65,8 @@ SCALE_KEYS = {POSITION: 'position_scale', VELOCITY: 'velocity_scale', EFFORT: 'e
 
 
 # Mistakes of which a model file may have the line without a question.
-SURE_KINDS = {'position_unit', 'effort_unit', 'effort_sign', 'effort_sign_bit', 'time_unit'}
+SURE_KINDS = {'position_unit', 'effort_unit', 'effort_sign', 'effort_sign_bit', 'time_unit',
+              'velocity'}
 
 
 class FirstModelError(PprsError, ValueError):

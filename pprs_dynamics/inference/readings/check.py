@@ -36,7 +36,7 @@ from pprs_dynamics.inference.readings.evidence import (
     read_motion,
     rigid_factor,
 )
-from pprs_dynamics.inference.readings.findings import Mistake, OtherReading, Scales, columns_line
+from pprs_dynamics.inference.readings.findings import OtherReading, Scales, columns_line
 from pprs_dynamics.inference.readings.table import Reading, named, plain, quarter_turn, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
@@ -471,11 +471,15 @@ def _of_velocities(model: ForceModel, recording: Recording, excerpt: Excerpt | N
         return
     groups: dict[float, list[int]] = {}
     for drive, factor in factors.items():
-        for wrong in (-1.0, 1e-3, -1e-3, 1e3, -1e3, *(1 / unit for unit in table.ANGLES)):
+        for wrong in (-1.0, *(sign * each for sign in (1, -1) for unit in table.VELOCITY_FACTORS
+                              for each in (unit, 1 / unit))):
             if abs(factor / wrong - 1) <= table.NEAR_ONE:
                 groups.setdefault(wrong, []).append(drive)
     for factor, group in groups.items():
         times = 'minus' if factor == -1.0 else f'{factor:.4g} times'
-        yield Mistake.of('velocity', recording.drives, group, 'the recorded velocity of '
-                         f'{named(recording.drives, tuple(group))} is {times} the derivative of '
-                         'the position')
+        yield OtherReading.of(
+            'velocity', recording.drives, group, 'the recorded velocity of '
+            f'{named(recording.drives, tuple(group))} is {times} the derivative of the position',
+            scales=tuple((drive, 'velocity_scale', (
+                1.0 if columns is None else columns.drives[drive].velocity_scale) / factor)
+                for drive in (recording.drives[k] for k in group)))

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,7 +17,7 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.table import CURRENT, EFFORT, POSITION, VELOCITY
 from pprs_dynamics.measurement.files.contents import Series
-from pprs_dynamics.measurement.files.table_files import LATEST_SECOND, TIME_COLUMNS, TIME_LIKE
+from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
 
 
 class GuessError(PprsError, ValueError):
@@ -179,20 +178,9 @@ def _time(series: Sequence[Series], has_rate: bool,
         notes.append(f'column {found.column} rises all the time: taken as time')
     scale = next((table.TIME_WORDS[word] for word in words_of(found.title)
                   if word in table.TIME_WORDS), None)
-    known = found.values[np.isfinite(found.values)]
-    if known[0] > LATEST_SECOND:  # since 1970, in a unit that the size of the stamps tells
-        parts = 1.0
-        while known[0] * parts > LATEST_SECOND:
-            parts /= 1e3
-        step = float(np.median(np.diff(known)))
-        if scale is None and step * parts < table.SHORTEST:  # since boot
-            scale = next(unit for unit in table.SINCE_BOOT if step * unit <= table.SLOWEST)
-            notes.append(f'times rise by {step:g}: taken as units of {scale:g} s since boot')
-        parts = scale or parts
-        return replace(found, values=found.values * parts), scale, notes
-    step = float(np.median(np.diff(known)))
+    step = float(np.median(np.diff(found.values[np.isfinite(found.values)])))
     if scale is None and step > table.SLOWEST:
-        scale = next(unit for unit in table.SINCE_BOOT if step * unit <= table.SLOWEST)
+        scale = next(unit for unit in table.TIMES if step * unit <= table.SLOWEST)
         notes.append(f'times rise by {step:g}: taken as units of {scale:g} s')
     return replace(found, values=found.values * (scale or 1.0)), scale, notes
 
@@ -549,7 +537,7 @@ def _scale(title: str, quantity: str) -> float | None:
 
 def _judge_velocities(guess: Guess, series: Mapping[Column, Series], time: Series | None,
                       rate: float | None) -> Guess:
-    """Return a guess with the units of velocities and the rate that derivatives show.
+    """Return a guess with the rate that velocities show, without those that are none.
 
     Raises
     ------
@@ -585,15 +573,4 @@ def _judge_velocities(guess: Guess, series: Mapping[Column, Series], time: Serie
             1.0, *table.VELOCITY_FACTORS, *(1 / factor for factor in table.VELOCITY_FACTORS)))
         if not is_unit:
             raise RateError(rate, float(f'{rate * middle:.3g}'))
-    scales = dict(guess.scales)
-    for joint, slope in slopes.items():
-        factor = scales.get((joint, POSITION), 1.0)
-        if (joint, VELOCITY) in scales or abs(slope - 1) < table.SAME_UNIT:
-            continue
-        exact = min((1.0, *table.VELOCITY_FACTORS), key=lambda unit: abs(
-            math.log(unit * slope / factor)))
-        if abs(exact * slope / factor - 1) < table.SAME_UNIT:
-            scales[joint, VELOCITY] = exact
-            guess.notes.append(f'the velocity of {joint} is {slope:.4g} times the derivative of '
-                               f'its position: velocity_scale {exact:g}')
-    return replace(guess, scales=scales)
+    return guess

@@ -150,7 +150,6 @@ LEAST_ROWS = 30
 LENGTHS_OF_STEPS = (1, 2, 4, 8, 16, 32, 64, 128)  # [samples]
 VELOCITY_FACTORS = (math.pi / 180, 2 * math.pi, math.pi / 30, 1e-3, 1e-6)
 SLOWEST, SHORTEST = 0.5, 1e-5  # [s]; steps of a robot's recording
-SINCE_BOOT = (1e-3, 1e-6, 1e-9)  # units of stamps [s]
 
 # --------------------------------------------------------------------------------- velocities
 
