@@ -59,7 +59,7 @@ TESTS = {
     'inference/search/search.py': SEARCH,
     'inference/search/fitted_sets.py': SEARCH,
     'inference/search/table.py': (*SEARCH, 'inference/test_model_table.py'),
-    'inference/search/cost_terms.py': (*SEARCH, 'inference/test_prior_costs.py'),
+    'inference/search/candidates.py': (*SEARCH, 'inference/test_prior_costs.py'),
     'inference/search/held_out.py': ('inference/test_gates.py', *SEARCH),
     'inference/search/form_error.py': ('inference/test_gates.py', 'inference/test_search.py'),
     'ros/force_command.py': ('ros/test_force_command.py',),
@@ -74,7 +74,7 @@ TESTS = {
 }
 # The search decides all verdicts: more of it than COUNT, 40 mutants together.
 MORE = {'inference/search/search.py': 10, 'inference/search/fitted_sets.py': 10,
-        'inference/search/table.py': 10, 'inference/search/cost_terms.py': 4,
+        'inference/search/table.py': 10, 'inference/search/candidates.py': 4,
         'inference/search/held_out.py': 6}
 
 

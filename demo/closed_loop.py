@@ -30,9 +30,9 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
 from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.ros.setpoints import SetpointQueue
-from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
-from pprs_dynamics.simulation.injected_effects import draw_effects
-from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
+from pprs_dynamics.simulation.drive_control import Setpoint
+from pprs_dynamics.simulation.plant import Plant
+from pprs_dynamics.simulation.simulated_robot import BANDWIDTH, DAMPING_RATIO, SimulatedRobot
 
 LEAD_IN = 2.0  # [s] from the home pose to the path's start, not counted
 AHEAD = 0.05  # [s] that each pose is sent before its moment, as a trajectory controller is fed
@@ -165,10 +165,9 @@ def execute(case: Case, commands: np.ndarray) -> Tracking:
     commands : (K, 19) array
         As in `Tracking`.
     """
-    robot = SimulatedRobot(
-        DriveModel.load().values, draw_effects(case.hidden, np.random.default_rng(SEED)),
-        seed=SEED, rate=STATE_RATE,
-        control=ControlSettings(gravity_compensation=case.feedforward == 'none'))
+    plant = Plant(DriveModel.load(), case.hidden, SEED)
+    robot = SimulatedRobot(plant, seed=SEED, control=plant.gains(
+        BANDWIDTH, DAMPING_RATIO, gravity_compensation=case.feedforward == 'none'))
     queue = SetpointQueue(robot.control)
     for time_s, position, velocity, effort in zip(*_columns(commands), strict=True):
         wanted = (position, velocity) if case.feedforward == 'none' else (

@@ -74,4 +74,4 @@ def node_process(
                     process.wait(5)
                 except subprocess.TimeoutExpired:
                     process.kill()
-                    process.wait()
+                    process.wait(10)

@@ -26,13 +26,13 @@ import made_up_arm
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pprs_dynamics import DriveModel, MechanismModel, PlatformMotion
+from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect
-from pprs_dynamics.physics.effects.effect import PLATFORM, CatalogueEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.mechanism.places import PLATFORM
 from pprs_dynamics.physics.three_pprs.forward_kinematics import (
     solve_forward_kinematics,
 )
@@ -128,8 +128,8 @@ def arm_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Array, 
         model = made_up_arm.real_arm(Path(folder), **{
             'friction.motors.wrist.turn': 1.0, 'friction.motors.wrist.swing': 1.0})
         motion = made_up_arm.motion(SECONDS, RATE, seed=3)
-        changed = build_model({**model.values, **block(effect, 'swing')}, model.source)
-    assert isinstance(changed, MechanismModel)
+        changed = DriveModel.from_parameters(
+            {**model.values, **block(effect, 'swing')}, model.source)
     plain, at = model.drive_forces(motion), motion
     if changed.misreadings:  # as in `platform_law`
         read = (motion.position + changed.position_error(motion.position)
@@ -193,7 +193,7 @@ def page(effect: type[CatalogueEffect]) -> str:
     rows = [f'| `{each.name}` | {each.symbol} | {each.unit} | {each.description} | '
             f'{"" if each.default is None else f"{each.default:g}"} |'
             for each in effect.parameters]
-    kinds = {'platform': '3-PPRS', 'axis': 'single axis', 'arm': 'arm or robot with loops'}
+    kinds = {'platform': '3-PPRS', 'slide': 'single axis', 'mechanism': 'arm or robot with loops'}
     return '\n'.join([
         f'# {effect.name}', '', (getdoc(effect) or '').splitlines()[0], '',
         '```text', card.equation, '```', '',

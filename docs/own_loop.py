@@ -16,23 +16,22 @@ import time
 
 import numpy as np
 
-from pprs_dynamics import JointMotion, MechanismModel, PlatformMotion, load_model
-from pprs_dynamics.physics.model.model_file import Model
+from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 
 SWING, TURN = 0.02, np.pi  # [rad, m], [rad/s]
 HOME = np.array([0.0, 0.0, 0.5])  # [m], of a 3-PPRS's platform
 
 
-def one_sample(model: Model, t: float) -> JointMotion | PlatformMotion:
+def one_sample(model: DriveModel, t: float) -> JointMotion | PlatformMotion:
     """Return the motion at a time [s]: arrays of one row.
 
     In a loop of your own these are your trajectory's next setpoint.
     """
-    shape = (1, len(model.drives) if isinstance(model, MechanismModel) else 3)
+    shape = (1, len(model.drives) if model.moves_joints else 3)
     q, v, a = (np.full(shape, SWING * value) for value in (
         np.sin(TURN * t), TURN * np.cos(TURN * t), -TURN**2 * np.sin(TURN * t)))
     stamp = np.array([t])  # what effects with a memory count from
-    if isinstance(model, MechanismModel):
+    if model.moves_joints:
         structure = model.robot.structure
         home = structure.home[structure.tables.drives]
         return JointMotion(home + q, v, a, time=stamp)
@@ -51,7 +50,7 @@ def run(path: str, seconds: float, rate: float) -> tuple[np.ndarray, np.ndarray]
     (N,) array
         How late each cycle began [s].
     """
-    model = load_model(path)
+    model = DriveModel.load(path)
     # Compiles at the first call: 15 s or more after an installation, a second later on.
     model.drive_forces(one_sample(model, 0.0))
     state = model.initial_state()  # the memory of effects that have one; each loop has its own

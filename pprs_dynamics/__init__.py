@@ -38,8 +38,7 @@ if TYPE_CHECKING:
         UnreadableFileError,
         WorkspaceError,
     )
-    from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
-    from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
+    from pprs_dynamics.inference.experiments.motion_limits import ArmLimits, MotionLimits
     from pprs_dynamics.measurement.files.recording import (
         Recording,
         read_recording,
@@ -58,20 +57,17 @@ if TYPE_CHECKING:
     from pprs_dynamics.physics.mechanism.motion import PlatformMotion
     from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
     from pprs_dynamics.physics.model.drive_model import DriveModel
-    from pprs_dynamics.physics.model.force_model import Forces, ModelState
-    from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-    from pprs_dynamics.physics.model.model_file import build_model, load_model
+    from pprs_dynamics.physics.model.forces import Forces, ModelState
 
 __all__ = ['AdoptionResult', 'AdoptionRunResult', 'ArmLimits', 'Array', 'Card', 'CatalogueEffect',
-           'ComparisonResult', 'ConvergenceError', 'DiagnosisResult', 'DriveEffect',
-           'DriveModel', 'DriveRange', 'DriveSamples', 'EffectError',
-           'Excitation', 'ExperimentResult', 'FitResult', 'Forces', 'GainEffect', 'HelicalPath',
-           'JointMotion', 'LimitError', 'MeasurementEffect', 'MechanismModel',
-           'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError', 'MotionLimits',
-           'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session', 'SimulationResult',
-           'SingularityError', 'StructureEffect', 'UnknownNameError', 'UnreadableFileError',
-           'WorkspaceError', 'adopt', 'adopt_all', 'build_model', 'compare', 'diagnose',
-           'fit', 'load_model', 'next_experiment', 'read_recording', 'simulate', 'write_recording']
+           'ComparisonResult', 'ConvergenceError', 'DiagnosisResult', 'DriveEffect', 'DriveModel',
+           'DriveRange', 'DriveSamples', 'EffectError', 'Excitation', 'ExperimentResult',
+           'FitResult', 'Forces', 'GainEffect', 'HelicalPath', 'JointMotion', 'LimitError',
+           'MeasurementEffect', 'MissingLibraryError', 'ModelError', 'ModelState', 'MotionError',
+           'MotionLimits', 'Parameter', 'PlatformMotion', 'PprsError', 'Recording', 'Session',
+           'SimulationResult', 'SingularityError', 'StructureEffect', 'UnknownNameError',
+           'UnreadableFileError', 'WorkspaceError', 'adopt', 'adopt_all', 'compare', 'diagnose',
+           'fit', 'next_experiment', 'read_recording', 'simulate', 'write_recording']
 __version__ = '0.1.0'
 
 # Loaded at first use: `pprs --help` and a node's refusal need neither numpy nor a model.
@@ -88,8 +84,7 @@ _HOMES = {
         'ConvergenceError', 'EffectError', 'LimitError', 'MissingLibraryError', 'ModelError',
         'MotionError', 'PprsError', 'SingularityError', 'UnknownNameError', 'UnreadableFileError',
         'WorkspaceError'),
-    'inference.experiments.arm_motions': ('ArmLimits',),
-    'inference.experiments.motion_limits': ('MotionLimits',),
+    'inference.experiments.motion_limits': ('ArmLimits', 'MotionLimits'),
     'measurement.files.recording': ('Recording', 'read_recording', 'write_recording'),
     'physics.effects.drive_effect': (
         'DriveEffect', 'DriveRange', 'DriveSamples', 'GainEffect', 'MeasurementEffect'),
@@ -98,10 +93,8 @@ _HOMES = {
     'physics.mechanism.joint_motion': ('JointMotion',),
     'physics.mechanism.motion': ('PlatformMotion',),
     'physics.mechanism.paths': ('Excitation', 'HelicalPath'),
-    'physics.model.mechanism_model': ('MechanismModel',),
     'physics.model.drive_model': ('DriveModel',),
-    'physics.model.force_model': ('Forces', 'ModelState'),
-    'physics.model.model_file': ('build_model', 'load_model'),
+    'physics.model.forces': ('Forces', 'ModelState'),
 }
 _MODULES = {name: f'{__name__}.{module}' for module, names in _HOMES.items() for name in names}
 

@@ -45,8 +45,7 @@ from benchmarks.naming.robots import OFFERED, ROBOTS, hidden_names
 from benchmarks.naming.run import enter_all, make_all, score_all
 from benchmarks.naming.scoring import FIGURES, Rate, Scored, figures, judge
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.simulation.injected_effects import IN_CATALOGUE
-from pprs_dynamics.simulation.mechanism_run import NAMES
+from pprs_dynamics.simulation.injection import NAMES
 
 pytestmark = pytest.mark.slow
 
@@ -321,7 +320,7 @@ def test_a_diagnosis_is_an_answer_with_its_rivals() -> None:
 
 def test_what_may_be_hidden_can_be_simulated() -> None:
     for robot in ROBOTS:
-        assert set(hidden_names(robot)) <= set(IN_CATALOGUE if robot == '3-PPRS' else NAMES)
+        assert set(hidden_names(robot)) <= set(NAMES)
 
 
 def test_columns_are_of_the_library_whatever_the_catalogue_has(

@@ -130,10 +130,10 @@ def _is_allowed(model: DriveModel, motion: PlatformMotion) -> bool:
         model.limits.check_strokes(mechanism.position)
     except PprsError:
         return False
-    condition = condition_number(model.robot.geometry, mechanism.jacobians.J).max()
+    condition = condition_number(model.robot.geometry, mechanism.links.jacobians.J).max()
     return bool(np.abs(mechanism.velocity).max() < FASTEST
                 and np.abs(mechanism.acceleration).max() < STRONGEST
-                and np.abs(mechanism.chains.sin_u).min() > ROD_SINE and condition < CONDITION)
+                and np.abs(mechanism.links.chains.sin_u).min() > ROD_SINE and condition < CONDITION)
 
 
 def joint_motion(duration: float = 30.0, rate: float = 100.0, seed: int = 0) -> JointMotion:

@@ -11,31 +11,22 @@ from __future__ import annotations
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.simulation.injected_effect import DriveForce, DriveMoment
-from pprs_dynamics.simulation.injected_effects import IN_CATALOGUE
-from pprs_dynamics.simulation.injected_forces import effort_offset, gear_efficiency
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.simulation.injected_forms import FORMS
 
 OFF = (0.05, 0.15)  # s
 WAVELENGTHS = (0.05, 0.3)  # [m]
 WAVES_OF_VELOCITY = (0.05, 0.3)  # [m/s]
-CAN_BE_OFF = tuple(name for name, effect in IN_CATALOGUE.items()
-                   if issubclass(effect, DriveForce)
-                   # A constant; and what came after the public problems were drawn.
-                   and effect not in (effort_offset, gear_efficiency))
+# But for a constant, what every axis has, and what came after the public problems were drawn.
+CAN_BE_OFF = tuple(sorted({*FORMS} - {'effort_offset', 'gear_efficiency', 'counterbalance',
+                                      'drive_inertia'}))
 
 
-def off_form(effect: DriveForce, rng: np.random.Generator) -> DriveForce:
-    """Return the effect with a form of its own in all drives that have it."""
+def off_form(motion: JointMotion, rng: np.random.Generator) -> Array:
+    """Return by what injected forces are multiplied along a motion, (N, D)."""
     share = rng.uniform(*OFF)
     length, wave = np.exp(rng.uniform(*np.log((WAVELENGTHS, WAVES_OF_VELOCITY)).T))
     phases = rng.uniform(0, 2 * np.pi, 2)
-    kind = type(effect)
-
-    def force(self: DriveForce, moment: DriveMoment) -> Array:
-        own: Array = kind.force(self, moment)
-        return own * (1 + share * (np.cos(2 * np.pi * moment.position / length + phases[0])
-                                   + np.cos(2 * np.pi * moment.velocity / wave + phases[1])))
-
-    effect.__class__ = type(kind.__name__, (kind,), {
-        'force': force, 'form': f'({kind.form}) (1 + {share:.2f} g(q, v))'})
-    return effect
+    factor: Array = 1 + share * (np.cos(2 * np.pi * motion.position / length + phases[0])
+                                 + np.cos(2 * np.pi * motion.velocity / wave + phases[1]))
+    return factor

@@ -11,36 +11,48 @@ and `load_case` keep it in a file.
 
 from __future__ import annotations
 
+import copy
 import json
 import zlib
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.hidden.driven_motion import DrivenMotion
-from benchmarks.hidden.motions import draw_motion
+from benchmarks.hidden.motions import RandomMotion, draw_motion
 from benchmarks.hidden.off_forms import off_form
-from benchmarks.hidden.prescribed import PrescribedPlant, Readings
 from benchmarks.hidden.strength import Refit, Whitening, sensitivities, tolerated_numbers
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.drives import CHANNELS
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.differentiation import Stretch, choose_smoothing
 from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.simulation.injected_effect import DriveForce, InjectedEffect
-from pprs_dynamics.simulation.injected_effects import draw_effect
-from pprs_dynamics.simulation.injected_forces import vibration
-from pprs_dynamics.simulation.plant import PlantSettings
+from pprs_dynamics.simulation.engine import MechanismEngine
+from pprs_dynamics.simulation.engine_loops import ClosedMotion
+from pprs_dynamics.simulation.injection import (
+    CLIMATE,
+    NAMES,
+    NOT_IN_CATALOGUE,
+    Choice,
+    Injection,
+    PlainRobot,
+)
+from pprs_dynamics.simulation.platform import as_mechanism
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
+from pprs_dynamics.simulation.temperatures import read_thermometers
 
+# What of the catalogue can be injected into a 3-PPRS.
+IN_CATALOGUE = tuple(name for name in NAMES if name not in (
+    *NOT_IN_CATALOGUE, 'counterbalance', 'eccentric_encoder', 'elastic_joint', 'coupled_drives',
+    'current_gain'))
 DURATION, RATE = 40.0, 500.0  # [s, Hz]
+ROUNDS = 4  # of loads with friction in them
 LEAD = 50  # samples before the recording, for what looks back in time
 NOISE = 0.08  # [N], of which 70 % of the variance is correlated
 QUIETEST = 0.01  # [N]; an effect that would need less is drawn anew
@@ -50,8 +62,6 @@ TOLERANCES = (0.03, 0.05)
 # Strengths of a hidden effect, as a multiple of what it is drawn with. Where they do not do, the
 # noise is another.
 SCALES = (0.01, 3.0)
-# Over a vanishing distance hysteresis would be nothing but a sharp reversal.
-SCALES_OF = {'hysteresis': (0.5, 3.0)}
 SCALINGS, SCALED = 8, 0.03  # rounds, and relative error of the strength that is good enough
 PINK = '1/f'
 VIBRATIONS = (0.3, 50.0)  # [Hz], of the row of that name
@@ -108,7 +118,7 @@ class Scene:
 
     def __init__(self, seed: int, width: float) -> None:
         rng = np.random.default_rng((seed, 2))
-        self.tolerance = float(rng.uniform(*TOLERANCES))
+        self.seed, self.tolerance = seed, float(rng.uniform(*TOLERANCES))
         self.model = tolerant_model(self.tolerance)
         numbers = list(tolerated_numbers(self.model.values))
         self.off = rng.uniform(-1, 1, len(numbers))
@@ -118,22 +128,35 @@ class Scene:
             factor = 1 + self.tolerance * off
             self.robot[key] = value * factor if index is None else tuple(
                 v * factor if i == index else v for i, v in enumerate(value))
-        self.settings = PlantSettings(
-            drive_width=_draw_widths(rng) if not width else (width,) * 6,
-            passive_width=width or _draw_width(rng), actual_loads=True)
-        self.path, self.motion = _motion(seed)
-        self.platform = self.path.motion(self.motion.time)
-        self.plant = PrescribedPlant({**self.model.values, **self.robot}, self.motion,
-                                     self.settings)
-        kept = len(self.motion) - LEAD
+        self.drive_width = _draw_widths(rng) if not width else (width,) * 6
+        self.passive_width = width or _draw_width(rng)
         self.block = block_length(1 / RATE)
+        self.move(seed)
+
+    def move(self, seed: int) -> None:
+        """Let the robot move along the motion of a seed."""
+        self.path, self.platform, motion, closed = _motion(seed)
+        self.plain = PlainRobot(simulated(
+            self.model, self.robot, self.drive_width, self.passive_width), motion, ROUNDS, closed)
+        kept = len(motion) - LEAD
         self.treat = Treatment(np.arange(0, kept, self.block), kept)
         self._refits: dict[str | float, Refit] = {}
+        vars(self).pop('_columns', None)
 
-    @cached_property
-    def plain(self) -> Readings:
-        """What is measured without hidden effects."""
-        return self.plant.readings()
+    def on_motion(self, seed: int) -> Scene:
+        """Return the same robot on the motion of another seed."""
+        other = copy.copy(self)
+        other.move(seed)
+        return other
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times of a recording [s]."""
+        return np.asarray(self.plain.motion.time)[LEAD:]
+
+    def inject(self, effects: Sequence[Choice]) -> Injection:
+        """Return the robot along its motion with effects."""
+        return Injection(self.plain, effects, np.random.default_rng((self.seed, CLIMATE)))
 
     @cached_property
     def _columns(self) -> np.ndarray:
@@ -146,32 +169,65 @@ class Scene:
                                         Whitening(noise_settings(noise, NOISE), self.block))
         return self._refits[noise]
 
-    def contribution(self, effect: InjectedEffect) -> np.ndarray:
-        """Return what an effect adds to the treated residual of the model, (M, 6) [N]."""
-        read, plain = self.plant.readings([effect]), self.plain
-        added = read.effort - plain.effort
-        if np.any(read.position != plain.position):
-            added -= self._model_force(read) - self.model.drive_forces(self.platform).total
+    def contribution(self, effect: Choice, off: np.random.Generator | None = None) -> np.ndarray:
+        """Return what an effect adds to the treated residual of the model, (M, 6) [N].
+
+        With a generator, its form is off.
+        """
+        run = self.inject([effect])
+        added = run.efforts - self.plain.effort
+        if off is not None:
+            added = added * off_form(self.plain.motion, off)
+        if run.beside.any():
+            added -= self._model_force(run) - self.model.drive_forces(self.platform).total
         return self.treat(added[LEAD:])
 
-    def _model_force(self, read: Readings) -> np.ndarray:
+    def _model_force(self, run: Injection) -> np.ndarray:
         """Return the forces that the model gives for the motion as it is read, (N, 6) [N].
 
         An encoder that leads its drive shows in the rates above all: a play of 0.1 mm is nothing
         as a position, and a burst of acceleration at each reversal.
         """
-        velocity, acceleration = read.velocity.copy(), read.acceleration.copy()
-        if np.any(read.lead):
-            # As a comparison would differentiate these positions; its edges are dropped there.
-            differentiator = choose_smoothing([Stretch(SensorSettings().quantised(
-                read.position[LEAD:]), 1 / RATE)]).polynomial(1 / RATE)
-            inside = slice(differentiator.half, len(velocity) - differentiator.half)
-            _, rate, burst = differentiator.differentiated(read.lead)
-            velocity[inside] += rate
-            acceleration[inside] += burst
-        found = solve_forward_motion(self.model.robot.geometry, read.position, velocity,
+        motion = self.plain.motion
+        # As a comparison would differentiate these positions; its edges are dropped there.
+        differentiator = choose_smoothing([Stretch(SensorSettings().quantised(
+            run.position[LEAD:]), 1 / RATE)]).polynomial(1 / RATE)
+        inside = slice(differentiator.half, len(motion) - differentiator.half)
+        velocity, acceleration = motion.velocity.copy(), motion.acceleration.copy()
+        _, rate, burst = differentiator.differentiated(run.beside)
+        velocity[inside] += rate
+        acceleration[inside] += burst
+        found = solve_forward_motion(self.model.robot.geometry, run.position, velocity,
                                      acceleration, self.platform[:1])
-        return self.model.drive_forces(found.motion.with_time(self.motion.time)).total
+        return self.model.drive_forces(found.motion.with_time(motion.time)).total
+
+    def recording(self, name: str, effects: Sequence[Choice], settings: SensorSettings,
+                  noise: np.ndarray, off: Sequence[np.random.Generator] = ()) -> Recording:
+        """Return a recording with effects and noise (M, 6) [N].
+
+        With a generator for each effect, their forms are off.
+        """
+        run = self.inject(effects)
+        effort = run.efforts
+        for effect, rng in zip(effects, off, strict=False):
+            added = self.inject([effect]).efforts - self.plain.effort
+            effort = effort + added * (off_form(self.plain.motion, rng) - 1)
+        channels = {}
+        if any(effect.name == 'friction_temperature' for effect in effects):
+            channels['temperature'] = read_thermometers(run.time, run.temperature)[LEAD:]
+        return Recording.from_arrays(name, self.time, settings.quantised(run.position[LEAD:]),
+                                     None, effort[LEAD:] + noise, channels=channels)
+
+
+def simulated(model: DriveModel, robot: Mapping[str, Any],
+              drive_width: Sequence[float] = (1.0,) * 6, passive_width: float = 1.0,
+              ) -> DriveModel:
+    """Return a robot with other numbers than the model's, and widths of reversal over its own."""
+    own = as_mechanism(DriveModel.from_parameters({**model.values, **robot}))
+    reversal = own.reversal
+    return replace(own, reversal=Reversal(
+        tuple(np.multiply(drive_width, reversal.velocity).tolist()),
+        passive_width * reversal.rate, passive_width * reversal.slide))
 
 
 @lru_cache(maxsize=2)
@@ -181,21 +237,27 @@ def scene(seed: int, width: float) -> Scene:
 
 
 @lru_cache(maxsize=2)
-def _motion(seed: int) -> tuple[Any, DrivenMotion]:
+def _motion(seed: int) -> tuple[RandomMotion, PlatformMotion, JointMotion, ClosedMotion]:
     model = DriveModel.load()
     path = draw_motion(model, seed, DURATION)
-    time = np.arange(-LEAD, round(DURATION * RATE)) / RATE
-    drives = model.mechanism(path.motion(time))
-    return path, DrivenMotion.of_drives(model.values, time, drives.position, drives.velocity,
-                                        drives.acceleration)
+    platform = path.motion(np.arange(-LEAD, round(DURATION * RATE)) / RATE)
+    motion = driven(model, platform)
+    return path, platform, motion, MechanismEngine(as_mechanism(model)).closed(motion)
+
+
+def driven(model: DriveModel, platform: PlatformMotion) -> JointMotion:
+    """Return the motion of the drives along one of the platform."""
+    state = model.mechanism(platform)
+    return JointMotion(state.position, state.velocity, state.acceleration, platform.time)
 
 
 def tolerant_model(tolerance: float) -> DriveModel:
     """Return the paper's robot, its masses and friction coefficients known to a tolerance."""
     values = default_parameters()
-    model = build_model(values)
+    model = DriveModel.from_parameters(values)
     keys = dict.fromkeys(key for key, _ in tolerated_numbers(model.values))
-    return build_model({**values, **{f'tolerances.{key}': tolerance for key in keys}})
+    return DriveModel.from_parameters(
+        {**values, **{f'tolerances.{key}': tolerance for key in keys}})
 
 
 def noise_settings(noise: float | str, deviation: float) -> SensorSettings:
@@ -212,24 +274,19 @@ def make_case(case: Case) -> tuple[DriveModel, Recording, dict[str, Any]]:
     found = [_draw(case, place, name) for name in case.effects]
     deviation = min([one.noise for one in found], default=NOISE)
     effects = [one.effect for one in found]
-    read = place.plant.readings(effects)
     settings = noise_settings(case.noise, deviation)
-    time = place.motion.time[LEAD:]
-    noise = EffortNoise(settings, case.rng(f'noise {case.name}')).samples(len(time))
-    recording = Recording.from_arrays(case.name, time, settings.quantised(read.position[LEAD:]),
-                                      None, read.effort[LEAD:] + noise, channels={
-                                          name: values[LEAD:]
-                                          for name, values in read.channels.items()})
+    noise = EffortNoise(settings, case.rng(f'noise {case.name}')).samples(len(place.time))
+    recording = place.recording(case.name, effects, settings, noise, [
+        case.rng(f'form {one.what}') for one in found] if case.row == 'forms' else ())
     truth = {
         'case': asdict(case), 'name': case.name,
-        'effects': [{**one.effect.truth(), 'scale': one.scale,
+        'effects': [{**place.inject([one.effect]).truths[0], 'scale': one.scale,
                      'snr': one.snr * NOISE / deviation,
                      'snr_by_drive': (one.by_drive * NOISE / deviation).tolist()}
                     for one in found],
         'noise': deviation, 'noise_floor': float(np.sqrt(np.mean(place.treat(noise) ** 2))),
         'noise_by_drive': np.sqrt(np.mean(place.treat(noise) ** 2, axis=0)).tolist(),
-        'drive_width': list(place.settings.drive_width),
-        'passive_width': place.settings.passive_width,
+        'drive_width': list(place.drive_width), 'passive_width': place.passive_width,
         'tolerance': place.tolerance, 'robot': place.robot, 'motion': place.path.to_dict()}
     # As it comes back from a file.
     return place.model, recording, json.loads(json.dumps(truth))
@@ -263,7 +320,8 @@ def load_case(path: Path | str) -> tuple[DriveModel, Recording, dict[str, Any]]:
 
 @dataclass(frozen=True)
 class _Drawn:
-    effect: InjectedEffect
+    effect: Choice
+    what: str  # its generator is for
     scale: float
     snr: float  # at a noise of NOISE
     by_drive: np.ndarray  # the same, (6,)
@@ -280,17 +338,16 @@ def _draw(case: Case, place: Scene, name: str) -> _Drawn:
     return drawn
 
 
-def _effect(case: Case, name: str, what: str, scale: float) -> InjectedEffect:
+def _effect(case: Case, place: Scene, name: str, what: str, scale: float) -> Choice:
     """Return the effect that a case draws; in the row `vibration` at any frequency."""
-    effect = draw_effect(name, case.rng(what), scale)
-    if case.row == 'forms':
-        assert isinstance(effect, DriveForce)
-        return off_form(effect, case.rng(f'form {what}'))
-    if case.row != 'vibration':
-        return effect
-    frequency = float(np.exp(case.rng(f'frequency {what}').uniform(*np.log(VIBRATIONS))))
-    return vibration({drive: {**own, 'frequency': frequency}
-                      for drive, own in effect.parameters.items()})
+    effect = Choice(name, case.rng(what), scale)
+    if case.row == 'vibration':
+        place.inject([effect])
+        assert effect.sizes is not None
+        for _, _, drawn in effect.sizes.values():
+            drawn['frequency'] = float(np.exp(
+                case.rng(f'frequency {what}').uniform(*np.log(VIBRATIONS))))
+    return effect
 
 
 def _scaled(case: Case, place: Scene, name: str, what: str, wanted: float) -> _Drawn:
@@ -298,22 +355,23 @@ def _scaled(case: Case, place: Scene, name: str, what: str, wanted: float) -> _D
     past: list[tuple[float, float]] = []
     rays = {}
     for _ in range(SCALINGS):
-        effect = _effect(case, name, what, scale)
-        ray = refit.beyond(place.contribution(effect))
+        effect = _effect(case, place, name, what, scale)
+        ray = refit.beyond(place.contribution(
+            effect, case.rng(f'form {what}') if case.row == 'forms' else None))
         strength = ray.strength()
         past.append((scale, strength))
         rays[scale] = ray
         if abs(strength / wanted - 1) < SCALED:
             break
         following = float(np.clip(_next_scale(past, ray.factor(wanted), wanted),
-                                  *SCALES_OF.get(name, SCALES)))
+                                  *SCALES))
         if following == scale:
             break
         scale = following
     scale, strength = min(past, key=lambda pair: abs(np.log(max(pair[1], 1e-9) / wanted)))
-    effect = _effect(case, name, what, scale)
+    effect = _effect(case, place, name, what, scale)
     near = abs(strength / wanted - 1) < SCALED
-    return _Drawn(effect, scale, strength, rays[scale].by_drive(),
+    return _Drawn(effect, what, scale, strength, rays[scale].by_drive(),
                   NOISE if near else NOISE * strength / wanted)
 
 

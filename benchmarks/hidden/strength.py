@@ -21,7 +21,6 @@ from scipy.signal import lfilter
 
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.measurement.motion.treatment import Treatment
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 WHITENING_ORDER = 64
@@ -66,7 +65,8 @@ def sensitivities(model: DriveModel, motion: PlatformMotion, treat: Treatment,
     values = model.values
     nominal = model.drive_forces(motion).total
     return np.array([
-        treat(build_model(changed_values(values, key, i, 1 + tolerance)).drive_forces(motion).total
+        treat(DriveModel.from_parameters(
+            changed_values(values, key, i, 1 + tolerance)).drive_forces(motion).total
               - nominal)
         for key, i in tolerated_numbers(values)])
 

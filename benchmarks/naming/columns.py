@@ -15,12 +15,12 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design, searched_in_drives
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 SHAPES = 24  # of an effect on a drive at the most, evenly among those that we try ourselves
 
 
-def problem_of(model: ForceModel, recording: Recording) -> Problem:
+def problem_of(model: DriveModel, recording: Recording) -> Problem:
     """Return a recording as a regression around a model."""
     design = Design.of(model, [recording])
     error = design.residuals.error

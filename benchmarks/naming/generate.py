@@ -34,15 +34,12 @@ from pprs_dynamics.measurement.files.recording import (
     read_recording,
     write_recording,
 )
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.model_writer import format_model
 from pprs_dynamics.simulation.export.exported_robot import export_robot
 from pprs_dynamics.simulation.export.expressed import express
 from pprs_dynamics.simulation.export.writers import written
-from pprs_dynamics.simulation.injected_effects import NOT_IN_CATALOGUE
-from pprs_dynamics.simulation.mechanism_run import simulate_mechanism
+from pprs_dynamics.simulation.injection import NOT_IN_CATALOGUE, simulate_mechanism
 from pprs_dynamics.simulation.sensors import EffortNoise
 
 DURATION = 40.0  # [s]
@@ -121,7 +118,7 @@ def make(draw: Draw, folder: Path) -> Truth:
     """Write a problem with its columns into a folder of its name, and return what is true."""
     target = folder / draw.name
     truth = write_problem(draw, target)
-    model = load_model(target / 'model.yaml')
+    model = DriveModel.load(target / 'model.yaml')
     problem_of(model, read_recording(target / 'recording.csv', model.drives)).write(target)
     return truth
 
@@ -142,7 +139,7 @@ def write_problem(draw: Draw, folder: Path, seconds: float = DURATION) -> Truth:
     return truth
 
 
-def _write_model(robot: str, model: ForceModel, folder: Path) -> None:
+def _write_model(robot: str, model: DriveModel, folder: Path) -> None:
     if robot == '3-PPRS':
         (folder / 'model.yaml').write_text(format_model(model.values))
         robot = export_robot(express(model, 'mjcf'), 'mjcf')
@@ -171,7 +168,7 @@ def _named(effect: dict[str, object], kind: str) -> Named:
     return Named(name, None if drives is None else tuple(drives), flat)  # type: ignore[arg-type]
 
 
-def _of_platform(draw: Draw) -> tuple[ForceModel, Recording, Truth]:
+def _of_platform(draw: Draw) -> tuple[DriveModel, Recording, Truth]:
     rng = draw.rng('platform')
     row = {'single': 'effects', 'nothing': 'nothing', 'form': 'forms', 'unknown': 'unknown'}.get(
         draw.kind, 'pairs')
@@ -182,9 +179,8 @@ def _of_platform(draw: Draw) -> tuple[ForceModel, Recording, Truth]:
     return model, recording, _truth(draw, truth['effects'])
 
 
-def _of_arm(draw: Draw) -> tuple[ForceModel, Recording, Truth]:
-    model = load_model(model_of(draw.robot))
-    assert isinstance(model, MechanismModel)
+def _of_arm(draw: Draw) -> tuple[DriveModel, Recording, Truth]:
+    model = DriveModel.load(model_of(draw.robot))
     motion_seed = draw.seed % 1_000_000
     plain, run = (simulate_mechanism(model, names, draw.seed, noise=0.0, duration=DURATION,
                                      path_seed=motion_seed) for names in ((), draw.names))
@@ -213,7 +209,7 @@ def _of_arm(draw: Draw) -> tuple[ForceModel, Recording, Truth]:
     return model, recording, _truth(draw, effects)
 
 
-def _residuals(model: ForceModel, time: Array, position: Array, effort: Array) -> Residuals:
+def _residuals(model: DriveModel, time: Array, position: Array, effort: Array) -> Residuals:
     recording = Recording.from_arrays('noise-free', time, position, None, effort, model.drives)
     return measure_residuals(model, [recording])[0]
 
@@ -245,7 +241,7 @@ def _bump(draw: Draw, position: Array, largest: Array) -> tuple[Array, str]:
     width = rng.uniform(*BUMP) * stroke
     added = np.zeros_like(position)
     added[:, d] = 0.1 * largest[d] * np.exp(-((position[:, d] - middle) / width) ** 2)
-    return added, load_model(model_of(draw.robot)).drives[d]
+    return added, DriveModel.load(model_of(draw.robot)).drives[d]
 
 
 def _with_gaps(draw: Draw, recording: Recording) -> Recording:

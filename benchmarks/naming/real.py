@@ -32,7 +32,7 @@ from benchmarks.naming.problems import Named, Truth
 from benchmarks.real import davinci, emps_files, recorded_data, ur10e
 from pprs_dynamics.app.commands.pprs import main as pprs
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 UR10E_FREE = tuple(f'{name}.csv.gz' for name in ur10e.FITTED)
@@ -149,11 +149,11 @@ def make(part: Part, data: Path, folder: Path) -> None:
     base = _base(part, data, folder / 'bases' / part.folder)
     target = folder / 'problems' / part.name
     target.mkdir(parents=True, exist_ok=True)
-    values = dict(load_model(base).values)
+    values = dict(DriveModel.load(base).values)
     if part.zero:
         assert part.drives
         numbers = list(values[part.zero])
-        numbers[load_model(base).drives.index(part.drives[0])] = 0.0
+        numbers[DriveModel.load(base).drives.index(part.drives[0])] = 0.0
         values[part.zero] = tuple(numbers)
     write_model(target / 'model.yaml', values, base)
     for urdf in base.parent.glob('*.urdf'):
@@ -163,7 +163,7 @@ def make(part: Part, data: Path, folder: Path) -> None:
     else:
         (target / 'recording.csv').write_bytes(
             gzip.decompress((data / part.recording).read_bytes()))
-    model = load_model(target / 'model.yaml')
+    model = DriveModel.load(target / 'model.yaml')
     problem_of(model, read_recording(target / 'recording.csv', model.recorded)).write(target)
     truth = Truth(part.name, part.machine, 'single' if part.effect else 'unknown', 'real', 0.0,
                   (Named(part.effect or 'command', part.drives),))

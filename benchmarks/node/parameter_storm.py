@@ -26,7 +26,7 @@ from std_msgs.msg import Float64MultiArray
 from benchmarks.node.damage import valid_motion
 from benchmarks.node.stream import feedforward, served
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.ros.messages.conversions import write_trajectory
 
@@ -66,7 +66,7 @@ def random_change(rng: np.random.Generator) -> dict[str, Any]:
 
 def expected_forces(values: dict[str, Any], motion: Any) -> np.ndarray | None:
     """Return the model's forces; None where it refuses the motion."""
-    model = build_model(values)
+    model = DriveModel.from_parameters(values)
     try:
         forces = model.drive_forces(motion)
         model.limits.check_strokes(forces.mechanism.position)
@@ -79,7 +79,7 @@ def expected_forces(values: dict[str, Any], motion: Any) -> np.ndarray | None:
 def is_model(values: dict[str, Any]) -> bool:
     """Return whether a model file may hold these values."""
     try:
-        build_model(values)
+        DriveModel.from_parameters(values)
     except PprsError:
         return False
     return True

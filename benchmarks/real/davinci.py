@@ -26,8 +26,7 @@ from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 matplotlib.use('Agg')
 from matplotlib import pyplot
@@ -44,7 +43,7 @@ def model_text() -> str:
     return PAGE.read_text(encoding='utf-8').partition('```yaml\n')[2].partition('```')[0]
 
 
-def relative_below(model: ForceModel, recordings: list[Recording]) -> list[tuple[Array, Array]]:
+def relative_below(model: DriveModel, recordings: list[Recording]) -> list[tuple[Array, Array]]:
     """Return error and effort of each drive below `BELOW`, zero phase, of each recording."""
     found = []
     for recording in recordings:
@@ -81,10 +80,10 @@ def run(folder: Path) -> None:
     for name in LOADED:
         if not Path(f'{name}.json').exists():
             main(['diagnose', f'{name}.csv.gz', '--model', 'full.yaml', '--json', f'{name}.json'])
-    free = read_recording(FREE, load_model('psm.yaml').recorded)
+    free = read_recording(FREE, DriveModel.load('psm.yaml').recorded)
     lines = [f'| model | {" | ".join(free.drives)} |', '|---|---|---|---|']
     for name in ('psm', 'base', 'full'):
-        errors = share(relative_below(load_model(f'{name}.yaml'), [free]))
+        errors = share(relative_below(DriveModel.load(f'{name}.yaml'), [free]))
         lines.append(f'| {name} | ' + ' | '.join(f'{100 * error:.1f} %' for error in errors) + ' |')
     lines += ['', '| recording | verdict | effect | alike | parameters |', '|---|---|---|---|---|']
     for name in LOADED:
@@ -103,7 +102,7 @@ def run(folder: Path) -> None:
 
 def draw() -> None:
     """Draw the error of pitch with the weight on top, before and with the body found."""
-    model = load_model('full.yaml')
+    model = DriveModel.load('full.yaml')
     name = LOADED[0]
     said = json.loads(Path(f'{name}.json').read_text())['effects'][0]
     values = {f'effects.{said["name"]}.{key}': one['value']

@@ -20,7 +20,7 @@ from scipy.signal import butter, decimate, filtfilt
 from benchmarks.real.emps_files import IDENTIFICATION, PULSES, read_emps
 from benchmarks.real.recorded_data import need_data
 from benchmarks.results import ROOT, write_results
-from pprs_dynamics import JointMotion, MechanismModel, PprsError
+from pprs_dynamics import DriveModel, JointMotion, PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.adoption.loop import AdoptionRun, adopt_all
@@ -29,7 +29,6 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
 
 matplotlib.use('Agg')
 from matplotlib import pyplot
@@ -81,14 +80,14 @@ def published_error(recording: Recording, parameters: np.ndarray) -> float:
                     thinned(recording.effort[:, 0]))
 
 
-def error_of(model: ForceModel, recording: Recording) -> float:
+def error_of(model: DriveModel, recording: Recording) -> float:
     """Return the relative error of a model by the authors' recipe [%]."""
     forces = model.measured(model.drive_forces(published_motion(recording)))
     measured = thinned(recording.effort[:, 0])
     return relative(measured - thinned(forces.total[:, 0]), measured)
 
 
-def compared(model: ForceModel, recording: Recording) -> float:
+def compared(model: DriveModel, recording: Recording) -> float:
     """Return the relative error that `pprs compare` tells [%]."""
     residuals, _ = measure_residuals(model, [recording])
     return relative(residuals.error[:, 0], residuals.measured[:, 0] - residuals.measured.mean())
@@ -105,7 +104,7 @@ class Story:
 
     run: Recording
     pulses: Recording
-    model: MechanismModel
+    model: DriveModel
     diagnosis: Diagnosis
     asymmetric: Adoption
     ripple: Adoption | None
@@ -115,7 +114,7 @@ class Story:
 
 def tell(run: Recording, pulses: Recording, report: Callable[[str], None]) -> Story:
     """Run everything; the pulses run gates the second loop and the ripple, and nothing else."""
-    model = MechanismModel.load('config/single_axis.yaml')
+    model = DriveModel.load('config/single_axis.yaml')
     report('diagnosing')
     diagnosis = diagnose(model, [run])
     report('adopting asymmetric_friction')
@@ -165,7 +164,7 @@ def document(story: Story) -> str:
               "By the authors' recipe, and as `pprs compare` reports it.", '',
               '| model | identification | pulses | `compare`, identification | `compare`, pulses |',
               '|---|---|---|---|---|']
-    rows: list[tuple[str, ForceModel]] = [
+    rows: list[tuple[str, DriveModel]] = [
         ('published, symmetric friction', story.model),
         ('with asymmetric_friction', story.asymmetric.after)]
     for outcome, name in ((story.blind, 'blocks'), (story.gated, 'pulses run')):

@@ -19,7 +19,8 @@ from scipy.io import loadmat
 
 from benchmarks.real.recorded_data import need_data
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.physics.model.robot_block import AXIS
+
+AXIS = 'axis'
 
 IDENTIFICATION, PULSES = 'DATA_EMPS.mat', 'DATA_EMPS_PULSES.mat'
 

@@ -22,8 +22,7 @@ from benchmarks.real.recorded_data import need_data
 from benchmarks.real.ur10e import Bench, file, table
 from benchmarks.results import write_results
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 FREE, SAME_DAY = 'free_one_b', 'free_50s_14harm'
@@ -85,7 +84,7 @@ def loaded_arm(bench: Bench) -> list[list[str]]:
             since(bench, 'UR10e_other_path', file(ur10e.LOADED), 'ur_other.yaml', 'ur_other.yaml')]
 
 
-def add_noise(model: ForceModel, clean: Path, noisy: Path, seed: int) -> None:
+def add_noise(model: DriveModel, clean: Path, noisy: Path, seed: int) -> None:
     """Write a recording with white noise of half a percent of each joint's largest effort."""
     if noisy.exists():
         return
@@ -97,7 +96,7 @@ def add_noise(model: ForceModel, clean: Path, noisy: Path, seed: int) -> None:
 
 def simulated_arm(bench: Bench) -> list[list[str]]:
     """Return rows of a simulated UR10e with hysteresis and ripple that were there before."""
-    base, rows = load_model(bench.folder / 'ur_same.yaml'), []
+    base, rows = DriveModel.load(bench.folder / 'ur_same.yaml'), []
     keys = [key for key in base.values if key.startswith('reference')]
     plain = {key: value for key, value in base.values.items() if key not in keys}
     for number, (name, key, joint, factor) in enumerate((('', '', 0, 1.0), *CHANGES)):

@@ -29,14 +29,13 @@ from benchmarks.real.recorded_data import need_data
 from benchmarks.results import ROOT, write_results
 from benchmarks.scores import arms as arm_score
 from benchmarks.scores import cases as cases_on_dask
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import read_recording
 from pprs_dynamics.physics.mechanism.description import body_at
-from pprs_dynamics.physics.model.mechanism_model import inertial_values
-from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model
+from pprs_dynamics.physics.model.robot_block import inertial_values
 
 matplotlib.use('Agg')
 from matplotlib import pyplot
@@ -124,7 +123,7 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return '\n'.join(f'| {line} |' for line in lines)
 
 
-def without(bench: Bench, base: MechanismModel, kind: str, joint: int) -> dict[str, Any]:
+def without(bench: Bench, base: DriveModel, kind: str, joint: int) -> dict[str, Any]:
     """Return the diagnosis of the base model with one number of friction set to 0."""
     name = f'zero_{kind}_{joint}'
     values = dict(base.values)
@@ -135,7 +134,7 @@ def without(bench: Bench, base: MechanismModel, kind: str, joint: int) -> dict[s
     return bench.run(name, 'diagnose', file(HELD_OUT), '--model', f'{name}.yaml')
 
 
-def with_hand(base: MechanismModel) -> dict[str, Any]:
+def with_hand(base: DriveModel) -> dict[str, Any]:
     """Return the values of the base model with a hand on its tool."""
     hand = body_at(HAND, (0.0, 0.02, 0.045), np.diag([1e-3, 1e-3, 4e-4]))
     inertial = base.robot.with_body('tool0', hand).inertial
@@ -143,7 +142,7 @@ def with_hand(base: MechanismModel) -> dict[str, Any]:
                               inertial_values(inertial).items()}}
 
 
-def zero_rows(bench: Bench, base: MechanismModel) -> tuple[list[list[str]], int, int]:
+def zero_rows(bench: Bench, base: DriveModel) -> tuple[list[list[str]], int, int]:
     """Return what was named where one number of friction was 0, how often rightly, and first.
 
     Rightly: first, with a value within 15 %. First: on that joint, with any value.
@@ -242,7 +241,7 @@ def draw(path: Path, drives: Sequence[str], curves: dict[str, Any], ylabel: str)
 
 def pictures(bench: Bench) -> None:
     """Draw the base model on a run that it never saw, and the loaded run with what was found."""
-    described, base, found = (load_model(bench.folder / f'{name}.yaml')
+    described, base, found = (DriveModel.load(bench.folder / f'{name}.yaml')
                               for name in ('arm', 'base', 'loaded'))
     curves = {}
     run = read_recording(bench.folder / file(HELD_OUT), base.recorded)
@@ -269,8 +268,7 @@ def tell(bench: Bench) -> dict[str, str]:
     bench.run('adopted', 'adopt', 'payload_mass', file(LOADED), '--model', 'base.yaml', '--output',
               'loaded.yaml')
     free = bench.run('free', 'diagnose', file(HELD_OUT), '--model', 'base.yaml')
-    base = load_model(bench.folder / 'base.yaml')
-    assert isinstance(base, MechanismModel)
+    base = DriveModel.load(bench.folder / 'base.yaml')
     if (bench.folder / 'loaded.yaml').exists():
         pictures(bench)
     write_model(bench.folder / 'hand.yaml', with_hand(base), bench.folder / 'base.yaml')

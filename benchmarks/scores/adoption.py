@@ -28,19 +28,16 @@ from typing import Any
 import numpy as np
 
 from benchmarks.hidden import recordings as hidden_recordings
-from benchmarks.hidden.prescribed import PrescribedPlant
-from benchmarks.hidden.recordings import LEAD, Case, Scene, noise_settings
+from benchmarks.hidden.recordings import IN_CATALOGUE, Case, Scene, noise_settings
 from benchmarks.hidden.strength import Whitening
 from benchmarks.scores.cases import outcomes_of, scoring_parser
 from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.model.model_writer import write_model
-from pprs_dynamics.simulation.injected_effect import InjectedEffect
-from pprs_dynamics.simulation.injected_effects import IN_CATALOGUE
+from pprs_dynamics.simulation.injection import Choice
 from pprs_dynamics.simulation.sensors import EffortNoise
 
 OTHER_MOTION = 1000  # between the seeds of the two motions
@@ -61,9 +58,9 @@ class Robot:
         self.case = case
         self.place = hidden_recordings.scene(case.seed, case.width)
         drawn = [hidden_recordings._draw(case, self.place, name) for name in case.effects]
-        self.effects: list[InjectedEffect] = [one.effect for one in drawn]
+        self.effects: list[Choice] = [one.effect for one in drawn]
         self.noise = min([one.noise for one in drawn], default=hidden_recordings.NOISE)
-        self.other = _on_motion(self.place, case.seed + OTHER_MOTION)
+        self.other = self.place.on_motion(case.seed + OTHER_MOTION)
 
     @property
     def model(self) -> DriveModel:
@@ -75,15 +72,10 @@ class Robot:
         return self._recording(self.place, 'first'), self._recording(self.other, 'second')
 
     def _recording(self, place: Scene, name: str) -> Recording:
-        read = place.plant.readings(self.effects)
         settings = noise_settings(self.case.noise, self.noise)
-        time = place.motion.time[LEAD:]
         rng = self.case.rng(f'noise {name} {self.case.name}')
-        noise = EffortNoise(settings, rng).samples(len(time))
-        return Recording.from_arrays(name, time, settings.quantised(read.position[LEAD:]), None,
-                                     read.effort[LEAD:] + noise, channels={
-                                         name: values[LEAD:]
-                                         for name, values in read.channels.items()})
+        return place.recording(name, self.effects, settings,
+                               EffortNoise(settings, rng).samples(len(place.time)))
 
     def best_error(self, first: Recording, second: Recording) -> float:
         """Return the error on the second motion of the effect's own form, fitted on the first.
@@ -114,21 +106,6 @@ class Robot:
         residuals, _ = measure_residuals(self.model, [recording])
         return residuals.error, np.concatenate((
             [place.contribution(effect) for effect in self.effects], place._columns))
-
-
-def _on_motion(place: Scene, seed: int) -> Scene:
-    """Return the same robot on another motion."""
-    other = copy.copy(place)
-    for cached in ('plain', '_columns'):
-        vars(other).pop(cached, None)
-    other._refits = {}
-    other.path, other.motion = hidden_recordings._motion(seed)
-    other.platform = other.path.motion(other.motion.time)
-    other.plant = PrescribedPlant({**place.model.values, **place.robot}, other.motion,
-                                  place.settings)
-    kept = len(other.motion) - LEAD
-    other.treat = Treatment(np.arange(0, kept, place.block), kept)
-    return other
 
 
 def pprs(*arguments: str) -> subprocess.CompletedProcess[str]:

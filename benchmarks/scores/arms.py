@@ -35,13 +35,13 @@ from benchmarks.scores.cases import (
     run_missing,
     scoring_parser,
 )
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.app.commands.pprs import main as pprs
 from pprs_dynamics.physics.effects.laws.coupled_drives import CoupledDrives
 from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
 from pprs_dynamics.physics.effects.laws.link_mass import LinkMass
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
-from pprs_dynamics.simulation.mechanism_run import NAMES, links_that_weigh
+from pprs_dynamics.simulation.injection import NAMES, links_that_weigh
 
 # Effects of real machines, and what each was taken for before it was in the catalogue.
 PAIRS = {
@@ -193,7 +193,7 @@ def table(found: Sequence[Outcome]) -> str:
 def todo(model: Path, seeds: range, nothing: range, sets: range, only: Sequence[str] = (),
          ) -> Iterator[tuple[str, int]]:
     """Yield effects that a robot can have and seeds, every effect once before any twice."""
-    loaded = MechanismModel.load(model)
+    loaded = DriveModel.load(model)
     robot, structure = loaded.robot, loaded.robot.structure
     has_passive = any(row >= 0 and name not in structure.drives
                       for name, (row, _) in friction_rows(structure).items())

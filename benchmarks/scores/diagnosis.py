@@ -27,12 +27,12 @@ import numpy as np
 
 from benchmarks import OUTPUT
 from benchmarks.hidden.off_forms import CAN_BE_OFF
-from benchmarks.hidden.recordings import PINK, Case, load_case, make_case, save_case
+from benchmarks.hidden.recordings import IN_CATALOGUE, PINK, Case, load_case, make_case, save_case
 from benchmarks.results import write_results
 from benchmarks.scores.cases import Each, engine, read_outcomes, run_missing, scoring_parser
 from benchmarks.scores.diagnosis_table import judge, make_table
 from benchmarks.scores.oracle import consult
-from pprs_dynamics.simulation.injected_effects import IN_CATALOGUE, NOT_IN_CATALOGUE
+from pprs_dynamics.simulation.injection import NOT_IN_CATALOGUE
 
 SNRS = (0.25, 0.5, 1.0, 3.0)
 NOISES: tuple[float | str, ...] = (0.0, 0.9, 0.98, 0.997, 0.999, PINK)

@@ -22,32 +22,32 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.hidden.driven_motion import DrivenMotion
-from benchmarks.hidden.prescribed import PrescribedPlant
-from benchmarks.hidden.recordings import noise_settings, tolerant_model
+from benchmarks.hidden.recordings import (
+    ROUNDS,
+    driven,
+    noise_settings,
+    simulated,
+    tolerant_model,
+)
 from benchmarks.hidden.strength import changed_values, tolerated_numbers
 from benchmarks.scores.cases import outcomes_of, read_outcomes, scoring_parser
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.experiments.fourier_path import FourierPath
+from pprs_dynamics.inference.experiments.motion_design import PlatformMotions, random_motions
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
-from pprs_dynamics.inference.experiments.next_experiment import experiment_of
+from pprs_dynamics.inference.experiments.next_experiment import design_experiment
 from pprs_dynamics.inference.experiments.question import Question, question_of
-from pprs_dynamics.inference.experiments.trajectory_search import TrajectorySearch
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
-from pprs_dynamics.simulation.injected_effect import InjectedEffect
-from pprs_dynamics.simulation.injected_effects import draw_effect
-from pprs_dynamics.simulation.plant import PlantSettings
+from pprs_dynamics.simulation.injection import CLIMATE, Choice, Injection, PlainRobot
 from pprs_dynamics.simulation.sensors import EffortNoise
-from pprs_dynamics.simulation.virtual_robot import DriveReference, simulate
 
 EFFECTS = ('external_wrench', 'base_tilt', 'payload_mass', 'payload_offset', 'link_mass',
            'effort_offset', 'drive_spring', 'effort_gain', 'homing_error', 'coulomb_friction',
@@ -76,42 +76,17 @@ class HiddenRobot:
         for key, index in tolerated_numbers(self.model.values):
             values = changed_values(values, key, index, 1 + TOLERANCE * rng.uniform(-1, 1))
         self.values, self.name, self.seed, self.scale = values, name, seed, scale
-
-    def effect(self) -> InjectedEffect:
-        """Return the effect, afresh."""
-        return draw_effect(self.name, np.random.default_rng((self.seed, 3)), self.scale)
+        self.effect = Choice(name, np.random.default_rng((seed, 3)), scale)
 
     def record(self, motion: PlatformMotion, run: int) -> Recording:
         """Return a recording of a motion; `run` seeds its noise."""
-        drives = self.model.mechanism(motion)
-        driven = DrivenMotion.of_drives(self.model.values, motion.time, drives.position,
-                                        drives.velocity, drives.acceleration)
-        read = PrescribedPlant(self.values, driven, PlantSettings(actual_loads=True)).readings(
-            [self.effect()])
+        plain = PlainRobot(simulated(self.model, self.values), driven(self.model, motion), ROUNDS)
+        run_along = Injection(plain, [self.effect], np.random.default_rng((self.seed, CLIMATE)))
         settings = noise_settings(CORRELATION, NOISE)
         noise = EffortNoise(settings, np.random.default_rng((self.seed, 4, run))).samples(
             len(motion))
-        return Recording.from_arrays(f'run {run}', driven.time,
-                                     settings.quantised(read.position), None, read.effort + noise)
-
-    def follow(self, motion: PlatformMotion, limits: MotionLimits) -> dict[str, float]:
-        """Return the largest use of each limit by a simulated robot that follows a motion.
-
-        Without margins: 1 is the limit itself.
-        """
-        forces = self.model.drive_forces(motion)
-        state = forces.mechanism
-        run = simulate(self.values, DriveReference(
-            state.position, state.velocity, forces.total), [self.effect()], seed=self.seed,
-            rate=RATE)
-        truth = run.truth
-        lower, upper = self.model.limits.strokes
-        return {'stroke': float(np.max(np.abs(2 * truth.position - lower - upper)
-                                       / (upper - lower))),
-                'velocity': float(np.abs(truth.velocity).max() / limits.velocity),
-                'acceleration': float(np.abs(truth.acceleration).max() / limits.acceleration),
-                'effort': float(np.max(np.abs(truth.effort) / self.model.limits.efforts)),
-                'tilt': float(run.platform_motion().tilt.max() / limits.tilt)}
+        return Recording.from_arrays(f'run {run}', run_along.time, settings.quantised(
+            run_along.position), None, run_along.efforts + noise)
 
 
 @dataclass(frozen=True)
@@ -173,19 +148,17 @@ def judged(robot: HiddenRobot, recordings: list[Recording]) -> dict[str, Any]:
     return {'verdict': verdict, 'names': names, 'held': held, 'said': found.verdict}
 
 
-def score(name: str, seed: int, follow: bool) -> dict[str, Any] | None:
+def score(name: str, seed: int) -> dict[str, Any] | None:
     """Return how one case goes."""
     start = ambiguous_start(name, seed)
     if start is None:
         return None
     robot, old, question = start.robot, start.recording, start.question
     limits = MotionLimits(effort_reserve=4 * question.noise_floor)
-    search = TrajectorySearch(question, limits, NEW, seed)
     cpu, wall = time.process_time(), time.perf_counter()
-    found = search.run()
+    experiment = design_experiment(question, limits, NEW, seed)
     cost = {'design_cpu': time.process_time() - cpu, 'design_wall': time.perf_counter() - wall}
-    random = TrajectorySearch(question, limits, NEW, seed + 1000).screen(draws=1)[0].path
-    experiment = experiment_of(question, found)
+    (random,) = random_motions(PlatformMotions(robot.model, limits, NEW), seed + 1000, 1)
     result: dict[str, Any] = {
         'effect': name, 'seed': seed, 'scale': robot.scale, 'motion': start.how,
         'rivals': rivals_of(name, question),
@@ -195,18 +168,16 @@ def score(name: str, seed: int, follow: bool) -> dict[str, Any] | None:
         'expected_evidence': experiment.expected_evidence,
         'largest_use': max(experiment.limits.values()), **cost}
     grid = times(NEW)
-    result['designed'] = judged(robot, [old, robot.record(found.path.motion(grid), 1)])
+    result['designed'] = judged(robot, [old, robot.record(experiment.motion(grid), 1)])
     result['random'] = judged(robot, [old, robot.record(random.motion(grid), 2)])
     result['repeat'] = judged(robot, [old, *(robot.record(start.motion, run) for run in (3, 4))])
-    if follow:
-        result['followed'] = robot.follow(found.path.motion(grid), limits)
     return result
 
 
-def outcome_of(case: tuple[str, int], follow: bool) -> dict[str, Any]:
+def outcome_of(case: tuple[str, int]) -> dict[str, Any]:
     """Return how the case of an effect and a seed goes; no more than these without ambiguity."""
     name, seed = case
-    return score(name, seed, follow) or {'effect': name, 'seed': seed}
+    return score(name, seed) or {'effect': name, 'seed': seed}
 
 
 def table(rows: list[dict[str, Any]]) -> Iterator[str]:
@@ -229,11 +200,6 @@ def table(rows: list[dict[str, Any]]) -> Iterator[str]:
     different = {frozenset(pair[:2]) for pair in pairs}
     yield (f'{len(different)} different pairs of truth and rival, {len(pairs)} in all, of which '
            f'the designed motion settled {sum(pair[2] for pair in pairs)}')
-    followed = [row['followed'] for row in rows if 'followed' in row]
-    if followed:
-        worst = {key: max(one[key] for one in followed) for key in followed[0]}
-        yield f'followed by the simulated robot {len(followed)} times, largest use: ' + ', '.join(
-            f'{key} {value:.2f}' for key, value in worst.items())
     promised = [row for row in rows if row['probability'] >= 0.9]
     kept = sum(row['designed']['verdict'] == 'settled' for row in promised)
     yield f'promised with 0.9 or more: {len(promised)}, of which settled {kept}'
@@ -246,7 +212,6 @@ def main() -> None:
     parser.add_argument('--effects', default=','.join(EFFECTS))
     parser.add_argument('--seeds', type=int, default=10)
     parser.add_argument('--first-seed', type=int, default=0)
-    parser.add_argument('--follow', action='store_true', help='let the simulated robot follow')
     parser.add_argument('--table', type=Path, help='only show what is in a file')
     options = parser.parse_args()
     if options.table:
@@ -255,7 +220,7 @@ def main() -> None:
         cases = {(name, seed): (name, seed)
                  for seed in range(options.first_seed, options.first_seed + options.seeds)
                  for name in options.effects.split(',')}
-        rows = outcomes_of(options, partial(outcome_of, follow=options.follow), cases,
+        rows = outcomes_of(options, outcome_of, cases,
                            lambda row: (row['effect'], row['seed']), str)
     # Of what was not ambiguous there is nothing to settle.
     print('\n'.join(table([row for row in rows if 'designed' in row])))

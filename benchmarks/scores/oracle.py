@@ -13,10 +13,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from pprs_dynamics.inference.search.candidates import EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_model import linear_error
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.search import Search
+from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.inference.search.table import ModelTable
 from pprs_dynamics.physics.effects.catalogue import catalogue
 
@@ -35,12 +36,15 @@ def consult(selection: ModelTable, truth: Mapping[str, Any]) -> dict[str, Any]:
     effect, design = catalogue()[hidden[0]['name']], selection.first.design
     drives = hidden[0]['drives'] and [design.drives.index(drive) for drive in hidden[0]['drives']]
     fits = FittedSets(design, DECISIONS)
-    search, nothing = Search(fits), fits.evaluate(())
-    own = search.best_of(effect, drives)
-    if own is None:
+    scan, nothing = Scan(fits), fits.evaluate(())
+    offers = scan.offers(nothing).get(effect, [])
+    chosen = ([component for _, component in offers if component.drive in drives] if drives
+              else scan.best_drives(effect, offers, None)[1] if offers else [])
+    if not chosen:
         return {}
+    own = fits.refined(fits.evaluate((EffectCandidate.of(chosen),)))
     base = replace(nothing, fit=fits.regression.at((), own.fit.amplitudes))
     rivals = [fits.refined(fits.evaluate(one)).cost
-              for one in search.scan.proposals(base, RIVALS) if one[0].name != effect.name]
+              for one in scan.proposals(base, RIVALS) if one[0].name != effect.name]
     return {'best_error': linear_error(fits, own),
             'separable': min(rivals, default=nothing.cost) > own.cost + DECISIONS.rival_margin}

@@ -33,7 +33,7 @@ from benchmarks.naming.robots import hidden_names
 from benchmarks.scores.cases import read_outcomes
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import read_recording
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 SECONDS = 20.0  # of each recording
 KINDS = ('two', 'form', 'single', 'three', 'unknown', 'two', 'nothing', 'form', 'single', 'three')
@@ -72,7 +72,7 @@ def make(folder: Path, seed: int, found: Iterable[Draw]) -> None:
 
 def answer(problem: Path) -> dict[str, Any]:
     """Return what is said of a problem."""
-    model = load_model(problem / 'model.yaml')
+    model = DriveModel.load(problem / 'model.yaml')
     recording = read_recording(problem / 'recording.csv', model.drives)
     start = time.process_time()
     said = diagnose(model, [recording]).to_dict()

@@ -30,8 +30,7 @@ from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.physics.model.model_file import build_model, load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 NOISE, DURATION = 0.2, 20.0
 FORCES = np.array([2.0, 1.5, 2.5])  # [N m, N], of what no effect explains
@@ -60,13 +59,12 @@ class Change:
     key: str
     value: float
 
-    def model(self, base: MechanismModel) -> MechanismModel:
+    def model(self, base: DriveModel) -> DriveModel:
         """Return the machine after it."""
         if not self.effect:
             return base
-        changed = build_model({**base.values, 'effects.active': [self.effect],
+        changed = DriveModel.from_parameters({**base.values, 'effects.active': [self.effect],
                                f'effects.{self.effect}.{self.key}': self.value}, base.source)
-        assert isinstance(changed, MechanismModel)
         return changed
 
     def told(self, found: Diagnosis) -> dict[str, bool]:
@@ -97,7 +95,7 @@ def unknown_forces(moved: JointMotion, drift: Array) -> Array:
     return force
 
 
-def record(machine: MechanismModel, seed: int, drift: float, path: int = 0) -> Recording:
+def record(machine: DriveModel, seed: int, drift: float, path: int = 0) -> Recording:
     """Return a run of a machine on a path, its drift and noise of a seed."""
     moved, random = joint_motion(DURATION, seed=path), np.random.default_rng(seed)
     state = machine.initial_state(0.0)
@@ -114,8 +112,7 @@ def score(seeds: int, drift: float, path: int) -> list[dict[str, Any]]:
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / 'made_up.urdf').write_text(URDF)
         (Path(folder) / 'arm.yaml').write_text(MODEL)
-        base = load_model(Path(folder) / 'arm.yaml')
-        assert isinstance(base, MechanismModel)
+        base = DriveModel.load(Path(folder) / 'arm.yaml')
         reference = Reference.of(base, [record(base, 0, drift)])
         rows = []
         for number, change in enumerate(CHANGES):

@@ -7,7 +7,7 @@
     python -m benchmarks.scores.reference_robots --model ur_base.yaml --changes --power
 
 In every drive there are hysteresis, ripple and Stribeck friction of forms that the catalogue has
-not (`pprs_dynamics.simulation.joint_forms`), and in every passive joint of a robot with loops dry
+not (`injected_forms` of the simulation), and in every passive joint of a robot with loops dry
 friction that turns over otherwise. They are the same on all days. A run on path 0 is the
 reference. Others, on `--path`, have noise of their own, and a change: of `--effects` in the place
 of the catalogue's that are drawn in turn, of `--changes` those of a table, and of `--power` the
@@ -40,11 +40,11 @@ from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel, inertial_values
-from pprs_dynamics.physics.model.model_file import build_model, load_model
-from pprs_dynamics.simulation.joint_forms import FORMS, STEEPNESS, JointForm, JointMoment
-from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
-from pprs_dynamics.simulation.mechanism_run import (
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.robot_block import inertial_values
+from pprs_dynamics.simulation.engine import MechanismEngine
+from pprs_dynamics.simulation.injected_forms import FORMS, STEEPNESS, JointForm, JointMoment
+from pprs_dynamics.simulation.injection import (
     MechanismRun,
     draw_motion,
     noise_like,
@@ -54,7 +54,7 @@ from pprs_dynamics.simulation.mechanism_run import (
 DURATION, REFERENCE_SEED = 20.0, 1000
 HEALTHY, SHARE = ('hysteresis', 'force_ripple', 'stribeck_friction'), 0.4  # of a form's size
 PASSIVE = 0.02  # of a drive's largest effort, from each passive joint
-# Hidden in turn: what changes on a machine, on which joint_forms and the healthy forms agree.
+# Hidden in turn: what changes on a machine, on which the injected and the healthy forms agree.
 EFFECTS = ('coulomb_friction', 'viscous_friction', 'payload_mass', 'link_mass', 'drive_spring',
            'effort_offset', 'homing_error', 'drive_inertia', 'load_friction', 'joint_friction')
 # Of an arm: number of the model file, drive from the base, and by which share it grows.
@@ -94,13 +94,13 @@ class Robot:
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
         All that is known of it.
     duration : float
         Of its runs [s].
     """
 
-    def __init__(self, model: MechanismModel, duration: float) -> None:
+    def __init__(self, model: DriveModel, duration: float) -> None:
         self.model, self.duration = model, duration
         self.engine = MechanismEngine(model)
         motion = draw_motion(model, duration, 0)
@@ -171,7 +171,7 @@ class Robot:
             v / np.asarray(self.model.reversal.velocity)[d])
         return change.over_noise * float(self.noise()[d]) / float(root_mean_square(law))
 
-    def _changed(self, change: Change) -> MechanismModel:
+    def _changed(self, change: Change) -> DriveModel:
         """Return the machine after a change of its model's numbers."""
         values = dict(self.model.values)
         for effect, _, key, _, _ in SHARES:
@@ -185,8 +185,7 @@ class Robot:
             point = change.value * np.array([1.0, *np.zeros(9)])
             values.update({key: tuple(map(float, given)) for key, given in inertial_values(
                 robot.with_body(tool, point).inertial).items()})
-        changed = build_model(values, self.model.source)
-        assert isinstance(changed, MechanismModel)
+        changed = DriveModel.from_parameters(values, self.model.source)
         return changed
 
     def record(self, change: Change, seed: int, path: int,
@@ -217,7 +216,7 @@ class Robot:
             self.model.drives), truth
 
 
-def changes(model: MechanismModel, kinds: Sequence[str], effects: int, seeds: int,
+def changes(model: DriveModel, kinds: Sequence[str], effects: int, seeds: int,
             ) -> Iterator[tuple[Change, int]]:
     """Yield changes and seeds."""
     for k in range(effects):
@@ -331,8 +330,7 @@ def main() -> int:
     parser.add_argument('--duration', type=float, default=DURATION)
     parser.add_argument('--file', type=Path)
     options = parser.parse_args()
-    model = load_model(options.model)
-    assert isinstance(model, MechanismModel)
+    model = DriveModel.load(options.model)
     robot = Robot(without_reference(model), options.duration)
     file = options.file or OUTPUT / f'reference_{options.model.stem}.jsonl'
     reference = Reference.of(robot.model, [robot.record(
@@ -347,12 +345,11 @@ def main() -> int:
     return 0
 
 
-def without_reference(model: MechanismModel) -> MechanismModel:
+def without_reference(model: DriveModel) -> DriveModel:
     """Return a model that names no reference run."""
     values = {key: value for key, value in model.values.items()
               if key.partition('_')[0] != 'reference'}
-    plain = build_model(values, model.source)
-    assert isinstance(plain, MechanismModel)
+    plain = DriveModel.from_parameters(values, model.source)
     return plain
 
 

@@ -30,9 +30,9 @@ from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJointEffect
 from pprs_dynamics.physics.mechanism.evaluation import PLAIN, is_compiled
+from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.model.one_pass import forces_kernel
 from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
-from pprs_dynamics.physics.three_pprs.state import ThreePprsState
 
 ROUNDS = 25
 CALLS = 200  # of one sample, per round
@@ -133,9 +133,9 @@ def _regressors(model: DriveModel, motion: PlatformMotion) -> int:
     return len(columns)
 
 
-def _total(model: DriveModel, state: ThreePprsState) -> np.ndarray:
+def _total(model: DriveModel, state: MechanismState) -> np.ndarray:
     """Return rigid body and friction, which follows the loads of other bodies."""
-    return sum((effect.force(state) for effect in model.effects), state.rigid_body.force)
+    return sum((effect.force(state) for effect in model.effects), state.rigid_force)
 
 
 def growth(model: DriveModel, motion: PlatformMotion) -> None:

@@ -21,7 +21,7 @@ from oracles.mujoco_robot import _build
 from oracles.pinocchio_robot import PinocchioRobot
 
 from pprs_dynamics import PlatformMotion
-from pprs_dynamics.physics.three_pprs.robot import Robot
+from pprs_dynamics.physics.three_pprs.robot import ThreePprs
 
 SLIDES, LIFTS, RODS = slice(6, 15, 3), slice(7, 15, 3), slice(8, 15, 3)
 
@@ -29,7 +29,7 @@ SLIDES, LIFTS, RODS = slice(6, 15, 3), slice(7, 15, 3), slice(8, 15, 3)
 class Peer:
     """Analytic inverse kinematics and the way from the trees' forces to the drives'."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: ThreePprs) -> None:
         geometry = robot.geometry
         self.R, self.l, self.elbow = (geometry.base_radius, geometry.rod_length,
                                       geometry.elbow_sign)
@@ -141,7 +141,7 @@ class PinocchioPeer(Peer):
 
     name = 'Pinocchio'
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: ThreePprs) -> None:
         super().__init__(robot)
         self.model = PinocchioRobot(robot).model
         self.data = self.model.createData()
@@ -204,7 +204,7 @@ class MujocoPeer(Peer):
 
     name = 'MuJoCo'
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: ThreePprs) -> None:
         super().__init__(robot)
         spec = _build(robot)
         # Nothing here but the bodies: no contacts, no limits, no sensors to look for.

@@ -23,17 +23,17 @@ import pinocchio as pin
 
 from benchmarks import ROOT
 from benchmarks.speed.model import CALLS, _print, _rounds
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, Evaluation
-from pprs_dynamics.simulation.mechanism_run import draw_motion
+from pprs_dynamics.simulation.injection import draw_motion
 
 BATCH = 5000
 ROUNDS = 25
 DURATION = 25.0  # [s], at 200 Hz
 ROBOTS = ('hexapod', 'delta')
-FIRST = ('from pprs_dynamics import MechanismModel; '
+FIRST = ('from pprs_dynamics import DriveModel; '
          'from pprs_dynamics.physics.model.preparation import prepare; '
-         'prepare(MechanismModel.load("config/hexapod.yaml"))')
+         'prepare(DriveModel.load("config/hexapod.yaml"))')
 
 
 def main(rounds: int) -> None:
@@ -46,7 +46,7 @@ def main(rounds: int) -> None:
 
 def compare(name: str, rounds: int) -> None:
     """Print one sample and one motion of a robot beside `rnea`."""
-    model = MechanismModel.load(f'config/{name}.yaml')
+    model = DriveModel.load(f'config/{name}.yaml')
     motion = draw_motion(model, DURATION, 1, BATCH / DURATION)
     tree = pin.buildModelFromUrdf(model.robot.structure.description.path)
     data, q = tree.createData(), pin.neutral(tree)
@@ -76,7 +76,7 @@ def compare(name: str, rounds: int) -> None:
 
 def steps(rounds: int) -> None:
     """Print what single steps save in a motion of the hexapod."""
-    model = MechanismModel.load('config/hexapod.yaml')
+    model = DriveModel.load('config/hexapod.yaml')
     motion = draw_motion(model, DURATION, 1, BATCH / DURATION)
     given = motion.position, motion.velocity, motion.acceleration
     robot, evaluation = model.robot, model.robot.structure.evaluation

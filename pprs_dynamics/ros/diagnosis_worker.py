@@ -109,7 +109,7 @@ class DiagnosisWorker:
                reference: tuple[str, ...] = ()) -> None:
         """Begin with a window; with another model than before all is forgotten.
 
-        `reference` names the runs since which it is told what has changed.
+        `reference` names the reference runs.
         """
         if self._process is None or not self._process.is_alive():
             self.close()
@@ -155,10 +155,10 @@ class DiagnosisWorker:
 
 
 def _start_tracker() -> None:
-    """Start what multiprocessing has beside its processes, without what it does to signals.
+    """Start multiprocessing's resource tracker and restore the signal mask.
 
-    It leaves SIGINT and SIGTERM unblocked in this thread, where they would end the node without a
-    last word: `StopSignals` waits for them in another.
+    The tracker unblocks SIGINT and SIGTERM in this thread, where they would end the node without a
+    last command. `StopSignals` waits for them in another thread.
     """
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, ())
     try:
@@ -179,7 +179,7 @@ def _work(pipe: Any) -> None:
     from pprs_dynamics.errors import PprsError
     from pprs_dynamics.inference.diagnosis.live_diagnosis import LiveDiagnosis
     from pprs_dynamics.inference.fit.reference_runs import read_reference
-    from pprs_dynamics.physics.model.model_file import build_model
+    from pprs_dynamics.physics.model.drive_model import DriveModel
 
     def said(live: LiveDiagnosis) -> dict[str, Any]:
         return {**live.to_dict(), ADOPTED: live.adopted()}
@@ -192,7 +192,7 @@ def _work(pipe: Any) -> None:
             return
         try:
             if known != (values, source, reference):
-                model = build_model(values, source)
+                model = DriveModel.from_parameters(values, source)
                 live = LiveDiagnosis(model, reference=(
                     read_reference(model, reference) if reference else None))
                 known = values, source, reference

@@ -5,12 +5,10 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from functools import partial
 from typing import Any
 
-import numpy as np
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from sensor_msgs.msg import JointState
@@ -28,8 +26,12 @@ from pprs_dynamics.ros.force_command import (
     ForceCommand,
     parameters_for,
 )
-from pprs_dynamics.ros.messages.command_writer import CommandWriter
-from pprs_dynamics.ros.messages.conversions import NANOSECONDS, RobotNames
+from pprs_dynamics.ros.messages.conversions import (
+    NANOSECONDS,
+    RobotNames,
+    efforts,
+    joint_state,
+)
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS, Rejection
 from pprs_dynamics.ros.messages.trajectory_request import (
     TRAJECTORY,
@@ -69,8 +71,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
     """
 
     def __init__(self, **options: Any) -> None:
-        ManagedNode.__init__(
-            self, 'feedforward', allow_undeclared_parameters=True, **options)
+        super().__init__('feedforward', allow_undeclared_parameters=True, **options)
         self._log = ThrottledLog(self)
         self._publishers_made: list[Any] = []
         self._parts: dict[str, Any] = {}
@@ -84,9 +85,8 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             self.get_logger().info(f'{name} begins anew: {assumed}')
         self._preparation = prepare_beside(self, self._settings.model)
         # Which drives there are, and by which message they are asked for, stays.
-        names = RobotNames.of(self._settings.model, node_values['frame_id'])
+        self._names = names = RobotNames.of(self._settings.model, node_values['frame_id'])
         self._readers = readers_for(self._settings.model, names)
-        self._written = CommandWriter(names)
         self._controller = ControllerWatch(names.joints)
         self._feedforward = Feedforward(self._settings.model, node_values)
         self._timing = Timing.of(node_values)
@@ -97,7 +97,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         self._last_unchecked: ForceCommand | None = None  # when its margins were not due
         self._compute_time, self._lag = Durations(), Durations()
         self._counted = (0, 0, time.monotonic())
-        self._files = files_given(options.get('cli_args') or sys.argv)
+        self._files = files_given(self.arguments)
         self._status = StatusReporter(
             self, {'taken_from_paper': self._settings.taken_from_paper}, self._counters,
             hardware_of(self._settings.model), self._refresh)
@@ -204,30 +204,29 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
     def _command(self, command: ForceCommand) -> None:
         """Send efforts to the drives, and the currents that give them where they are known."""
         effort = command.effort[0]
-        self._commands.publish(self._written.commands(effort))
+        self._commands.publish(efforts(effort))
         if self._current is not None:
-            self._current.publish(self._written.commands(self._settings.model.currents(effort)))
+            self._current.publish(efforts(self._settings.model.currents(effort)))
 
     def _publish_rest(self, answer: ForceCommand) -> None:
         request, forces = answer.request, answer.forces
         if self._joint_command.get_subscription_count():
             position, velocity, _ = forces.drive_motion
-            self._joint_command.publish(self._written.joint_state(
-                request.first_stamp, answer.effort[0], position[0], velocity[0]))
+            self._joint_command.publish(joint_state(
+                request.first_stamp, answer.effort[0], position[0], velocity[0], self._names))
         self._sent = None
         if self._joint_trajectory.get_subscription_count():
             drives = self._sent = self._feedforward.ending_at_rest(
                 answer, self._settings.node_values['stop_time'])
             self._has_sent = True
-            self._joint_trajectory.publish(self._written.joint_trajectory(
-                request.start, drives.offsets, drives, drives.effort))
+            self._joint_trajectory.publish(drives.message(request.start, self._names))
             left = request.start + int(drives.offsets[-1]) - self.get_clock().now().nanoseconds
             self._controller.sent(drives.drive_motion[0], left / NANOSECONDS,
                                   not drives.ends_at_rest)
         for name, each in self._parts.items():
             if each.get_subscription_count():
-                each.publish(self._written.joint_state(
-                    request.first_stamp, self._feedforward.part(answer, name)))
+                each.publish(joint_state(request.first_stamp, self._feedforward.part(answer, name),
+                                         names=self._names))
 
     def _report_condition(self, answer: ForceCommand) -> None:
         node_values, report, now = self._settings.node_values, self._status.report, time.monotonic()
@@ -303,9 +302,8 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
 
     def _send_hold(self, held: ForceCommand) -> None:
         """Let the trajectory controller hold a pose at rest from now on."""
-        self._sent = DriveTrajectory(np.zeros(1, np.int64), held.forces.drive_motion, held.effort)
-        self._joint_trajectory.publish(self._written.joint_trajectory(
-            0, self._sent.offsets, held.forces, held.effort))
+        self._sent = DriveTrajectory.holding(held)
+        self._joint_trajectory.publish(self._sent.message(0, self._names))
 
     def _reject(self, rejection: Rejection) -> None:
         self._counters[rejection.code] += 1
@@ -360,9 +358,10 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
             held = self._feedforward.hold(gravity, left)
             self._command(held)
             if self._joint_command.get_subscription_count():
-                self._joint_command.publish(self._written.joint_state(
+                self._joint_command.publish(joint_state(
                     self.get_clock().now().nanoseconds, held.effort[0],
-                    held.forces.mechanism.position[0], held.forces.mechanism.velocity[0]))
+                    held.forces.mechanism.position[0], held.forces.mechanism.velocity[0],
+                    self._names))
             controller = self._end_trajectory(held, left, gravity)
         except PprsError as error:
             return f'the last command stays in force, as none can be given: {error}'
@@ -384,8 +383,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
                 return '; a trajectory controller completes its trajectory, which ends at rest'
             stop_time = self._settings.node_values['stop_time'] or STOP_TIME
             self._sent = self._feedforward.stop(left, stop_time, gravity)
-            self._joint_trajectory.publish(self._written.joint_trajectory(
-                0, self._sent.offsets, self._sent, self._sent.effort))
+            self._joint_trajectory.publish(self._sent.message(0, self._names))
             return f'; a trajectory controller stops along the path in {stop_time:g} s'
         if not self._sent.ends_as(held):
             self._send_hold(held)
@@ -398,7 +396,7 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         return bool(self._status.facts.get('lagging'))
 
     def _refresh(self) -> None:
-        """Bring what is told once a second up to date."""
+        """Update the facts that are published once a second."""
         if self._last_unchecked is not None and self._status.code == 'OK':
             # Nothing came after it: where it leads to is told all the same.
             self._report_condition(self._last_unchecked)

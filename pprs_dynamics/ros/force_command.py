@@ -11,19 +11,26 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import LimitError, PprsError
 from pprs_dynamics.measurement.files.samples import Indices
 from pprs_dynamics.physics.mechanism.drive_path import DrivePath
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.pose_spline import load_splines
-from pprs_dynamics.physics.model.force_model import RIGID_BODY, Forces, ModelState
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState
 from pprs_dynamics.physics.model.limits import DriveLimits
-from pprs_dynamics.ros.messages.conversions import NANOSECONDS
+from pprs_dynamics.ros.messages.conversions import (
+    NANOSECONDS,
+    RobotNames,
+    write_joint_trajectory,
+)
+from pprs_dynamics.ros.messages.conversions import time as time_of
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import REJECT, SPLINE, Motion, TrajectoryRequest
 from pprs_dynamics.ros.node.managed_node import AUTOSTART
-from pprs_dynamics.ros.node.model_parameters import NodeModel
 from pprs_dynamics.ros.node.parameters import NodeParameter, node_parameter
 
 REVERSAL_VELOCITY = 'friction.reversal_velocity'
@@ -72,7 +79,8 @@ _PARAMETERS = (
 
 def parameters_for(drives: int) -> tuple[NodeParameter, ...]:
     """Return the parameters of a node with so many drives."""
-    return tuple(replace(one, size=drives) if one.size else one for one in _PARAMETERS)
+    return tuple(replace(parameter, size=drives) if parameter.size else parameter
+                 for parameter in _PARAMETERS)
 
 
 class ForceCommand(NamedTuple):
@@ -122,6 +130,16 @@ class DriveTrajectory(NamedTuple):
         """Whether the last point stands, by joint_trajectory_controller's own bound."""
         return bool((np.abs(self.drive_motion[1][-1]) <= STILL).all())
 
+    def message(self, start: int, names: RobotNames) -> JointTrajectory:
+        """Return the message that starts at a time [ns]; 0: when it arrives."""
+        return write_joint_trajectory(JointMotion(*self.drive_motion), time_of(start),
+                                      self.offsets.tolist(), names, self.effort)
+
+    @classmethod
+    def holding(cls, held: ForceCommand) -> DriveTrajectory:
+        """Return the trajectory of one point that holds a pose."""
+        return cls(np.zeros(1, np.int64), held.forces.drive_motion, held.effort)
+
     def ends_as(self, held: ForceCommand) -> bool:
         """Return whether the last point is a pose at rest with the efforts of a command."""
         return (self.ends_at_rest and not self.drive_motion[2][-1].any()
@@ -129,18 +147,18 @@ class DriveTrajectory(NamedTuple):
 
 
 class _Leaving(NamedTuple):
-    """What was in force before a change, while efforts go over to what is now.
+    """Model in force before a change, during the ramp to the present one.
 
     Parameters
     ----------
-    model : DriveModel or MechanismModel
+    model : DriveModel
     memory : ModelState
         As it was at the change: what an effect did since then fades with the model.
     scale : float
     since, duration : float
         [s]
     earlier : _Leaving, optional
-        That was still going over at the change.
+        Ramp that was not complete at the change.
     """
 
     model: Any
@@ -151,7 +169,7 @@ class _Leaving(NamedTuple):
     earlier: _Leaving | None
 
     def is_over(self, now: float) -> bool:
-        """Return whether all has gone over to what is in force now."""
+        """Return whether the ramp is complete."""
         return now >= self.since + self.duration
 
     def blended(self, motion: Motion, offsets: Indices, effort: Array, now: float) -> Array:
@@ -180,14 +198,14 @@ class Feedforward:
 
     Parameters
     ----------
-    model : DriveModel or MechanismModel
+    model : DriveModel
     node_values : mapping
         The node's parameters, see `parameters_for`.
     clock : callable, optional
         Returns a time that only goes on [s].
     """
 
-    def __init__(self, model: NodeModel, node_values: Mapping[str, Any],
+    def __init__(self, model: DriveModel, node_values: Mapping[str, Any],
                  clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self._leaving: _Leaving | None = None
@@ -196,15 +214,15 @@ class Feedforward:
         self._memory: ModelState | None = None
         self._remembers = False
         # The model that remembered last, and what.
-        self._before: tuple[NodeModel, ModelState] | None = None
+        self._before: tuple[DriveModel, ModelState] | None = None
         self._epoch: int | None = None
         self._last: ForceCommand | None = None
         self.use(model, node_values)
 
-    def use(self, model: NodeModel, node_values: Mapping[str, Any]) -> None:
+    def use(self, model: DriveModel, node_values: Mapping[str, Any]) -> None:
         """Go on with another model; effects that both have keep their memory.
 
-        Efforts go over to those of the other one in `ramp_time`.
+        Efforts change to those of the other model in `ramp_time`.
         """
         ramp_time, scale = node_values.get('ramp_time', 0.0), node_values['feedforward_scale']
         if self._last is not None and self._memory is not None and (
@@ -316,7 +334,7 @@ class Feedforward:
             Where the robot cannot be there, or there is no such force.
         """
         rest = np.zeros((1, len(position)))
-        motion = self._model.motion_of_drives(position[None], rest, rest).held()
+        motion = self._model.robot.motion_of_drives(position[None], rest, rest).held()
         return self._at_rest(TrajectoryRequest(motion, 0, np.zeros(1, dtype=np.int64)), gravity)
 
     def hold(self, gravity: bool, left: int = 0) -> ForceCommand:
@@ -363,7 +381,7 @@ class Feedforward:
         now = (int(last.request.offsets[-1]) - left) / NANOSECONDS
         path = _path_of(last).stop(now, duration)
         lower, upper = self._limits.strokes
-        motion = self._model.motion_of_drives(
+        motion = self._model.robot.motion_of_drives(
             np.clip(path.position, lower, upper), path.velocity, path.acceleration)
         forces = self._model.sound_at(motion).drive_forces(motion)
         assert path.time is not None  # `stop` gives it

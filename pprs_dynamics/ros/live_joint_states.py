@@ -31,8 +31,7 @@ from std_srvs.srv import Trigger
 from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.live import ERROR_SPAN
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.live_stream import LiveStream
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
@@ -61,7 +60,7 @@ class LiveJointStates(Node):
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     topic : str
         Of sensor_msgs/JointState.
     monitor, feedforward : str
@@ -71,7 +70,7 @@ class LiveJointStates(Node):
         Of `rclpy.node.Node`.
     """
 
-    def __init__(self, model: ForceModel, topic: str, monitor: str, feedforward: str,
+    def __init__(self, model: DriveModel, topic: str, monitor: str, feedforward: str,
                  **options: Any) -> None:
         super().__init__(NAME, **options)
         self._ring: deque[tuple[int, Any, Any]] = deque(maxlen=MOST_SAMPLES)
@@ -110,12 +109,12 @@ class LiveJointStates(Node):
 
     def _follow(self, parameters: Sequence[Parameter]) -> None:
         with suppress(PprsError):  # then the fingerprints differ, and nothing can be set
-            self.stream.use_model(build_model({
+            self.stream.use_model(DriveModel.from_parameters({
                 **self.model.values,
                 **{each.name: plain_value(each.value) for each in parameters}}, self.model.source))
 
     def _takers(self, full_name: str) -> list[str]:
-        """Return the nodes that listen to what a node tells drives."""
+        """Return the nodes that subscribe to a node's commands."""
         namespace, _, name = full_name.rpartition('/')
         try:
             topics = self.get_publisher_names_and_types_by_node(name, namespace or '/')
@@ -128,7 +127,7 @@ class LiveJointStates(Node):
                 self.get_fully_qualified_name()})
 
     @property
-    def model(self) -> ForceModel:
+    def model(self) -> DriveModel:
         """What is compared with."""
         return self.stream.model
 
@@ -206,7 +205,7 @@ class LiveNodes:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
         That running nodes have as well.
     topic, monitor, feedforward : str
         As `LiveJointStates`.
@@ -216,7 +215,7 @@ class LiveNodes:
         Of ROS 2, with --ros-args: remappings, use_sim_time, QoS overrides.
     """
 
-    def __init__(self, model: ForceModel, topic: str = 'joint_states', monitor: str = 'monitor',
+    def __init__(self, model: DriveModel, topic: str = 'joint_states', monitor: str = 'monitor',
                  feedforward: str = 'feedforward', namespace: str = '',
                  arguments: Sequence[str] = ()) -> None:
         self._context = Context()
@@ -254,12 +253,12 @@ class LiveNodes:
         """Return the machine that would be set, in words; '' where no node drives."""
         return self._node.machine()
 
-    def set_model(self, model: ForceModel, confirmed: str) -> dict[str, Any]:
+    def set_model(self, model: DriveModel, confirmed: str) -> dict[str, Any]:
         """Set a model on the node that drives, all or none, and compare with it here.
 
         Parameters
         ----------
-        model : ForceModel
+        model : DriveModel
         confirmed : str
             `machine` as a person has read it.
 

@@ -17,7 +17,7 @@ from sensor_msgs.msg import JointState
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import EffectError, PprsError
 from pprs_dynamics.inference.residuals.live import ERROR_SPAN, Compared, LiveComparison
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages.conversions import NANOSECONDS, RobotNames
 from pprs_dynamics.ros.messages.measured_states import MeasuredStates
 from pprs_dynamics.ros.messages.status_codes import Code, Rejection
@@ -36,7 +36,7 @@ class LiveStream:
     Parameters
     ----------
     node : Node
-    model : ForceModel
+    model : DriveModel
     take : callable
         Called with stamp [ns], positions and efforts (D,) of every sample.
     reject : callable
@@ -58,7 +58,7 @@ class LiveStream:
     """
 
     def __init__(
-        self, node: Node, model: ForceModel, take: Callable[[int, Array, Array], None],
+        self, node: Node, model: DriveModel, take: Callable[[int, Array, Array], None],
         reject: Callable[[Rejection], None], is_active: Callable[[], bool] = lambda: True,
         topic: str = TOPIC, window: float | None = None, span: float = ERROR_SPAN,
         clock: Callable[[], float] = time.monotonic,
@@ -72,7 +72,7 @@ class LiveStream:
         self._subscription: Any = None
         self.begin(model)
 
-    def begin(self, model: ForceModel) -> None:
+    def begin(self, model: DriveModel) -> None:
         """Begin with a stream anew."""
         with self.lock:
             self.model = model
@@ -96,7 +96,7 @@ class LiveStream:
             self._node.destroy_subscription(self._subscription)
         self._subscription = None
 
-    def use_model(self, model: ForceModel) -> None:
+    def use_model(self, model: DriveModel) -> None:
         """Compare with another model from the next comparison on."""
         with self.lock:
             self.model, self._begins_anew = model, True

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import replace
 from typing import Any
 
@@ -62,8 +61,8 @@ PARAMETERS = (
                    'in a process of its own [s]; 0: never', lower=0.0, upper=86400.0, stays=True),
     node_parameter('diagnose_span', 60.0, 'longest window that is diagnosed [s]', lower=5.0,
                    upper=3600.0, stays=True),
-    node_parameter('diagnose_since', (), 'recordings of days on which the machine was right: '
-                   'windows are diagnosed for what has changed since then', stays=True),
+    node_parameter('diagnose_since', (), 'recordings of days on which the machine was correct: '
+                   'windows are diagnosed for changes since then', stays=True),
     node_parameter('feedforward', 'feedforward', 'node that gets what ~/adopt_confirmed sets, '
                    'absolute or in the namespace of this one', stays=True),
 )
@@ -81,15 +80,16 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
     """
 
     def __init__(self, **options: Any) -> None:
-        ManagedNode.__init__(self, 'monitor', allow_undeclared_parameters=True, **options)
+        super().__init__('monitor', allow_undeclared_parameters=True, **options)
         self._log = ThrottledLog(self)
         self._worker = DiagnosisWorker()
         self._publishers_made: list[Any] = []
         self._clocks: list[Timer] = []
         parameters: tuple[NodeParameter, ...] = PARAMETERS
         if is_mechanism(overrides(self)):
-            parameters = tuple(replace(one, default=ARM_WINDOW) if one.name == 'window' else one
-                               for one in PARAMETERS)
+            parameters = tuple(
+                replace(parameter, default=ARM_WINDOW) if parameter.name == 'window' else parameter
+                for parameter in PARAMETERS)
         self._settings = ModelParameters(self, parameters, self._use)
         node_values = self._settings.node_values
         prepare_beside(self, self._settings.model)
@@ -100,7 +100,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._counters = self._stream.counters
         self._counters.update(dict.fromkeys(REJECTIONS, 0))
         self._share, self._counted = 1.0, (0, 0)
-        self._files = files_given(options.get('cli_args') or sys.argv)
+        self._files = files_given(self.arguments)
         self._joints = AllJoints()
         self._adoptable: dict[str, Any] = {}  # values of the model with what is claimed
         self._diagnosed = self._settings.model  # the latest window against it
@@ -204,7 +204,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         unit = common_effort(self._settings.model.units)
         text = (f'largest running error {np.nanmax(running):.4g} {unit}'
                 if np.isfinite(running).any() else
-                'no running error: efforts are not measured, or all joints stand')
+                'no running error: efforts are not measured, or no joint moves')
         text += f'; {self._share:.0%} of the samples are compared'
         if self._stream.measures_no_effort:
             self._status.report('WARN', 'WAITING', f'nothing is compared: {text}')

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -20,8 +20,8 @@ from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import is_mechanism
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.trajectory_request import Motion
@@ -34,10 +34,11 @@ from pprs_dynamics.ros.node.parameters import (
     overrides,
     refuse_unknown,
 )
+from pprs_dynamics.ros.node.provenance import arguments_of
 from pprs_dynamics.ros.node.qos import publisher
 from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 from pprs_dynamics.ros.run_node import Finished
-from pprs_dynamics.simulation.mechanism_run import draw_motion
+from pprs_dynamics.simulation.injection import draw_motion
 
 # Fast DDS asks listeners every 3 s what they have got, which none tells by itself.
 ACKNOWLEDGED = Duration(seconds=4.0)
@@ -67,8 +68,9 @@ LONGEST_CATCH_UP = 0.1
 
 # Of an arm or a robot with loops: what goes with its model, given as to the other nodes.
 OF_JOINTS = tuple(
-    replace(one, default=EXCITATION, choices=(EXCITATION,)) if one.name == 'source' else one
-    for one in PARAMETERS if one.name not in ('file', 'lead_in'))
+    replace(parameter, default=EXCITATION, choices=(EXCITATION,))
+    if parameter.name == 'source' else parameter
+    for parameter in PARAMETERS if parameter.name not in ('file', 'lead_in'))
 
 
 class PlayTrajectoryNode(Node):
@@ -87,7 +89,7 @@ class PlayTrajectoryNode(Node):
         self._beats = Beats(conversions.NANOSECONDS / self._rate)
         self._motion: Motion
         if joints:
-            self._motion, self._write = _joints(self, values)
+            self._motion, self._write = _joints(self, values, arguments_of(options))
         else:
             refuse_unknown(self)
             self._motion, self._write = _path(values), conversions.write_trajectory
@@ -167,11 +169,12 @@ class Beats:
         return self._start + round(self._count * self._period)
 
 
-def _joints(node: Node, values: dict[str, Any]) -> tuple[JointMotion, Callable[..., Any]]:
+def _joints(node: Node, values: dict[str, Any], arguments: Sequence[str],
+            ) -> tuple[JointMotion, Callable[..., Any]]:
     """Return an excitation of the drives of the node's model, and what writes its messages."""
-    declare_model(node)
+    declare_model(node, arguments)
     given = current_values(node)
-    model = MechanismModel.from_parameters({
+    model = DriveModel.from_parameters({
         name: given[name] for name in given.keys() - values.keys()})
     drawn = draw_motion(model, values['duration'], values['seed'], values['rate'])
     # One step beyond the end, which is where it began, at rest.

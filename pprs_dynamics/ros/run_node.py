@@ -17,7 +17,6 @@ from rclpy.signals import SignalHandlerOptions
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.ros.node.executor import PromptExecutor, StoppableExecutor, StopSignals
 from pprs_dynamics.ros.node.parameters import with_hint
-from pprs_dynamics.ros.node.provenance import check_files
 
 
 class Finished(Exception):
@@ -38,7 +37,6 @@ def run_node(factory: Callable[[], Node],
     """
     signals = StopSignals()
     try:
-        check_files(sys.argv)
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except PprsError as error:
         return _complain(with_hint(error))

@@ -39,7 +39,7 @@ class SetpointQueue:
         self._present = None
 
     def advance(self, now: float, lag: float = 0.0) -> bool:
-        """Tell the drives what holds now; False where they refuse it.
+        """Pass the present setpoint to the drives; return False where they refuse it.
 
         Parameters
         ----------

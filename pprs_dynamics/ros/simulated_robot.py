@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any
 
@@ -17,65 +16,48 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics.errors import ModelError, PprsError
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.keys import is_mechanism
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, Followed
 from pprs_dynamics.ros.node.parameters import (
-    NodeParameter,
     current_values,
     declare_model,
     declare_node_parameters,
     node_parameter,
-    overrides,
 )
 from pprs_dynamics.ros.node.provenance import hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.ros.node.throttled_log import ThrottledLog
 from pprs_dynamics.ros.setpoints import SetpointQueue
-from pprs_dynamics.simulation.drive_control import ControlSettings, Setpoint
-from pprs_dynamics.simulation.injected_effect import InjectedEffect
-from pprs_dynamics.simulation.injected_effects import draw_effects
-from pprs_dynamics.simulation.mechanism_plant import MechanismPlant
+from pprs_dynamics.simulation.drive_control import Setpoint
+from pprs_dynamics.simulation.plant import Plant
 from pprs_dynamics.simulation.sensors import SensorSettings
-from pprs_dynamics.simulation.virtual_robot import SimulatedRobot
+from pprs_dynamics.simulation.simulated_robot import BANDWIDTH, DAMPING_RATIO, SimulatedRobot
 
 PARAMETERS = (
-    node_parameter('rate', 500.0, 'of joint_states, a divisor of 2000 [Hz]', lower=10, upper=2000),
-    node_parameter('stiffness', 4000.0, 'gain of the PD loop [N/m]', lower=0, upper=1e9),
-    node_parameter('damping', 150.0, 'gain of the PD loop [N s/m]', lower=0, upper=1e9),
+    node_parameter('rate', 500.0, 'of joint_states [Hz]', lower=10, upper=500),
+    node_parameter('bandwidth', BANDWIDTH, 'of the PD loop, by the inertia at home [Hz]', lower=0,
+                   upper=50),
+    node_parameter('damping_ratio', DAMPING_RATIO, 'of the PD loop [1]', lower=0, upper=10),
     node_parameter('use_effort', True, 'true: the effort of ~/joint_command is the feedforward; '
                    'false: it is ignored, and the PD loop compensates gravity by itself'),
     node_parameter('command_timeout', 0.1, 'without a command for this long the drives hold [s]; '
                    '0: never', lower=0, upper=3600),
     node_parameter('actuation_delay', 0.0, 'from command to force [s]', lower=0, upper=1),
-    node_parameter('encoder_resolution', 1e-6, '0 for none [m]', lower=0),
-    node_parameter('effort_noise', 0.08, 'standard deviation, 64 % white, 36 % coloured [N]',
-                   lower=0),
+    node_parameter('encoder_resolution', 1e-6, '0 for none [m, rad]', lower=0),
+    node_parameter('effort_noise', 0.005, 'standard deviation, 64 % white, 36 % coloured, as a '
+                   'share of the largest effort of an excitation [1]', lower=0, upper=1),
     node_parameter('hidden_effects', (), 'names of effects that the model does not know of, '
                    'or random for one drawn at random; drives may follow: '
                    'coulomb_friction:lift_1,lift_2'),
     node_parameter('hidden_scale', 1.0, 'multiplies their strength', lower=0),
     node_parameter('seed', 0, 'of noise and hidden effects', lower=0),
 )
-# Of an arm or a robot with loops, whose drives are in several units and sizes.
-OF_JOINTS = (
-    node_parameter('rate', 500.0, 'of joint_states [Hz]', lower=10, upper=500),
-    node_parameter('bandwidth', 7.0, 'of the PD loop, by the inertia at home [Hz]', lower=0,
-                   upper=50),
-    node_parameter('damping_ratio', 0.9, 'of the PD loop [1]', lower=0, upper=10),
-    *(one for one in PARAMETERS[3:] if one.name not in ('encoder_resolution', 'effort_noise')),
-    node_parameter('encoder_resolution', 1e-6, '0 for none [m, rad]', lower=0),
-    node_parameter('effort_noise', 0.005, 'standard deviation, 64 % white, 36 % coloured, as a '
-                   'share of the largest effort of an excitation [1]', lower=0, upper=1),
-)
-# What of a running robot changes: what is hidden in it, and parameters of ROS 2 itself.
+# What changes while the robot runs: injected effects, and parameters of ROS 2 itself.
 CHANGEABLE = ('hidden_effects', 'hidden_scale', 'seed')
 OF_ROS = ('use_sim_time', 'start_type_description_service')
 # A node that was stopped for longer than this [s], or whose clock was set back by more, goes on
@@ -96,18 +78,14 @@ class SimulatedRobotNode(ExplainsRefusals):
     def __init__(self, **options: Any) -> None:
         super().__init__('simulated_robot', allow_undeclared_parameters=True, **options)
         self._log = ThrottledLog(self)
-        of_joints = is_mechanism(overrides(self))
-        node_values = declare_node_parameters(self, OF_JOINTS if of_joints else PARAMETERS)
-        declare_model(self)
+        node_values = declare_node_parameters(self, PARAMETERS)
+        declare_model(self, self.arguments)
         values = {name: value for name, value in current_values(self).items()
                   if name not in node_values}
-        self._model = build_model(values)
+        self._model = DriveModel.from_parameters(values)
         self._names = RobotNames.of(self._model)
         self._use_effort = node_values['use_effort']
-        hidden = Hidden.of(node_values) if not of_joints else None
-        self._robot = (_mechanism(self._model, node_values)
-                       if isinstance(self._model, MechanismModel) else
-                       _platform(self._model, node_values, hidden.effects if hidden else ()))
+        self._robot = _simulated(self._model, node_values)
         self._queue = SetpointQueue(self._robot.control)
         self._period = round(conversions.NANOSECONDS / node_values['rate'])
         self._counters = {'cycles': 0, 'late': 0, 'commands': 0, 'refused': 0}
@@ -120,8 +98,8 @@ class SimulatedRobotNode(ExplainsRefusals):
                                   (Float64MultiArray, '~/commands', self._take_efforts)):
             subscription(self, kind, topic, partial(self._on_command, take), raw=True)
         self.get_logger().info(
-            f'{self._model.title}, {node_values["rate"]:g} Hz, {_loop_in_words(node_values)}, '
-            f'hidden effects: {in_words(self._robot.hidden)}; holding at home')
+            f'{self._model.title}, {node_values["rate"]:g} Hz, PD loop of '
+            f'{node_values["bandwidth"]:g} Hz, hidden effects: {self._injected()}; holding at home')
         self._robot.tick()
         self._start = self.get_clock().now().nanoseconds
         # How far the simulation has fallen behind the clock for good, where it could not keep up.
@@ -129,12 +107,17 @@ class SimulatedRobotNode(ExplainsRefusals):
         self._status.report('OK', 'HOLD', 'the robot holds; waiting for commands')
         steady_timer(self, self._period / conversions.NANOSECONDS, self._on_timer)
         steady_timer(self, 1.0, self._judge_timing)
-        self._settings = HiddenParameters(self, PARAMETERS, hidden, self._hide)
+        self._settings = InjectedParameters(self, self._robot.plant, self._inject)
 
-    def _hide(self, hidden: Hidden) -> None:
-        self._robot.use_effects(hidden.effects)
+    def _inject(self, values: Mapping[str, Any]) -> None:
+        self._robot.plant.inject(values['hidden_effects'], values['seed'], values['hidden_scale'])
         self.get_logger().info(f'from {self._robot.time + self._lag:.3f} s after the start on, '
-                               f'hidden effects: {in_words(self._robot.hidden)}')
+                               f'hidden effects: {self._injected()}')
+
+    def _injected(self) -> str:
+        """Return the injected effects in words."""
+        return '; '.join(f'{each["name"]} {each["parameters"]}'
+                         for each in self._robot.plant.injected) or 'none'
 
     def _on_timer(self) -> None:
         behind = self._now() - self._lag - self._robot.time
@@ -192,7 +175,7 @@ class SimulatedRobotNode(ExplainsRefusals):
         efforts = np.array(message_in(data, Float64MultiArray).data)
         count = len(self._names.joints)
         if efforts.shape != (count,) or not np.all(np.isfinite(efforts)):
-            raise PprsError(f'data holds {len(efforts)} values, must be {count} finite efforts')
+            raise PprsError(f'data has {len(efforts)} values, must be {count} finite efforts')
         self._queue.clear()
         self._queue.add(self._now(), Setpoint(None, None, efforts))
 
@@ -209,111 +192,48 @@ class SimulatedRobotNode(ExplainsRefusals):
         return (self.get_clock().now().nanoseconds - self._start) / conversions.NANOSECONDS
 
 
-def _loop_in_words(node_values: dict[str, Any]) -> str:
-    if 'bandwidth' in node_values:
-        return (f'PD loop of {node_values["bandwidth"]:g} Hz and a damping ratio of '
-                f'{node_values["damping_ratio"]:g}')
-    return f'PD gains {node_values["stiffness"]:g} N/m and {node_values["damping"]:g} N s/m'
+def _simulated(model: DriveModel, values: Mapping[str, Any]) -> SimulatedRobot:
+    """Return the simulated robot of a model with the node's settings."""
+    plant = Plant(model, values['hidden_effects'], values['seed'], values['hidden_scale'],
+                  values['rate'])
+    control = plant.gains(values['bandwidth'], values['damping_ratio'],
+                          gravity_compensation=not values['use_effort'],
+                          command_timeout=values['command_timeout'] or np.inf,
+                          actuation_delay=values['actuation_delay'])
+    return SimulatedRobot(
+        plant, seed=values['seed'], rate=values['rate'], control=control,
+        sensors=SensorSettings.with_effort_noise(values['effort_noise'],
+                                                 values['encoder_resolution']))
 
 
-def _platform(model: ForceModel, node_values: dict[str, Any], effects: Sequence[InjectedEffect],
-              ) -> SimulatedRobot:
-    rate = node_values['rate']
-    if 2000 % rate:
-        raise ModelError('rate', rate, PARAMETERS[0].rule)
-    control = ControlSettings(node_values['stiffness'], node_values['damping'],
-                              **_behaviour(node_values))
-    return SimulatedRobot(model.values, effects, seed=node_values['seed'], rate=rate,
-                          control=control, sensors=_sensors(node_values))
-
-
-def _mechanism(model: MechanismModel, node_values: dict[str, Any]) -> SimulatedRobot:
-    seed, rate = node_values['seed'], node_values['rate']
-    plant = MechanismPlant(model, node_values['hidden_effects'], seed, node_values['hidden_scale'],
-                           rate)
-    control = plant.gains(node_values['bandwidth'], node_values['damping_ratio'],
-                          **_behaviour(node_values))
-    return SimulatedRobot(plant, seed=seed, rate=rate, control=control,
-                          sensors=_sensors(node_values))
-
-
-def _sensors(node_values: dict[str, Any]) -> SensorSettings:
-    return SensorSettings.with_effort_noise(
-        node_values['effort_noise'], node_values['encoder_resolution'])
-
-
-def _behaviour(node_values: dict[str, Any]) -> dict[str, Any]:
-    return {'gravity_compensation': not node_values['use_effort'],
-            'command_timeout': node_values['command_timeout'] or np.inf,
-            'actuation_delay': node_values['actuation_delay']}
-
-
-@dataclass(frozen=True)
-class Hidden:
-    """Hidden effects, and the words, scale and seed that they were drawn from."""
-
-    words: tuple[str, ...]
-    drawn_with: tuple[float, int]
-    effects: tuple[InjectedEffect, ...]
-
-    @classmethod
-    def of(cls, values: Mapping[str, Any], running: Hidden | None = None) -> Hidden:
-        """Return those that parameters say; what acts already stays what it is.
-
-        Raises
-        ------
-        InjectedEffectError
-            For words that name no effect.
-        """
-        words = tuple(values['hidden_effects'])
-        drawn_with = values['hidden_scale'], values['seed']
-        effects = draw_effects(words, np.random.default_rng(values['seed']),
-                               values['hidden_scale'])
-        kept = (dict(zip(running.words, running.effects, strict=True))
-                if running is not None and running.drawn_with == drawn_with else {})
-        return cls(words, drawn_with, tuple(
-            kept.pop(word, effect) for word, effect in zip(words, effects, strict=True)))
-
-
-def in_words(truths: Iterable[Mapping[str, Any]]) -> str:
-    """Return what is hidden, for the log."""
-    return '; '.join(f'{one["name"]} {one["parameters"]}' for one in truths) or 'none'
-
-
-class HiddenParameters(Followed[tuple[dict[str, Any], Hidden | None]]):
-    """Follows the parameters of what is hidden; all others stay as they were at the start.
+class InjectedParameters(Followed[dict[str, Any]]):
+    """Follows the parameters of injected effects; all others stay as they were at the start.
 
     Parameters
     ----------
     node : Node
-    declared : iterable of NodeParameter
-        The node's own.
-    hidden : Hidden or None
-        What is hidden now; None of a robot in which that stays, too.
+    plant : Plant
+        Checks the names of effects.
     use : callable
-        Called with what is hidden from now on.
+        Called with the node's parameters when those of injected effects have changed.
     """
 
-    def __init__(self, node: Node, declared: Iterable[NodeParameter], hidden: Hidden | None,
-                 use: Callable[[Hidden], None]) -> None:
-        self._hidden, self._use = hidden, use
-        super().__init__(node, (one for one in declared
-                                if hidden is not None and one.name in CHANGEABLE))
-        self._own, _ = self._checked
+    def __init__(self, node: Node, plant: Plant, use: Callable[[Mapping[str, Any]], None]) -> None:
+        self._plant, self._use = plant, use
+        super().__init__(node, (each for each in PARAMETERS if each.name in CHANGEABLE))
+        self._values = self._checked
 
-    def _validated(self, changes: Iterable[Parameter]) -> tuple[dict[str, Any], Hidden | None]:
+    def _validated(self, changes: Iterable[Parameter]) -> dict[str, Any]:
         before, after = current_values(self._node), current_values(self._node, changes)
-        changeable = [one.name for one in self._declared]
         for name in (change.name for change in changes):
-            if name not in (*changeable, *OF_ROS) and before.get(name) != after.get(name):
+            if name not in (*CHANGEABLE, *OF_ROS) and before.get(name) != after.get(name):
                 raise ModelError(name, after.get(name), 'stay as it was at the start: of a running '
-                                 f'robot only {", ".join(changeable) or "the clock"} change')
-        node_values = {one.name: one.check(after.get(one.name)) for one in self._declared}
-        return node_values, None if self._hidden is None else Hidden.of(node_values, self._hidden)
+                                 f'robot only {", ".join(CHANGEABLE)} change')
+        values = {each.name: each.check(after.get(each.name)) for each in self._declared}
+        self._plant.choices(values['hidden_effects'], values['seed'], values['hidden_scale'])
+        return values
 
-    def _apply(self, checked: tuple[dict[str, Any], Hidden | None],
-               changes: Iterable[Parameter]) -> None:
-        before, (self._own, hidden) = self._own, checked
-        if hidden is not None and self._own != before:
-            self._hidden = hidden
-            self._use(hidden)
+    def _apply(self, checked: dict[str, Any], changes: Iterable[Parameter]) -> None:
+        if checked != self._values:
+            self._values = checked
+            self._use(checked)

@@ -5,10 +5,10 @@
 
 MoveIt and other planners send goals to `~/follow_joint_trajectory`; the node computes the drives'
 efforts at every point and sends the goal on to the controller's own action. Feedback, result and
-cancelling pass through. A goal that breaks a rule, or asks for what the robot cannot do, is aborted
-with the reason in `error_string`, and nothing reaches the controller. So is one whose controller
-goes, or falls silent, in the middle of it, or says that it is reached long before it can be: a
-controller goes over to what comes on its topic meanwhile, and answers the goal by that.
+cancelling pass through. A goal that breaks a rule, or asks for what the robot cannot do, is refused
+when it is asked, with the reason in `~/status` and the log. A goal is aborted where its controller
+disappears or falls silent, or reports the goal as reached long before it can be: a controller
+switches to a trajectory that comes on its topic, and answers the goal by that.
 
 A controller holds a pose without any effort by itself, after it has become active, and after a goal
 was cancelled or aborted: the node then sends it that pose at rest, with its gravity.
@@ -24,14 +24,13 @@ from action_msgs.msg import GoalStatus
 from control_msgs.action import FollowJointTrajectory
 from control_msgs.msg import JointTrajectoryControllerState
 from geometry_msgs.msg import Twist
-from rclpy.action import ActionServer, CancelResponse
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from trajectory_msgs.msg import JointTrajectory
 
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.model.preparation import prepare
-from pprs_dynamics.ros.force_command import STILL, Feedforward, parameters_for
+from pprs_dynamics.ros.force_command import STILL, DriveTrajectory, Feedforward, parameters_for
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.command_writer import CommandWriter
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.status_codes import Code, Rejection
 from pprs_dynamics.ros.messages.trajectory_request import (
@@ -44,7 +43,7 @@ from pprs_dynamics.ros.node.controller_watch import STATE_TOPIC, ControllerWatch
 from pprs_dynamics.ros.node.goal_relay import ControllerError, GoalRelay
 from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, ModelParameters
 from pprs_dynamics.ros.node.parameters import drive_count, node_parameter
-from pprs_dynamics.ros.node.provenance import hardware_of
+from pprs_dynamics.ros.node.provenance import files_given, hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.senders import publishers_of
 from pprs_dynamics.ros.node.status import StatusReporter
@@ -64,7 +63,6 @@ SETTLING = 0.02
 # Share of a goal's motion before the end of which the answer that it is reached is not believed;
 # a controller's clock and its last cycles take less.
 LEFT_AT_MOST = 0.1
-ERROR_CODES = {'NAMES': Result.INVALID_JOINTS}  # of rejections; INVALID_GOAL for all others
 
 
 class TrajectoryProxyNode(ExplainsRefusals):
@@ -75,44 +73,51 @@ class TrajectoryProxyNode(ExplainsRefusals):
         self._log = ThrottledLog(self)
         # Planners may leave derivatives out; feedforward, whose messages are short, refuses that.
         parameters = (ACTION, TIMEOUT, *(
-            replace(one, default=SPLINE) if one.name == 'missing_derivatives' else one
-            for one in parameters_for(drive_count(self)) if one.name in SHARED))
+            replace(parameter, default=SPLINE)
+            if parameter.name == 'missing_derivatives' else parameter
+            for parameter in parameters_for(drive_count(self)) if parameter.name in SHARED))
         self._settings = ModelParameters(self, parameters, lambda: None, drives=True)
         node_values = self._settings.node_values
         prepare(self._settings.model)
         self._counters = {'received': 0, 'passed_on': 0, 'refused': 0}
         self._status = StatusReporter(self, {'action': node_values['action']}, self._counters,
-                                      hardware_of(self._settings.model))
+                                      hardware_of(self._settings.model), self._refresh)
+        self._files = files_given(self.arguments)
+        self._refresh()
         self._relay = GoalRelay(self, FollowJointTrajectory, node_values['action'],
                                 lambda: self._settings.node_values['controller_timeout'])
         self._server = ActionServer(
             self, FollowJointTrajectory, '~/follow_joint_trajectory', self._execute,
-            cancel_callback=self._cancel)
+            goal_callback=self._accept, cancel_callback=self._cancel)
         self._joints = RobotNames.of(self._settings.model).joints
         self._controller, self._hold_is_due = ControllerWatch(self._joints), False
         where = node_values['action'].rpartition('/')[0]
-        self._speed_scaling = 1.0  # the largest that the controller has told
+        self._speed_scaling = 1.0  # the largest that the controller has reported
         self._hold = publisher(self, JointTrajectory, f'{where}/joint_trajectory')
         subscription(self, JointTrajectoryControllerState, f'{where}/{STATE_TOPIC}',
                      self._on_controller)
         self._status.report('OK', 'WAITING', f'goals go to {node_values["action"]}')
 
-    async def _execute(self, handle: Any) -> Any:
+    def _refresh(self) -> None:
+        self._status.facts.update(
+            model={'files': self._files, 'sha256': self._settings.model.fingerprint},
+            changes=len(self._settings.history or ()))
+
+    def _accept(self, goal: Any) -> GoalResponse:
+        """Refuse a goal that breaks a rule, or asks for what the robot cannot do."""
         self._counters['received'] += 1
         try:
-            goal = self._filled(handle.request)
+            self._checked(goal)
         except PprsError as error:
-            reason = Rejection.of(error)
-            return self._refused(handle, reason.code, reason.text,
-                                 ERROR_CODES.get(reason.code, Result.INVALID_GOAL))
-        duration = _duration(goal, self.get_clock().now().nanoseconds)
-        if duration < 0:
-            return self._refused(handle, 'TIME', f'the trajectory ended {-duration:.3f} s ago',
-                                 Result.OLD_HEADER_TIMESTAMP)
-        if max(np.abs(goal.trajectory.points[-1].velocities)) > STILL:
-            return self._refused(handle, 'REFUSED', 'the last point is in motion: the controller '
-                                 'would never say that the goal is reached; end at rest',
-                                 Result.INVALID_GOAL)
+            self._note_refusal(Rejection.of(error))
+            return GoalResponse.REJECT
+        return GoalResponse.ACCEPT
+
+    async def _execute(self, handle: Any) -> Any:
+        try:
+            goal, duration = self._checked(handle.request)
+        except PprsError as error:  # the model was changed meanwhile
+            return self._aborted(handle, Rejection.of(error), Result.INVALID_GOAL)
         try:
             tolerance = conversions.nanoseconds(goal.goal_time_tolerance)
             watched = await self._relay.accepted(
@@ -125,7 +130,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
         except ControllerError as error:
             self._hold_is_due = self._hold_is_due or error.began
             # It has not kept to the path, and where it is is not known.
-            return self._refused(handle, 'CONTROLLER', str(error), Result.PATH_TOLERANCE_VIOLATED
+            return self._aborted(handle, error, Result.PATH_TOLERANCE_VIOLATED
                                  if error.began else Result.INVALID_GOAL)
         self._hold_is_due = answer.status != GoalStatus.STATUS_SUCCEEDED
         if answer.status == GoalStatus.STATUS_SUCCEEDED:
@@ -157,8 +162,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
         except PprsError as error:
             self.get_logger().warning(f'the controller holds without gravity: {error}')
             return
-        self._hold.publish(CommandWriter(RobotNames.of(model)).joint_trajectory(
-            0, np.zeros(1, dtype=np.int64), held.forces, held.effort))
+        self._hold.publish(DriveTrajectory.holding(held).message(0, RobotNames.of(model)))
         self.get_logger().info('the controller holds with gravity')
 
     def _check_in_time(self, goal: Any, sent_at: int) -> None:
@@ -175,16 +179,38 @@ class TrajectoryProxyNode(ExplainsRefusals):
         if left > LEFT_AT_MOST * duration:
             topic = self._hold.topic_name
             raise ControllerError(
-                f'the controller says that the goal is reached {left:.2f} s before its last point: '
+                f'the controller reports the goal as reached {left:.2f} s before its last point: '
                 f'it followed another trajectory, which came on {topic}, where these publish: '
                 f'{publishers_of(self, topic)}', began=True)
 
-    def _refused(self, handle: Any, status: Code, text: str, code: int) -> Any:
+    def _note_refusal(self, error: Rejection | ControllerError) -> str:
+        code: Code = error.code if isinstance(error, Rejection) else 'CONTROLLER'
+        text = error.text if isinstance(error, Rejection) else str(error)
         self._counters['refused'] += 1
-        self._status.report('ERROR', status, text)
-        self._log.warning('refused', f'refused, {status}: {text}')
+        self._status.report('ERROR', code, text)
+        self._log.warning('refused', f'refused, {code}: {text}')
+        return f'{code}: {text}'
+
+    def _aborted(self, handle: Any, error: Rejection | ControllerError, code: int) -> Any:
         handle.abort()
-        return Result(error_code=code, error_string=f'{status}: {text}')
+        return Result(error_code=code, error_string=self._note_refusal(error))
+
+    def _checked(self, goal: Any) -> tuple[Any, float]:
+        """Return the goal for the controller, and how long it takes from now on [s].
+
+        Raises
+        ------
+        PprsError
+            Where it breaks a rule, has ended already, or ends in motion.
+        """
+        filled = self._filled(goal)
+        duration = _duration(filled, self.get_clock().now().nanoseconds)
+        if duration < 0:
+            raise Rejection('TIME', f'the trajectory ended {-duration:.3f} s ago')
+        if max(np.abs(filled.trajectory.points[-1].velocities)) > STILL:
+            raise Rejection('LIMIT', 'the last point is in motion: the controller would never '
+                            'report that the goal is reached; end at rest')
+        return filled, duration
 
     def _filled(self, goal: Any) -> Any:
         """Return the goal for the controller: of all drives, with their efforts.
@@ -200,8 +226,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
         velocity = answer.forces.drive_motion[1]
         is_still = np.abs(velocity[-1]).max() <= STILL  # else it is refused
         drives = feedforward.ending_at_rest(answer, SETTLING if is_still else 0.0)
-        trajectory = CommandWriter(RobotNames.of(model)).joint_trajectory(
-            0, drives.offsets, drives, drives.effort)
+        trajectory = drives.message(0, RobotNames.of(model))
         given = goal.trajectory if goal.trajectory.points else goal.multi_dof_trajectory
         trajectory.header = given.header  # a stamp of 0 means: at once, when it arrives
         return Goal(
@@ -221,7 +246,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
             return request
         # Drives' positions: the platform's motion follows from them.
         drives: Any = request.motion
-        motion = model.motion_of_drives(drives.position, drives.velocity, drives.acceleration)
+        motion = model.robot.motion_of_drives(drives.position, drives.velocity, drives.acceleration)
         return TrajectoryRequest(motion, request.start, request.offsets)
 
 

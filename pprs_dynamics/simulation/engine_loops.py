@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Loops closed by the engine's own kinematics, and what they transmit.
+"""Loops closed by the engine's own kinematics, and the forces in them.
 
 J is the engine's Jacobian of the drives, the closures, coupled joints and locked joints, so that
 J v = (v_a, 0). Positions come from Newton's method. The rates of all joints T are the columns of
@@ -22,30 +22,37 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.tree_equations import AXES, KIND, LOOP, TRANSLATION
+from pprs_dynamics.physics.mechanism.tree_tables import AXES, KIND, LOOP, TRANSLATION
 from pprs_dynamics.simulation.engine_state import LEAST_SINGULAR, EngineState
 
 CLOSED = 1e-11  # [m, rad], of Newton's last step
 MOST_STEPS = 40
 STRIDE = 0.05  # [m, rad] of a drive, from where loops were closed last
 FEW_STEPS = 12  # after which derivatives are computed anew
+NEXT, LAST = np.array([1, 2, 0]), np.array([2, 0, 1])  # of three axes, cyclically
 MOVE = 1e-4  # [m, rad], by which a joint moves for derivatives of derivatives
 
 
 class ClosedMotion(NamedTuple):
-    """The engine's coordinates along a motion, its loops closed.
+    """The engine's coordinates along a motion, with closed loops.
 
     Parameters
     ----------
     position, velocity, acceleration : (N, nq), (N, nv) and (N, nv) arrays
     rates : (N, nv, D) array
-        Velocities per rate of each drive.
+        Velocities of all joints per rate of each drive.
+    turns : (N, L, 3, nv) array
+        Angular velocities of link B against link A of each closure, per velocity of each joint.
+    reactions : (N, L, 3, nv) array
+        Force of each closure on link B per effort of each joint of the tree.
     """
 
     position: Array
     velocity: Array
     acceleration: Array
     rates: Array
+    turns: Array
+    reactions: Array
 
 
 class EngineLoops:
@@ -66,6 +73,8 @@ class EngineLoops:
         model, t = state.model, state.structure.tables
         self._rows, self._weights = t.rows, t.row_reals[:, :2].T
         self._slides = self._rows[:, KIND] == TRANSLATION
+        self._turning, self._of_loop = np.flatnonzero(~self._slides), self._rows[:, LOOP]
+        self._root = state.root.inverse
         # Of both sides of each closure: the body, and its frame there.
         self._bodies = np.array([[links[int(row)] for row in side]
                                  for side in (t.loop_a, t.loop_b)], dtype=int)
@@ -74,8 +83,15 @@ class EngineLoops:
             for k, row in enumerate(rows):
                 own = frames[int(row)].inverse @ Frame(self._R[side, k], self._p[side, k])
                 self._R[side, k], self._p[side, k] = own.R, own.p
-        self._moves = _moved_by(model)[self._bodies]  # (2, L, nv)
-        self._sign = self._moves[1].astype(float) - self._moves[0]
+        self._fixed = self._bodies == 0
+        self._about = model.body_rootid[model.dof_bodyid]
+        moves = _moved_by(model)[self._bodies].astype(float)  # (2, L, nv)
+        self._sign = moves[1] - moves[0]
+        hangs = np.eye(model.nbody)
+        for body in range(model.nbody - 1, 0, -1):
+            hangs[model.body_parentid[body]] += hangs[body]
+        # 1 where a closure's force on its second link acts through a body, -1 on its first.
+        self.behind = hangs[:, self._bodies[1]] - hangs[:, self._bodies[0]]  # (bodies, L)
         self._coupled = [(*(int(model.jnt_qposadr[k]) for k in (a, b)),
                           *(int(model.jnt_dofadr[k]) for k in (a, b)), ratio, offset)
                          for a, b, ratio, offset in state.couplings
@@ -103,21 +119,21 @@ class EngineLoops:
         data, bodies = self.state.data, self._bodies
         R, p = data.xmat[bodies].reshape(*bodies.shape, 3, 3), data.xpos[bodies]
         # The engine's world is the root of the description; what is fixed is so in the base.
-        root, fixed = self.state.root.inverse, bodies == 0
-        R[fixed], p[fixed] = root.R, root.p
+        R[self._fixed], p[self._fixed] = self._root.R, self._root.p
         return R @ self._R, p + np.einsum('slij,slj->sli', R, self._p)
 
     def _axes(self, R: Array) -> tuple[Array, ...]:
-        """Return the axes of each row, of A, B, A and B, (r, 3) each."""
-        loops, axes = self._rows[:, LOOP], self._rows[:, AXES:AXES + 4].T
-        return tuple(R[k % 2, loops, :, axes[k]] for k in range(4))
+        """Return the axes of rotating rows, of A, B, A and B, (r, 3) each."""
+        rows = self._rows[self._turning]
+        return tuple(R[k % 2, rows[:, LOOP], :, rows[:, AXES + k]] for k in range(4))
 
     def _leads(self, R: Array) -> Array:
-        """Return what rows multiply relative velocities by: of points, or angular, (r, 3)."""
-        a, b, c, d = self._axes(R)
-        first, second = self._weights[..., None]
-        leads: Array = np.where(self._slides[:, None], a,
-                                first * cross(b, a) + second * cross(d, c))
+        """Return the directions along which rows take velocities of points, or angular, (r, 3)."""
+        leads: Array = R[0, self._of_loop, :, self._rows[:, AXES]]
+        if len(self._turning):
+            a, b, c, d = self._axes(R)
+            first, second = self._weights[:, self._turning, None]
+            leads[self._turning] = first * cross(b, a) + second * cross(d, c)
         return leads
 
     def residuals(self, goal: Array) -> Array:
@@ -126,11 +142,13 @@ class EngineLoops:
         qpos = state.data.qpos
         state.engine.mj_kinematics(state.model, state.data)
         R, p = self.frames()
-        a, b, c, d = self._axes(R)
-        first, second = self._weights
-        closures = np.where(
-            self._slides, np.sum(a * (p[1] - p[0])[self._rows[:, LOOP]], axis=1),
-            first * np.sum(a * b, axis=1) + second * np.sum(c * d, axis=1))
+        along = R[0, self._of_loop, :, self._rows[:, AXES]]
+        closures = np.einsum('ri,ri->r', along, (p[1] - p[0])[self._of_loop])
+        if len(self._turning):
+            a, b, c, d = self._axes(R)
+            first, second = self._weights[:, self._turning]
+            closures[self._turning] = (first * np.einsum('ri,ri->r', a, b)
+                                       + second * np.einsum('ri,ri->r', c, d))
         return np.concatenate((
             qpos[self._places] - goal, np.zeros(len(self._given) - self._count), closures,
             [qpos[place] - ratio * qpos[leader] - offset
@@ -144,28 +162,32 @@ class EngineLoops:
         points : (L, 3) array
             In the world.
         """
-        model, data = self.state.model, self.state.data
+        data = self.state.data
         turn, move = data.cdof[:, :3], data.cdof[:, 3:]
-        about = data.subtree_com[model.body_rootid[model.dof_bodyid]]
+        about = data.subtree_com[self._about]
         arms = points[:, None] - about
         linear = self._sign[..., None] * (move + cross(turn, arms))
         angular = self._sign[..., None] * turn
         return linear.transpose(0, 2, 1), angular.transpose(0, 2, 1)
 
-    def derivatives(self) -> Array:
-        """Return the derivatives of all residuals where the engine is, (r, nv)."""
+    def derivatives(self) -> tuple[Array, Array, Array]:
+        """Return the derivatives of the residuals, (r, nv), and what they consist of.
+
+        These are the directions of the closures' rows, and the angular velocities of link B
+        against link A per velocity of each joint, (L, 3, nv).
+        """
         state = self.state
         state.engine.mj_kinematics(state.model, state.data)
         state.engine.mj_comPos(state.model, state.data)
         R, p = self.frames()
-        linear, angular = self.relative(p[1])
-        loops = self._rows[:, LOOP]
-        moves = np.where(self._slides[:, None, None], linear[loops], angular[loops])
-        return np.concatenate((self._given, np.einsum('ri,rin->rn', self._leads(R), moves),
-                               self._couplings))
+        linear, turns = self.relative(p[1])
+        leads, moves = self._leads(R), linear[self._of_loop]
+        moves[self._turning] = turns[self._of_loop[self._turning]]
+        J = np.concatenate((self._given, np.einsum('ri,rin->rn', leads, moves), self._couplings))
+        return J, leads, turns
 
-    def _solved(self) -> Array:
-        J = self.derivatives()
+    def _solved(self, J: Array) -> Array:
+        """Return the inverse of the derivatives, or the pseudo-inverse of redundant rows."""
         if J.shape[0] == J.shape[1]:
             try:
                 inverse: Array = np.asarray(np.linalg.inv(J), dtype=float)
@@ -199,7 +221,7 @@ class EngineLoops:
         for n in range(MOST_STEPS):
             off = self.residuals(goal)
             if self._inverse is None or n >= FEW_STEPS:
-                self._inverse = self._solved()
+                self._inverse = self._solved(self.derivatives()[0])
             step = -self._inverse @ off
             state.engine.mj_integratePos(state.model, state.data.qpos, step, 1.0)
             if np.max(np.abs(step), initial=0.0) < CLOSED:
@@ -208,16 +230,19 @@ class EngineLoops:
         raise WorkspaceError(0, 'the loops do not close in the physics engine',
                              'must be within reach, on the way from home')
 
-    def put(self, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """Put the engine in a motion of the drives, (D,) each, and return all rates, (nv, D)."""
+    def put(self, position: Array, velocity: Array, acceleration: Array) -> ClosedMotion:
+        """Put the engine in a motion of the drives, (D,) each, and return it as one sample."""
         state, data = self.state, self.state.data
+        nv, loops = state.model.nv, self._bodies.shape[1]
         if self.is_open:
             data.qpos[self._places] = position
             data.qvel[state.drives], data.qacc[state.drives] = velocity, acceleration
-            return self._given[:self._count].T
+            none = np.zeros((loops, 3, nv))
+            return _sample(data, self._given[:self._count].T, none, none)
         self.close(position)
         there = data.qpos.copy()
-        inverse = self._solved()
+        J, leads, turns = self.derivatives()
+        inverse = self._solved(J)
         rates: Array = inverse[:, :self._count]
         v = rates @ velocity
         fastest = np.max(np.abs(v), initial=0.0)
@@ -226,65 +251,46 @@ class EngineLoops:
             step = MOVE / fastest
             for sign in (1.0, -1.0):
                 state.engine.mj_integratePos(state.model, data.qpos, v, sign * step)
-                drift += sign * (self.derivatives() @ v) / (2 * step)
+                drift += sign * (self.derivatives()[0] @ v) / (2 * step)
                 data.qpos[:] = there
         data.qvel[:] = v
         data.qacc[:] = rates @ acceleration - inverse @ drift
         self._inverse = inverse
-        return rates
+        return _sample(data, rates, turns, self._reactions(J, inverse, leads))
+
+    def _reactions(self, J: Array, inverse: Array, leads: Array) -> Array:
+        """Return the forces of the closures per effort of each joint, (L, 3, nv).
+
+        By (J^-1)' efforts of the tree become those of the rows. Redundant rows carry nothing: which
+        of them carries a load is not determined.
+        """
+        found = np.zeros((self._bodies.shape[1], 3, J.shape[1]))
+        first, count = len(self._given), len(self.state.structure.tables.passive)
+        if J.shape[0] != J.shape[1]:
+            carrying = np.concatenate((J[:first + count], J[first + len(self._rows):]))
+            inverse = np.asarray(np.linalg.pinv(carrying, rcond=LEAST_SINGULAR), dtype=float)
+        for k in np.flatnonzero(self._slides[:count]):
+            found[self._of_loop[k]] += np.outer(leads[k], inverse[:, first + k])
+        return found
 
     def follow(self, motion: JointMotion) -> ClosedMotion:
         """Return the engine's motion along one of the drives, from the first sample on."""
-        data, model = self.state.data, self.state.model
-        q = np.empty((len(motion), model.nq))
-        v, a = np.empty((2, len(motion), model.nv))
-        rates = np.empty((len(motion), model.nv, self._count))
-        for k in range(len(motion)):
-            rates[k] = self.put(motion.position[k], motion.velocity[k], motion.acceleration[k])
-            q[k], v[k], a[k] = data.qpos, data.qvel, data.qacc
-        return ClosedMotion(q, v, a, rates)
+        return ClosedMotion(*map(np.concatenate, zip(*(
+            self.put(*drives) for drives in zip(
+                motion.position, motion.velocity, motion.acceleration, strict=True)),
+            strict=True)))
 
-    def transmitted(self, needed: Array, efforts: Array) -> Array:
-        """Return what the closures transmit, force on B at its point and moment, (L, 6).
 
-        Parameters
-        ----------
-        needed : (nv,) array
-            Efforts of all joints of the tree, where the engine is.
-        efforts : (D,) array
-            Of the drives.
-        """
-        found = np.zeros((self._bodies.shape[1], 6))
-        count = len(self.state.structure.tables.passive)
-        if not count:
-            return found
-        first = len(self._given)
-        J = self.derivatives()
-        carrying = np.concatenate((J[self._count:first + count], J[first + len(self._rows):]))
-        left = needed.copy()
-        left[self.state.drives] -= efforts
-        amounts = np.linalg.lstsq(carrying.T, left, rcond=LEAST_SINGULAR)[0]
-        of_rows = amounts[first - self._count:][:count]
-        leads = self._leads(self.frames()[0])
-        for row, slides, lead, amount in zip(self._rows, self._slides, leads, of_rows,
-                                             strict=False):
-            part = slice(0, 3) if slides else slice(3, 6)
-            found[row[LOOP], part] += amount * lead
-        return found
-
-    def apply(self, forces: Array) -> None:
-        """Add the closures' forces (L, 6) to those on the engine's bodies."""
-        data, at = self.state.data, self.frames()[1][1]
-        for bodies, sign in zip(self._bodies, (-1.0, 1.0), strict=True):
-            moments = forces[:, 3:] + cross(at - data.xipos[bodies], forces[:, :3])
-            np.add.at(data.xfrc_applied, bodies, sign * np.concatenate(
-                (forces[:, :3], moments), axis=1))
+def _sample(data: Any, rates: Array, turns: Array, reactions: Array) -> ClosedMotion:
+    """Return the engine's state as a motion of one sample."""
+    return ClosedMotion(*(np.array(each)[None] for each in (
+        data.qpos, data.qvel, data.qacc, rates, turns, reactions)))
 
 
 def cross(a: Array, b: Array) -> Array:
     """Return vector products of the last axis; NumPy's own takes five times as long for few."""
-    product: Array = (a[..., [1, 2, 0]] * b[..., [2, 0, 1]]
-                      - a[..., [2, 0, 1]] * b[..., [1, 2, 0]])
+    product: Array = (a.take(NEXT, axis=-1) * b.take(LAST, axis=-1)
+                      - a.take(LAST, axis=-1) * b.take(NEXT, axis=-1))
     return product
 
 

@@ -1,358 +1,370 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The simulated mechanism in motion: friction, hidden effects and time stepping.
+"""A robot in motion under the efforts of its drives.
 
-Its state is the six drive positions and velocities; passive joints and platform follow. A step
-is the midpoint rule. The equations are set up once, half a step ahead, and solved for the drive
-acceleration with friction at the velocity of the midpoint. So friction that reverses within one
-step does not chatter. Loads are those of the step before.
+Masses, gravity and inertial forces are MuJoCo's, of the tree; loops are eliminated. With T the
+rates of all joints per rate of the drives and h the forces of the tree,
 
-Notes
------
-Why the engine does not close the chains. The paper's robot on an excitation under PD control
-and feedforward, its true motion explained by an exact model (one core, time in Python included):
+    T' M T a = tau - T' h - T' (M T_dot v) - friction
 
-=============================================  ========  =============  =====================
-closed by                                      gap [m]   force rms [N]  times real time
-=============================================  ========  =============  =====================
-engine's `connect`, 0.5 ms, implicitfast       1.8e-7    3e-4           15-22, no friction
-engine's `connect`, 0.5 ms, RK4                9e-10     3e-4           10, no friction
-engine's `connect`, 0.1 ms, implicitfast       7e-9      5e-5           5, no friction
-elimination as here, 0.5 ms                    1e-15     5e-7           3.5-5, with friction
-=============================================  ========  =============  =====================
-
-The engine's constraints leave out the change of their Jacobian, which costs the tenths of a
-millinewton, and friction that follows loads would have to be added a step late and explicitly.
-The time step causes errors of 0.07 um and 0.4 mN rms against one of 0.05 ms.
+A step is the midpoint rule, with friction at the velocity of the midpoint. Friction of a joint is
+c(|w|) w with c = c_v + (T + mu r F) tanh(|w| / width) / |w|. With the c of the round before, it is
+linear in the acceleration. Loads are those of the acceleration of the step before.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import math
+import zlib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.linalg.lapack import dposv
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import PprsError, SingularityError
-from pprs_dynamics.physics.model.limits import Limits
-from pprs_dynamics.simulation.closed_chains import (
-    DRIVE_DOFS,
-    ClosedChains,
-    Equations,
+from pprs_dynamics.errors import PprsError, WorkspaceError, suggestion
+from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.simulation.drive_control import ControlSettings
+from pprs_dynamics.simulation.engine import SLOWEST, MechanismEngine
+from pprs_dynamics.simulation.injected_forms import (
+    FORMS,
+    UNKNOWN,
+    InjectedEffectError,
+    JointMoment,
+    draw_form,
 )
-from pprs_dynamics.simulation.injected_effect import (
-    BodyChange,
-    DriveMoment,
-    InjectedEffect,
-    PlatformMoment,
-    StructureForce,
+from pprs_dynamics.simulation.injection import (
+    RANDOM,
+    Choice,
+    Injected,
+    draw_motion,
+    guides,
+    inject_link_mass,
+    inject_payload,
+    inject_tilt,
+    link_sizes,
+    links_that_weigh,
+    named,
+    one_able_joint,
 )
-from pprs_dynamics.simulation.resistance import Resistance
+from pprs_dynamics.simulation.platform import as_mechanism
+from pprs_dynamics.simulation.temperatures import Climate
 
-LOAD_ROUNDS = 20
-LOAD_TOLERANCE = 3e-5  # [N], between rounds; what is left in the forces is below mu times it
-# Stops at the ends of the strokes.
-STOP_STIFFNESS = 1e5  # [N/m]
-STOP_DAMPING = 300.0  # [N s/m]
-# Share of the shorter stroke in one time step, 100 m/s for the paper's robot, beyond which the
-# stops at its ends are not seen.
-LONGEST_MOVE = 0.1
-
-
-@dataclass(frozen=True)
-class PlantSettings:
-    """Settings of the simulation.
-
-    Parameters
-    ----------
-    step : float
-        Time step [s].
-    friction : bool
-        False switches the model file's friction off.
-    drive_width, passive_width : float or (6,) array, float
-        Width in which friction turns over, as a multiple of the model file's.
-    actual_loads : bool
-        False: friction follows the loads that the joints would have without friction in the
-        passive joints, as the paper's equations do. True: the loads they have.
-    """
-
-    step: float = 0.0005
-    friction: bool = True
-    drive_width: float | tuple[float, ...] = 1.0
-    passive_width: float = 1.0
-    actual_loads: bool = False
-
-
-@dataclass(frozen=True)
-class Truth:
-    """True state of the mechanism at one moment, everything in `base`.
-
-    Parameters
-    ----------
-    time : float
-    position, velocity, acceleration, effort : (6,) arrays
-        Of the drives; effort is what they apply [N].
-    platform_position, orientation : (3,), (4,) arrays
-        Orientation as x, y, z, w.
-    linear_velocity, angular_velocity, linear_acceleration, angular_acceleration : (3,) arrays
-    guide_load : (6,) array
-        [N]
-    gap : float
-        Largest component of the distance between the halves of a spherical joint [m].
-    """
-
-    time: float
-    position: Array
-    velocity: Array
-    acceleration: Array
-    effort: Array
-    platform_position: Array
-    orientation: Array
-    linear_velocity: Array
-    angular_velocity: Array
-    linear_acceleration: Array
-    angular_acceleration: Array
-    guide_load: Array
-    gap: float
+LONGEST_STEP = 0.002  # [s]; a hexapod's takes 1 ms of processor time, for real time
+ROUNDS = 12  # of friction's coefficients in a step
+SOLVED = 1e-6  # of the width in which friction turns over, between rounds
+# Stops at the ends of ranges: a spring of that frequency with the drive's inertia at home, damped.
+STOP_FREQUENCY, STOP_DAMPING = 40.0, 0.3  # [Hz], of critical
+BEYOND = 1.0  # of a range behind its stop, from which on the motion means nothing
+FASTEST = 100.0  # of a range, or of a turn, in a second
+NOMINAL = 10.0  # [s], of the motion that gives the sizes of efforts and speeds of this robot
+BODIES = ('payload_mass', 'link_mass', 'base_tilt')
+# Forms that need the moment alone, without a memory or the acceleration.
+OF_MOMENT = {name: form for name, form in {**FORMS, **UNKNOWN}.items()
+             if name not in ('hysteresis', 'drive_inertia')}
+INJECTED = (*OF_MOMENT, *BODIES)
 
 
 class UnsolvedError(PprsError, ArithmeticError):
-    """A step that neither the engine nor the time step can follow: what it gives is no motion."""
+    """A step that has no solution with a physical meaning."""
 
     def __init__(self, time: float, found: str) -> None:
         self.found = f'at {time:.6g} s {found}'
-        super().__init__(f'the simulated robot: {self.found}, but forces and hidden effects must '
+        super().__init__(f'the simulated robot: {self.found}, but forces and injected effects must '
                          'be such as a mechanism can have')
 
 
 class Plant:
-    """The mechanism under drive efforts.
+    """A robot under efforts of its drives; it starts at home, an arm amid its ranges.
 
     Parameters
     ----------
-    values : mapping
-        Flat keys and values of a model file.
-    effects : sequence of InjectedEffect
-    settings : PlantSettings, optional
+    model : DriveModel
+        Its added effects are no part of the plant.
+    names : sequence of str
+        See `inject`.
+    seed : int
+        Of the injected effects.
+    scale : float
+        Multiplies their size.
+    rate : float
+        At which it is looked at [Hz]: a whole number of steps lies between.
 
     Attributes
     ----------
-    effects : tuple of InjectedEffect
-        Those that are hidden in it now.
+    time, time_step : float
+        [s]
+    position, velocity : (D,) arrays
+        Of the drives [m, rad].
+    last_acceleration : (D,) array
+        Of the last step: loads that friction follows are those of it.
+    injected : list of dict
+        Name, drives, parameters and form of each injected effect.
+    largest : (D,) array
+        Largest efforts of an excitation [N, N m].
+    inertia : (D,) array
+        For which the drives' loops are made, at home [kg, kg m^2]: of each drive alone, less where
+        motions of several together move little.
 
     Raises
     ------
     MissingLibraryError
         Where mujoco is not installed.
+    InjectedEffectError
+        See `inject`.
     """
 
-    def __init__(self, values: Mapping[str, Any], effects: Sequence[InjectedEffect] = (),
-                 settings: PlantSettings | None = None) -> None:
-        self.settings, self._values = settings or PlantSettings(), values
-        self.time_step = self.settings.step
-        self.limits = Limits.of(values)
+    def __init__(self, model: DriveModel, names: Sequence[str] = (), seed: int = 0,
+                 scale: float = 1.0, rate: float = 500.0) -> None:
+        self.time_step = 1 / (rate * math.ceil(1 / (rate * LONGEST_STEP)))
+        self.model = as_mechanism(model)
+        self.engine = MechanismEngine(self.model)
+        self.structure = s = self.model.robot.structure
+        self._nominal = draw_motion(self.model, NOMINAL, 0)
+        self._efforts = self.engine.torques(self._nominal)
+        self.largest = np.abs(self._efforts).max(axis=0)
+        self._guides = sorted(guides(self.model), key=s.drives.index)
+        reversal = self.model.reversal
+        self._viscous, self._coulomb, self._offset = (
+            np.broadcast_to(np.asarray(numbers, dtype=float), len(s.drives)) for numbers in (
+                self.model.friction.viscous, self.model.friction.coulomb, self.model.offset.value))
+        self._width = reversal.widths(len(s.drives))
+        self._passive = [effect.table(self.model.robot, reversal) for effect in self.model.effects
+                         if isinstance(effect, ModelJointFriction)]
+        self.inject(names, seed, scale)
+        home, _ = s.room(np.pi)  # where motions that are drawn begin
+        self.limits = self.model.limits
         self.lower, self.upper = self.limits.strokes
-        self.resistance = Resistance(values, self.settings.drive_width,
-                                     self.settings.passive_width, self.settings.friction)
-        self.effects: tuple[InjectedEffect, ...] = ()
-        self.chains = self._with(effects)
-        # A copy without hidden effects, of which the drives' control knows the weight.
-        self._known = ClosedChains(values)
-        self._held = np.zeros(6)
+        with np.errstate(invalid='ignore'):
+            span = self.upper - self.lower
+        self._span = np.where(np.isfinite(span), span, 2 * np.pi)
         self.time = 0.0
-        self.velocity = np.zeros(6)
-        self._all_velocities = np.zeros(15)
-        self._acceleration = np.zeros(15)
-        self._loads = np.zeros(12)
-        strokes = self.upper - self.lower
-        self._fastest = LONGEST_MOVE * float(strokes.min()) / self.time_step
-        self._widest = 3 * float(strokes.max())  # a whole stroke beyond the end
-        self.place(self.position)
+        self._rest = np.zeros_like(home)
+        self.place(home)
+        M = self._equations(home, self._rest, self._rest)[0]
+        alone = np.diag(M)
+        # A loop for `alone` would be unstable in the lightest motion, one for that weak in all
+        # others: the geometric mean of both.
+        lightest = np.linalg.eigvalsh(M / np.sqrt(np.outer(alone, alone)))[0]
+        self.inertia = alone * np.sqrt(lightest)
 
-    def _with(self, effects: Sequence[InjectedEffect]) -> ClosedChains:
-        """Take effects, and return the bodies with them."""
-        chains = ClosedChains(self._values)
-        self.resistance.use_effects(effects)
-        self._structure_forces = [e for e in effects if isinstance(e, StructureForce)]
-        self._body_changes = [e for e in effects if isinstance(e, BodyChange)]
-        for change in self._body_changes:
-            change.apply(chains, self._values)
-        self.effects = tuple(effects)
-        return chains
+    def inject(self, names: Sequence[str], seed: int = 0, scale: float = 1.0) -> None:
+        """Inject effects in place of those before; the motion goes on.
 
-    @property
-    def largest(self) -> None:
-        """Largest efforts of its motion: not known, sensors go by their own."""
-        return None
+        Parameters
+        ----------
+        names : sequence of str
+            Of `INJECTED`, or 'random'; drives may follow: 'coulomb_friction:lift_1,lift_2'.
+        seed : int
+            A name has the same parameters with the same seed, whatever else is injected.
+        scale : float
+            Multiplies the size of the effects.
 
-    def use_effects(self, effects: Sequence[InjectedEffect]) -> None:
-        """Have other hidden effects from now on; the motion goes on, and what stays remembers."""
-        before = self.chains.qpos.copy()
-        self.chains = self._with(effects)
-        self.chains.qpos[:] = before
+        Raises
+        ------
+        InjectedEffectError
+            For another name, or an effect that the robot cannot have.
+        """
+        chosen = self.choices(names, seed, scale)
+        kept = self.engine.data.qpos.copy()  # MuJoCo loses it where bodies change
+        self.engine.reset()
+        self._pushes: list[tuple[int, str, dict[str, float], JointMoment]] = []
+        self.injected: list[dict[str, Any]] = []
+        try:
+            for choice in chosen:
+                drives, parameters, form = self._inject(choice, scale)
+                self.injected.append({'name': choice.name, 'drives': drives,
+                                      'parameters': parameters, 'form': form})
+        finally:
+            self.engine.data.qpos[:] = kept
 
-    @property
-    def hidden(self) -> list[dict[str, Any]]:
-        """What is hidden in it: name, drives, parameters and form of each effect."""
-        return [effect.truth() for effect in self.effects]
+    def choices(self, names: Sequence[str], seed: int, scale: float) -> list[Choice]:
+        """Return the effects of names without injecting them; see `inject`."""
+        chosen = []
+        for words in names:
+            if words == RANDOM:
+                words = str(np.random.default_rng(seed).choice(sorted(INJECTED)))
+            choice = named(words, np.random.default_rng((seed, zlib.crc32(words.encode()))), scale)
+            wrong = [drive for drive in choice.drives
+                     if drive not in self.structure.drives or choice.name in BODIES]
+            if choice.name not in INJECTED:
+                raise InjectedEffectError(
+                    f'{choice.name} cannot be injected into a robot while it moves'
+                    f'{suggestion(choice.name, INJECTED)}, must be one of {", ".join(INJECTED)}')
+            if wrong:
+                raise InjectedEffectError(f'{choice.name} does not act in {wrong[0]!r}')
+            if choice.name in OF_MOMENT:
+                one_able_joint(choice.name, self.model, self._nominal, np.random.default_rng(0))
+            elif choice.name == 'link_mass' and not links_that_weigh(self.model, 0):
+                raise InjectedEffectError('link_mass needs a link beside that of the tool')
+            chosen.append(choice)
+        return chosen
+
+    def _inject(self, choice: Choice, scale: float) -> Injected:
+        name, random = choice.name, choice.random
+        if name == 'payload_mass':
+            return inject_payload(self.engine, scale * float(random.uniform(0.05, 0.12)), 0.0)
+        if name == 'link_mass':
+            return inject_link_mass(self.engine, **link_sizes(self.model, random, scale, first=0))
+        if name == 'base_tilt':
+            return inject_tilt(self.engine, scale * float(random.uniform(0.01, 0.03)))
+        model, motion, form = self.model, self._nominal, OF_MOMENT[name]
+        chosen = [model.drives.index(drive) for drive in choice.drives] or [
+            one_able_joint(name, model, motion, random)]
+        assert motion.time is not None
+        temperature = Climate.draw(random, len(model.drives)).along(motion.time, motion.velocity)
+        parameters = {}
+        for j in chosen:
+            moment = JointMoment.along(motion, j, self._efforts[:, j], self.largest[j],
+                                       model.gear_ratios[j], temperature)
+            drawn = parameters[model.drives[j]] = draw_form(form, random, moment, scale)
+            self._pushes.append((j, name, drawn, moment))
+        return Injected([*parameters], parameters, form.form)
+
+    def gains(self, frequency: float, damping: float, **settings: Any) -> ControlSettings:
+        """Return a PD loop of a frequency [Hz] and a damping ratio for what the drives move."""
+        rate = 2 * np.pi * frequency
+        return ControlSettings(tuple(rate ** 2 * self.inertia),
+                               tuple(2 * damping * rate * self.inertia), **settings)
 
     def holding(self, position: Array) -> Array:
-        """Return the efforts [N] that hold the model's weight at drive positions (6,) [m].
+        """Return the efforts that hold the model's weight at positions of the drives (D,).
 
-        Where it cannot close there, those of the last that did.
+        Where the loops do not close there, those of the last position where they did.
         """
-        kept = self._known.qpos.copy()
         try:
-            self._known.place_drives(position)
-            self._held = self._known.evaluate(np.zeros(6)).drive_bias
-        except SingularityError:
-            self._known.qpos[:] = kept
-        return self._held
-
-    @property
-    def position(self) -> Array:
-        """Drive positions [m], (6,)."""
-        return self.chains.qpos.take(DRIVE_DOFS)
+            rest = self._rest[None]
+            self._held: Array = self.model.robot.torques(position[None], rest, rest)[0]
+        except WorkspaceError:
+            pass
+        return self._held + self._offset
 
     def place(self, position: Array, velocity: Array | None = None) -> None:
-        """Put the drives at positions (6,) [m], at rest or with velocities (6,) [m/s].
+        """Put the drives at positions (D,), at rest or with velocities.
 
         Raises
         ------
-        SingularityError
-            Where the mechanism cannot follow.
+        WorkspaceError
+            Where the mechanism cannot go there.
         """
-        self.chains.place_drives(np.asarray(position, dtype=float))
-        self.velocity = np.zeros(6) if velocity is None else np.array(velocity, dtype=float)
-        equations = self.chains.evaluate(self.velocity)
-        self._all_velocities = equations.T @ self.velocity
-        # As if the drives held the platform, until the first step knows better.
-        self._acceleration = equations.g.copy()
-        self._loads = self.chains.loads(
-            equations, self._acceleration, self._structure(self.time))
+        self.position = np.array(position, dtype=float)
+        self.velocity = np.zeros_like(self.position) if velocity is None else np.array(velocity)
+        self.engine.home()
+        self.engine.loops.put(self.position, self.velocity, self._rest)
+        self.last_acceleration = np.zeros_like(self.position)
+        self._held = self._rest
+        self._held = self.holding(self.position) - self._offset
 
     def step(self, effort: Array) -> None:
-        """Advance by one time step under constant efforts (6,) [N].
+        """Advance by one time step under constant efforts (D,).
 
         Raises
         ------
-        SingularityError
-            Where the drives can no longer hold the platform.
+        WorkspaceError
+            Where the drives can no longer hold the tool.
         UnsolvedError
-            Where the step has no solution that means anything.
+            Where the step has no solution with a physical meaning.
         """
-        h, chains = self.time_step, self.chains
-        qpos, y, last = chains.qpos, self.velocity, self._acceleration
-        for change in self._body_changes:
-            change.advance(chains, self.time + h / 2)
-        start, before = qpos.take(DRIVE_DOFS), qpos.copy()
-        chains.engine.mj_integratePos(
-            chains.model, qpos, self._all_velocities + h / 4 * last, h / 2)
-        position = qpos.take(DRIVE_DOFS)
-        guess = last.take(DRIVE_DOFS)
-        predicted = y + h / 2 * guess
-        equations = chains.evaluate(predicted)
-        passive = self._structure(self.time + h / 2)
-        drive = (effort - equations.drive_bias + passive.dot(equations.T_d)
-                 + self._stops(position, predicted))
-        moment = DriveMoment(self.time + h / 2, position, y, self._loads[:6],
-                             effort - drive + equations.mass.dot(guess))
-        y_dot = self.resistance.solve(equations, drive, moment, self._loads, guess, h / 2)
-        acceleration = equations.T.dot(y_dot) + equations.g
-        middle = moment.at(y + h / 2 * y_dot)
-        self._loads = self._joint_loads(equations, acceleration, middle.velocity, passive)
-        self.resistance.advance(middle, h)
-
-        velocities = equations.T.dot(middle.velocity)
-        chains.engine.mj_integratePos(
-            chains.model, qpos, velocities + h / 4 * acceleration, h / 2)
-        self.velocity = y + h * y_dot
-        reason = self._unsolved()
-        if reason:
-            qpos[:], self.velocity = before, np.zeros(6)
-            raise UnsolvedError(self.time, reason)
-        qpos[DRIVE_DOFS] = start + h / 2 * (y + self.velocity)
-        self._all_velocities = velocities + h / 2 * acceleration
-        self._acceleration = acceleration
+        h, v, a = self.time_step, self.velocity, self.last_acceleration
+        middle = self.position + h / 2 * v + h * h / 8 * a
+        acceleration = self.acceleration(middle, v + h / 2 * a, effort, v, h / 2)
+        velocity = v + h * acceleration
+        position = self.position + h / 2 * (v + velocity)
+        if not np.all(np.abs(velocity) < FASTEST * self._span):
+            raise UnsolvedError(self.time, 'the engine could not solve its motion')
+        if np.any((position < self.lower - BEYOND * self._span)
+                  | (position > self.upper + BEYOND * self._span)):
+            raise UnsolvedError(self.time, 'a drive has gone through the stop at its end')
+        self.position, self.velocity, self.last_acceleration = position, velocity, acceleration
         self.time += h
 
-    def _unsolved(self) -> str:
-        """Return why the last step is no motion of a mechanism, or nothing."""
-        if not np.abs(self.velocity).max() < self._fastest or self.chains.warnings:
-            return 'the engine could not solve its motion'
-        if np.abs(2 * self.position - self.lower - self.upper).max() > self._widest:
-            return 'a drive has gone through the stop at its end'
-        return ''
+    def acceleration(self, position: Array, velocity: Array, effort: Array, start: Array,
+                     ahead: float) -> Array:
+        """Return the acceleration of the drives, with friction at start + ahead * acceleration.
 
-    def observe(self, effort: Array) -> Truth:
-        """Return the true state now, when the drives apply efforts (6,) [N]."""
-        chains, y = self.chains, self.velocity
-        gap = chains.close()
-        pose = chains.qpos[9:16].copy()
-        position = self.position
-        equations = chains.evaluate(y)
-        passive = self._structure(self.time)
-        drive = (effort - equations.drive_bias + passive.dot(equations.T_d)
-                 + self._stops(position, y))
-        kept = self._loads
-        passed = effort - drive + equations.mass.dot(self._acceleration.take(DRIVE_DOFS))
-        # Friction follows the loads, and these the acceleration: a fixed point, each round of
-        # which leaves about a twentieth (mu) of the error, or what a gear loses.
-        for _ in range(LOAD_ROUNDS):
-            before = self._loads
-            moment = DriveMoment(self.time, position, y, before[:6], passed)
-            force = self.resistance.in_drives(equations, moment, before)
-            _, y_dot, _ = dposv(equations.mass, drive - force)
-            a = equations.T.dot(y_dot) + equations.g
-            self._loads = self._joint_loads(equations, a, y, passive)
-            passed = effort - drive + equations.mass.dot(y_dot)
-            if max(np.abs(self._loads - before).max(),
-                   np.abs(passed - moment.transmitted).max()) < LOAD_TOLERANCE:
+        Parameters
+        ----------
+        position, velocity : (D,) arrays
+            At which inertia and inertial forces are taken.
+        effort : (D,) array
+        start : (D,) array
+            Velocity that friction starts from.
+        ahead : float
+            [s]
+        """
+        M, bias, rows, coefficients = self._equations(position, velocity, self.last_acceleration)
+        push = effort - bias - self._offset + self._stops(position, velocity)
+        a = found = self.last_acceleration
+        for _ in range(ROUNDS):
+            mid = start + ahead * a
+            C = np.einsum('kid,k,kie->de', rows, coefficients(rows @ mid), rows)
+            hidden, slope = self._hidden(position, mid)
+            # A slope beside M: friction at the middle, linear with the secants of this round.
+            damping = C + np.diag(slope)
+            found = np.linalg.solve(M + ahead * damping, push - hidden - damping @ start)
+            if np.all(ahead * np.abs(found - a) <= SOLVED * self._width):
                 break
-        v, rotation = equations.T.dot(y), chains.rotation
-        truth = Truth(
-            self.time, position, y.copy(), y_dot, np.array(effort), pose[:3],
-            pose[[4, 5, 6, 3]], v[9:12], rotation @ v[12:], a[9:12], rotation @ a[12:],
-            self._loads[:6].copy(), gap)
-        self._loads = kept
-        return truth
+            # Secants overshoot at a reversal: half of the way, where the velocity turns over.
+            turns = np.sign(start + ahead * found) != np.sign(mid)
+            a = np.where(turns, (a + found) / 2, found)
+        return found
 
-    def _structure(self, time: float) -> Array:
-        """Return forces of hidden effects on hinges and platform, (9,), as now evaluated."""
-        if not self._structure_forces:
-            return _NO_FORCES
-        passive = np.zeros(9)
-        chains = self.chains
-        rotation, velocities = chains.rotation.copy(), chains.qvel
-        moment = PlatformMoment(
-            time, chains.qpos[9:12].copy(), rotation, velocities[9:12].copy(),
-            rotation @ velocities[12:], chains.qpos[2:9:3].copy())
-        for effect in self._structure_forces:
-            hinges, force, torque = effect.apply(moment)
-            passive[:3] += hinges
-            passive[3:6] += force
-            passive[6:] += rotation.T @ torque
-        return passive
+    def _equations(self, position: Array, velocity: Array, acceleration: Array,
+                   ) -> tuple[Array, Array, Array, Any]:
+        """Return T' M T, forces without friction, and the friction of joints.
 
-    def _joint_loads(
-        self, equations: Equations, acceleration: Array, velocity: Array, passive: Array,
-    ) -> Array:
-        if self.settings.actual_loads:
-            passive = passive - self.resistance.of_passive_joints(
-                equations, velocity, self._loads)
-        return self.chains.loads(equations, acceleration, passive)
+        Friction is relative rates per rate of drives (K, 3, D) and a law, which gives friction over
+        rate, (K,), of rates (K, 3).
+        """
+        closed = self.engine.loops.put(position, velocity, acceleration)
+        carried = self.engine.carried(closed)
+        T = closed.rates[0]
+        mass = T.T @ self.engine.inertia() @ T
+        self._load = carried.efforts[0]
+        self._pressed = np.abs(self._load)
+        for name in self._guides:
+            self._pressed[self.structure.drives.index(name)] = np.linalg.norm(
+                self.engine.across([name], carried))
+        rubbing = [self.engine.friction(table, closed, carried) for table in self._passive]
+        count = len(position)
+        rows = [np.concatenate((np.eye(count)[:, None], np.zeros((count, 2, count))), axis=1),
+                *(each.rows[0] @ T for each in rubbing)]
+        ends = np.cumsum([len(each) for each in rows])
+
+        def coefficients(rates: Array) -> Array:
+            x = np.maximum(np.abs(rates[:count, 0]) / self._width, SLOWEST)
+            return np.concatenate((
+                self._viscous + self._coulomb * np.tanh(x) / (x * self._width),
+                *(each.coefficients(rates[None, start:end])[0] for each, start, end in zip(
+                    rubbing, ends[:-1], ends[1:], strict=True))))
+
+        return (mass + np.diag(self.model.robot.armature), self._load - mass @ acceleration,
+                np.concatenate(rows), coefficients)
+
+    def _hidden(self, position: Array, velocity: Array) -> tuple[Array, Array]:
+        """Return injected forces that do not follow velocities, and slopes of those that do."""
+        force, slope = np.zeros_like(position), np.zeros_like(position)
+        for j, name, drawn, nominal in self._pushes:
+            one, following = slice(j, j + 1), [(j + 1) % len(position)]
+            moment = JointMoment(
+                np.array([self.time]), position[one], velocity[one], self.last_acceleration[one],
+                self._load[one], nominal.effort, nominal.speed, nominal.gear_ratio,
+                np.interp([self.time], nominal.time, nominal.temperature), self._pressed[one],
+                velocity[following])
+            pushed = float(OF_MOMENT[name].force(drawn, moment)[0])
+            if 'friction' in name and pushed * velocity[j] > 0:
+                slope[j] += pushed / velocity[j]
+            else:
+                force[j] += pushed
+        return force, slope
 
     def _stops(self, position: Array, velocity: Array) -> Array:
-        """Return the force of the stops at the ends of the strokes [N], (6,)."""
-        beyond = position - np.minimum(np.maximum(position, self.lower), self.upper)
+        """Return the forces of the stops at the ends of the ranges."""
+        beyond = np.minimum(self.upper - position, 0.0) + np.maximum(self.lower - position, 0.0)
         if not beyond.any():
-            return _NO_STOPS
-        return -STOP_STIFFNESS * beyond - STOP_DAMPING * velocity * (beyond != 0)
-
-
-_NO_FORCES = np.zeros(9)
-_NO_STOPS = np.zeros(6)
+            return beyond
+        rate = 2 * np.pi * STOP_FREQUENCY
+        return self.inertia * (rate ** 2 * beyond - 2 * STOP_DAMPING * rate * velocity
+                               * (beyond != 0))

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import ast
-import dataclasses
 import json
 import subprocess
 import sys
@@ -21,15 +20,14 @@ import pytest
 import pprs_dynamics
 from pprs_dynamics import (
     ComparisonResult,
+    DriveModel,
     Excitation,
     JointMotion,
     PprsError,
     Recording,
     UnreadableFileError,
     adopt,
-    build_model,
     compare,
-    load_model,
     next_experiment,
     simulate,
     write_recording,
@@ -42,8 +40,8 @@ HEAVY = {'numpy', 'scipy', 'pandas', 'rich', 'matplotlib', 'plotly', 'rclpy'}
 
 
 def record(name: str, seed: int, seconds: float = 8.0) -> Recording:
-    given = load_model('config/paper.yaml')
-    robot = build_model({**given.values, 'effects.active': ['viscous_friction'],
+    given = DriveModel.load('config/paper.yaml')
+    robot = DriveModel.from_parameters({**given.values, 'effects.active': ['viscous_friction'],
                          'effects.viscous_friction.slide_2.coefficient': VISCOUS})
     motion = Excitation(seconds, seed).motion(np.arange(0.0, seconds, 0.005))
     forces = robot.drive_forces(motion)
@@ -67,7 +65,7 @@ def compared(folder: Path) -> ComparisonResult:
 
 def modules_after(code: str) -> set[str]:
     said = subprocess.run([sys.executable, '-c', f'import sys\n{code}\nprint(*sys.modules)'],
-                          capture_output=True, text=True, check=True)
+                          capture_output=True, text=True, check=True, timeout=120)
     return {name.split('.')[0] for name in said.stdout.split()}
 
 
@@ -91,11 +89,6 @@ def test_importing_the_package_imports_nothing_heavy() -> None:
 def test_a_comparison_needs_neither_terminal_nor_pictures_before_it_is_shown() -> None:
     loaded = modules_after('from pprs_dynamics import adopt, compare, diagnose, fit')
     assert not loaded & {'pandas', 'rich', 'matplotlib', 'plotly', 'rclpy', 'starlette'}
-
-
-def test_an_unknown_name_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match='no attribute'):
-        getattr(pprs_dynamics, 'compaer')  # noqa: B009
 
 
 @pytest.mark.parametrize('file', sorted((ROOT / 'docs/example_effect').glob('*.py')),
@@ -159,15 +152,10 @@ def test_a_result_shows_itself(compared: ComparisonResult, folder: Path) -> None
     assert 'slide_2' in page.read_text(encoding='utf-8')
 
 
-def test_results_are_frozen(compared: ComparisonResult) -> None:
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        compared.notes = ()  # type: ignore[misc]
-
-
 def test_recordings_from_memory_and_from_files_are_one(
     compared: ComparisonResult, folder: Path,
 ) -> None:
-    model = load_model('config/paper.yaml')
+    model = DriveModel.load('config/paper.yaml')
     again = compare(model, pprs_dynamics.read_recording(folder / 'run.csv'))
     assert again.rms == pytest.approx(compared.rms, rel=1e-12)
     assert 'RECORDING' in str(again)
@@ -199,23 +187,6 @@ def test_what_is_no_model_and_no_recording_is_refused_in_a_sentence(
             call('config/paper.yaml', recordings)
 
 
-def test_a_missing_library_is_named(compared: ComparisonResult,
-                                    monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, 'matplotlib.figure', None)
-    for module in ('box', 'console', 'markup', 'table'):
-        monkeypatch.setitem(sys.modules, f'rich.{module}', None)
-    for show, library in ((compared.plot, 'matplotlib'), (compared.view, 'rich')):
-        with pytest.raises(pprs_dynamics.MissingLibraryError, match=library):
-            show()
-
-
-def test_pages_need_no_terminal() -> None:
-    reports = 'adoption', 'comparison', 'diagnosis', 'experiment', 'fit', 'history'
-    loaded = modules_after('from pprs_dynamics.app.report import ' + ', '.join(
-        f'{name}_report' for name in reports))
-    assert not loaded & {'rich', 'plotly', 'matplotlib'}
-
-
 def test_an_experiment_that_has_nothing_to_read_from_is_refused() -> None:
     with pytest.raises(PprsError, match='no recording'):
         next_experiment('config/paper.yaml')
@@ -232,18 +203,18 @@ def test_a_simulation_hides_what_it_says_and_is_written(tmp_path: Path) -> None:
     difference = np.abs((run.recording.effort - plain.recording.effort).mean(axis=0))
     drives = [run.recording.drives[d] for d in np.flatnonzero(difference > 0.05)]
     assert drives == hidden['drives']
+    other = simulate('config/paper.yaml', 'effort_offset', seed=3, duration=2.0, path_seed=1)
+    assert other.effects == run.effects
     run.save(tmp_path / 'run.csv')
     read = pprs_dynamics.read_recording(tmp_path / 'run.csv')
     assert read.effort == pytest.approx(run.recording.effort)
     assert run.to_dict()['samples'] == len(read.time)
-    with pytest.raises(PprsError, match='feedforward'):
-        simulate('config/paper.yaml', feedforward='all')
 
 
 def test_an_effect_of_an_axis_is_found_adopted_and_the_error_falls() -> None:
     """The whole loop in Python, quickly; the notebook of the robot runs before a release."""
-    model = load_model('config/single_axis.yaml')
-    robot = build_model({**model.values, 'effects.active': ['drive_spring'],
+    model = DriveModel.load('config/single_axis.yaml')
+    robot = DriveModel.from_parameters({**model.values, 'effects.active': ['drive_spring'],
                          'effects.drive_spring.axis.stiffness': 300.0,
                          'effects.drive_spring.axis.position': 0.01})
     time = np.arange(0.0, 8.0, 0.005)
@@ -280,7 +251,7 @@ def loop(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         for cell in notebook['cells']:
             if cell['cell_type'] == 'code':
                 exec(compile(''.join(cell['source']), cell['id'], 'exec'), names)
-        names['saved'] = load_model('better.yaml')
+        names['saved'] = DriveModel.load('better.yaml')
     return names
 
 

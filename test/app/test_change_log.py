@@ -15,15 +15,6 @@ from pprs_dynamics.app.workbench.server.change_log import ChangeLog
 EFFECTS: list[dict[str, Any]] = [{'name': 'payload_mass'}]
 
 
-def test_what_is_counted_during_a_look_is_asked_for_again() -> None:
-    log = ChangeLog()
-    before = log.version
-    log.count()  # after the state was looked at
-    told = log.update({'stage': 'linear', 'effects': EFFECTS}, before)
-    assert told < log.version
-    assert log.update({'stage': 'linear', 'effects': EFFECTS}, log.version) == log.version
-
-
 def test_what_is_equal_is_sent_once() -> None:
     log = ChangeLog()
     first = log.update({'drives': ['a', 'b'], 'effects': [{'name': 'payload_mass'}]}, log.version)

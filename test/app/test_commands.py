@@ -11,11 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from pprs_command import pprs
 
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.system.output_files import write_text
 
 
@@ -55,17 +53,6 @@ def test_reproduce_is_honest_about_what_does_not_come_out(reproduced: Path) -> N
     assert '0.93 N rms active, 0.13 N rms passive' in claims[1]['found']
     assert '0.000 N rms by the second' in claims[2]['found']
     assert '48.2 to 109.5 degrees' in claims[4]['found']
-
-
-def test_the_printed_equations_give_the_printed_figures(tmp_path: Path) -> None:
-    model = tmp_path / 'printed.yaml'
-    values = default_parameters() | {'equations': 'printed'}
-    model.write_text(yaml.safe_dump({'/**': {'ros__parameters': values}}))
-    done = pprs('reproduce', '--model', str(model), '--output', str(tmp_path))
-    assert done.returncode == 0
-    claims = json.loads((tmp_path / 'claims.json').read_text())['claims']
-    assert '0.10 N rms passive' in claims[1]['found']
-    assert '0.097 N rms by the first, 0.000 N rms by the second' in claims[2]['found']
 
 
 def test_the_curves_leave_a_gap_where_the_second_approach_is_not_defined(reproduced: Path) -> None:

@@ -6,9 +6,7 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -20,8 +18,6 @@ from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
 RATE, OFFSET = 100.0, 0.7  # [Hz, N]
-CONFIG = Path(__file__).parents[2] / 'config'
-EFFORTS = ('/measured', '/model', '/residual')
 
 
 @pytest.fixture(scope='module')
@@ -72,34 +68,6 @@ def test_the_bag_holds_what_was_compared_at_the_measured_stamps(
     np.testing.assert_allclose(arrays['/residual'], arrays['/measured'] - arrays['/model'])
     np.testing.assert_allclose(arrays['/model'], sum(arrays[topic] for topic in parts), atol=1e-9)
     assert arrays['/residual'][:, 0].mean() == pytest.approx(OFFSET, abs=0.02)
-
-
-@pytest.mark.parametrize(('plotjuggler', 'foxglove'), [
-    ('out.plotjuggler.xml', 'out.foxglove.json'),
-    (CONFIG / 'plotjuggler/compare.xml', CONFIG / 'foxglove/compare.json')],
-    ids=['written beside the bag', 'in config'])
-def test_layouts_ask_for_what_the_bag_holds(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, plotjuggler: Path | str, foxglove: Path | str,
-) -> None:
-    """PlotJuggler names TOPIC/JOINT/effort, Foxglove an index: each must be there, none left."""
-    monkeypatch.chdir(folder)
-    (folder / 'out.mcap').unlink(missing_ok=True)
-    assert main(['compare', 'run.csv', '--mcap', 'out.mcap']) == 0
-    with AnyReader([folder / 'out.mcap']) as reader:
-        names = {connection.topic: tuple(reader.deserialize(data, connection.msgtype).name)
-                 for connection, _, data in reader.messages() if connection.topic in EFFORTS}
-    there = sorted(f'{topic}/{drive}/effort' for topic, drives in names.items()
-                   for drive in drives)
-    curves = ElementTree.parse(folder / plotjuggler).iter('curve')
-    assert sorted(curve.attrib['name'] for curve in curves) == there
-    shown = []
-    for panel in json.loads((folder / foxglove).read_text())['configById'].values():
-        for path in panel['paths']:
-            topic, index = re.fullmatch(r'(.*)\.effort\[(\d+)\]', path['value']).groups()
-            drive = names[topic][int(index)]
-            assert drive == panel['foxglovePanelTitle']
-            shown.append(f'{topic}/{drive}/effort')
-    assert sorted(shown) == there
 
 
 def test_errors_of_two_models_on_one_recording(

@@ -19,32 +19,30 @@ import pytest
 from browser import Seen, chromium, needs_browser
 from pprs_command import pprs
 
-from benchmarks.hidden.driven_motion import DrivenMotion
-from benchmarks.hidden.prescribed import PrescribedPlant
+from benchmarks.hidden.recordings import driven
 from pprs_dynamics import DriveModel, __version__
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.simulation.injected_effects import draw_effect
+from pprs_dynamics.simulation.injection import Choice, Injection, PlainRobot
+from pprs_dynamics.simulation.platform import as_mechanism
 from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 HIDDEN, RATE = 'coulomb_friction', 250.0
+EFFECT = Choice(HIDDEN, np.random.default_rng(11))
 
 
 def record(path: Path, seed: int, duration: float) -> dict[str, Any]:
     """Write a recording of a robot whose friction the model does not know; return the truth."""
     model = DriveModel.load()
     time = np.arange(0.0, duration, 1 / RATE)
-    drives = model.mechanism(Excitation(duration=duration, seed=seed).motion(time))
-    motion = DrivenMotion.of_drives(model.values, time, drives.position, drives.velocity,
-                                    drives.acceleration)
-    effect = draw_effect(HIDDEN, np.random.default_rng(11))
-    read = PrescribedPlant(model.values, motion).readings([effect])
+    motion = driven(model, Excitation(duration=duration, seed=seed).motion(time))
+    run = Injection(PlainRobot(as_mechanism(model), motion), [EFFECT], np.random.default_rng(0))
     sensors = SensorSettings()
     noise = EffortNoise(sensors, np.random.default_rng(seed)).samples(len(time))
     write_recording(path, Recording.from_arrays(
-        path.name, time, sensors.quantised(read.position), None, read.effort + noise))
-    return effect.truth()
+        path.name, time, sensors.quantised(run.position), None, run.efforts + noise))
+    return run.truths[0]
 
 
 @pytest.fixture(scope='module')

@@ -26,7 +26,7 @@ from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.readings.columns import GuessError
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 JOINTS = ('shoulder_pan', 'shoulder_lift', 'elbow')
 N, RATE = 800, 100.0
@@ -76,7 +76,7 @@ def read(robot: Path, *recordings: Path, **more: Any) -> Recording:
     """Write the model file that the command writes, and read the recording with it."""
     first = first_model(robot, recordings, robot.with_name('robot.yaml'), **more)
     first.path.write_text(first.text)
-    model = load_model(first.path)
+    model = DriveModel.load(first.path)
     assert model.drives == JOINTS
     assert first.has_efforts
     return read_recording(first.recordings[0], model.recorded)
@@ -371,25 +371,13 @@ def two_arms(path: Path) -> Path:
     return path
 
 
-def test_of_two_arms_the_recorded_one_is_taken_and_without_a_recording_one_is_asked_for(
-    tmp_path: Path,
-) -> None:
+def test_of_two_arms_the_recorded_one_is_taken(tmp_path: Path) -> None:
     robot = two_arms(tmp_path / 'two.urdf')
-    asked: list[str] = []
-
-    def ask(question: str, answers: Any) -> int:
-        asked.extend(answers)
-        return 1
-
-    chosen = first_model(robot, ask=ask)
-    assert len(asked) == 2
-    assert chosen.model.values['robot.tool'] in asked[1]
     assert any('--tool' in note for note in first_model(robot).notes)
     right = tuple(f'right_{joint}' for joint in JOINTS)
-    first = first_model(robot, bag(tmp_path, right), ask=ask)
+    first = first_model(robot, bag(tmp_path, right))
     assert first.model.drives == right
     assert first.model.values['robot.tool'] == 'right_flange'
-    assert len(asked) == 2
 
 
 def test_what_cannot_be_told_is_refused_with_what_to_write(robot: Path, tmp_path: Path) -> None:
@@ -446,7 +434,7 @@ def test_the_command_writes_says_what_info_says_and_what_comes_next(
     described = first_model(robot, (), tmp_path / 'described.yaml')
     described.path.write_text(described.text)
     ddq = -(Q - [0.3, -0.4, 0.1]) * WAVES**2
-    efforts = load_model(described.path).drive_forces(JointMotion(Q, DQ, ddq)).total
+    efforts = DriveModel.load(described.path).drive_forces(JointMotion(Q, DQ, ddq)).total
     np.savetxt('run.csv', np.column_stack([TIME, Q, DQ, efforts + 2 * np.tanh(20 * DQ)]),
                delimiter=',', fmt='%.17g')
     assert main(['init', 'arm.urdf', 'run.csv', '--json', 'x.json']) == 0
@@ -472,8 +460,9 @@ def test_a_file_that_the_user_goes_on_with_keeps_its_columns(robot: Path, tmp_pa
 
     first = first_model(robot, numbered(tmp_path), tmp_path / 'robot.yaml')
     first.path.write_text(first.text)
-    write_model(tmp_path / 'base.yaml', load_model(first.path).values, first.path)
-    assert_read(read_recording(tmp_path / 'run.csv', load_model(tmp_path / 'base.yaml').recorded))
+    write_model(tmp_path / 'base.yaml', DriveModel.load(first.path).values, first.path)
+    assert_read(read_recording(tmp_path / 'run.csv', DriveModel.load(
+        tmp_path / 'base.yaml').recorded))
 
 
 def test_an_error_of_init_is_one_of_ours() -> None:

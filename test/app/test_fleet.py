@@ -6,9 +6,7 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import signal
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -17,7 +15,6 @@ import pandas
 import pytest
 
 from pprs_dynamics.app.commands.pprs import main
-from pprs_dynamics.app.fleet.engine import cluster, run_each
 from pprs_dynamics.app.fleet.recordings import (
     ManifestError,
     SurveyedRecording,
@@ -186,28 +183,3 @@ def test_auto_diagnoses_and_an_effect_that_is_not_found_is_0(
     value, = rows[rows.effect == 'coulomb_friction'].value
     assert sorted(trend.value) == [0.0, value]
     assert abs(value - 6.0) < 0.5
-
-
-def test_other_parquet_files_are_no_store(tmp_path: Path) -> None:
-    pandas.DataFrame({'x': [1]}).to_parquet(tmp_path / 'x.parquet')
-    for place in (tmp_path, tmp_path / 'nothing'):
-        with pytest.raises(UnreadableFileError, match='there is no store'):
-            fleet_trends(str(place))
-
-
-def work(item: int) -> int:
-    """End the worker at 1, raise at 2."""
-    if item == 1:
-        os.kill(os.getpid(), signal.SIGKILL)
-    if item == 2:
-        raise ValueError('two')
-    return item
-
-
-def test_a_killed_worker_costs_one_item_and_an_error_is_reported() -> None:
-    with cluster(1) as client:
-        found = {item: (value, error) for item, value, error in run_each(client, work, range(4))}
-    assert found[0] == (0, None)
-    assert found[3] == (3, None)
-    assert found[2] == (None, 'ValueError: two')
-    assert 'was killed' in found[1][1]

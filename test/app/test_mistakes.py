@@ -60,7 +60,7 @@ MISTAKES = {
     'next-experiment run.csv --output x.yaml': ENDS + '.csv',
     'reproduce': '--output',
     'reproduce --output /dev/null/below': '/dev/null/below: cannot be a folder',
-    'reproduce --output x --model axis.yaml': 'single axis',
+    'reproduce --output x --model axis.yaml': 'must be a 3-PPRS',
     'simulate --output x.txt': ENDS + '.csv, .mcap, .db3',
     'simulate --output x.csv --noise -1': 'argument --noise: ',
     'simulate --output x.csv --path-seed -1': 'argument --path-seed: ',
@@ -76,7 +76,7 @@ MISTAKES = {
     'workbench --no-browser --model no.yaml': 'no.yaml',
     'workbench --no-browser --port 99999': '--port',
     'workbench --no-browser short.csv': 'short.csv',
-    'workbench --no-browser run.csv run.csv': 'twice',
+    'workbench --no-browser run.csv run.csv': 'may be given once',
 }
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -92,13 +91,9 @@ def check_structure(seen: Seen, figures: int) -> None:
 
 
 # Every component on both grounds and both widths: the diagnosis has nearly all of them.
-PICTURES = {('diagnosis', 'light', 1280), ('diagnosis', 'dark', 390), ('history', 'dark', 1280)}
-
-
 @needs_browser
 @pytest.mark.parametrize(('name', 'scheme', 'width'), [
-    pytest.param(*each, marks=() if each in PICTURES else pytest.mark.slow)
-    for each in product(PAGES, ('light', 'dark'), (1280, 390))])
+    ('diagnosis', 'light', 1280), ('diagnosis', 'dark', 390), ('adoption', 'dark', 1280)])
 def test_every_figure_is_drawn_and_all_text_can_be_read(
     see: Any, name: str, scheme: str, width: int,
 ) -> None:

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
 from pathlib import Path
@@ -15,13 +14,10 @@ import numpy as np
 import pytest
 from browser import Seen, chromium, needs_browser
 from pprs_command import pprs, simulate_into
-from rich.console import Console
-from rich.progress import Progress
 
 from pprs_dynamics.app.report.charts import thinned
 from pprs_dynamics.app.report.comparison_figures import worst_spans
 from pprs_dynamics.app.report.page import Page
-from pprs_dynamics.app.report.terminal import staged_bar
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
@@ -84,7 +80,7 @@ def test_info_says_what_is_in_a_file_and_what_is_wrong_with_it(folder: Path) -> 
     for drive in DRIVES:
         assert drive in done.stdout
     content = json.loads((folder / 'info.json').read_text())['recordings'][0]
-    assert [finding['kind'] for finding in content['findings']] == ['gap']
+    assert 'gap' in [finding['kind'] for finding in content['findings']]
     assert len(content['segments']) == 2
     assert '1 gap' in done.stdout
 
@@ -110,16 +106,6 @@ def test_a_browser_draws_the_page_without_complaints(folder: Path, tmp_path: Pat
     pixels = picture[..., :3]
     assert 0.003 < np.mean(pixels.min(axis=2) < 0.5) < 0.5
     assert np.mean(np.ptp(pixels, axis=2) > 0.2) > 0.002
-
-
-def test_a_progress_bar_never_goes_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    shown: list[float] = []
-    monkeypatch.setattr(Progress, 'update', lambda self, task, completed: shown.append(completed))
-    with staged_bar(Console(file=io.StringIO())) as advance:
-        for stage, share in (('diagnosing', 0.1), ('diagnosing', 0.6), ('diagnosing', 0.4),
-                             ('adopting', 0.2), ('adopting', 0.1)):
-            advance(stage, share)
-    assert shown == [0.1, 0.6, 0.6, 0.2, 0.2]
 
 
 def test_curves_of_a_figure_share_their_samples_and_keep_every_peak() -> None:

@@ -33,8 +33,8 @@ def truth(folder: Path) -> list[dict]:
 
 def test_info_tells_of_bodies_joints_loops_and_mobility(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found, page = tmp_path / 'info.json', tmp_path / 'info.html'
-    assert main(['info', '--model', HEXAPOD, '--json', str(found), '--report', str(page)]) == 0
+    found = tmp_path / 'info.json'
+    assert main(['info', '--model', HEXAPOD, '--json', str(found)]) == 0
     said = capsys.readouterr().out
     assert '13 bodies, 10.2 kg in total' in said
     assert '6 degrees of freedom, 6 drives' in said
@@ -42,7 +42,6 @@ def test_info_tells_of_bodies_joints_loops_and_mobility(
     assert [loop['name'] for loop in robot['loops']] == [f'ball_{k}' for k in range(1, 7)]
     assert {joint['role'] for joint in robot['joints']} == {'driven', 'passive'}
     assert 1 < robot['condition_number'] < 100
-    assert 'leg_6' in page.read_text()
     assert main(['info']) == 2
 
 

@@ -8,9 +8,7 @@ from __future__ import annotations
 import argparse
 import http.client
 import json
-import os
 import signal
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +16,10 @@ import pytest
 from workbench_bench import write_hidden
 from workbench_server import workbench
 
-from pprs_dynamics import load_model
+from pprs_dynamics import DriveModel
 from pprs_dynamics.app.commands import workbench as workbench_command
 from pprs_dynamics.app.workbench import Session
 from pprs_dynamics.app.workbench.robot_motion import robot_motion
-from pprs_dynamics.app.workbench.server.serve import serve
-from pprs_dynamics.errors import MissingLibraryError
 from pprs_dynamics.measurement.files.recording import (
     Recording,
     read_recording,
@@ -101,27 +97,16 @@ def test_it_ends_at_once_and_in_a_line_while_a_browser_listens(folder: Path) -> 
     assert (folder / 'workbench.log').read_text() == 'pprs workbench: interrupted\n'
 
 
-def test_ctrl_c_during_a_diagnosis_ends_it_in_a_line(folder: Path) -> None:
-    """A terminal sends the signal to all processes of the command, those that compute included."""
-    with workbench(write_hidden(folder / 'long.csv', 1), folder=folder) as bench:
-        bench.enter()
-        bench.wait(lambda screen: any(
-            job['kind'] == 'diagnose' and job['is_running'] and job['share'] > 0
-            for job in screen.get('jobs', {}).values()), 60)
-        os.killpg(bench.process.pid, signal.SIGINT)
-        assert bench.process.wait(60) == 128 + signal.SIGINT
-    assert (folder / 'workbench.log').read_text() == 'pprs workbench: interrupted\n'
-
-
 def test_a_single_axis_has_the_same_session(tmp_path: Path) -> None:
     time = np.arange(0.0, 15.0, 0.002)
     position = 0.1 * np.sin(2 * np.pi * 0.4 * time) + 0.03 * np.sin(2 * np.pi * 1.1 * time)
     velocity, acceleration = np.gradient(position, time), np.gradient(
         np.gradient(position, time), time)
-    values = load_model(AXIS).values
-    effort = (values['axis.mass'] * acceleration + values['axis.viscous'] * velocity
-              + values['axis.coulomb'] * np.tanh(velocity / values['friction.reversal_velocity'])
-              + values['axis.offset'] + SPRING * position
+    values = DriveModel.load(AXIS).values
+    effort = (values['links.mass'][0] * acceleration + values['friction.viscous'][0] * velocity
+              + values['friction.coulomb'][0]
+              * np.tanh(velocity / values['friction.reversal_velocity'])
+              + values['friction.offset'][0] + SPRING * position
               + np.random.default_rng(0).normal(0, 0.3, len(time)))
     write_recording(tmp_path / 'axis.csv', Recording.from_arrays(
         'axis', time, position[:, None], velocity[:, None], effort[:, None], drives=('axis',)))
@@ -134,12 +119,6 @@ def test_a_single_axis_has_the_same_session(tmp_path: Path) -> None:
     json.dumps(session.to_dict(), allow_nan=False)
     drawn = robot_motion(session).skeleton.points
     assert np.ptp(drawn, axis=0).max() == pytest.approx(np.ptp(position), rel=0.05)
-
-
-def test_what_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, 'uvicorn', None)
-    with pytest.raises(MissingLibraryError, match=r'workbench'):
-        serve(None, '127.0.0.1', 0, False)
 
 
 @pytest.mark.parametrize(('arguments', 'heard'), [

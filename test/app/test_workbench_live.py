@@ -29,7 +29,7 @@ from workbench_page import Page
 from workbench_server import Workbench, workbench
 
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 
@@ -97,7 +97,7 @@ def test_an_arm_is_compared_and_set_in_its_own_window_names_and_units(
     real = arm.real_arm(tmp_path)
     more = arm.real_arm(tmp_path, **{'friction.viscous': (14.0, 5.0, 20.0)})
     model = arm.write_arm(tmp_path, **{key: list(value) for key, value in arm.FRICTION.items()})
-    assert load_model(model).values == real.values
+    assert DriveModel.load(model).values == real.values
     with ExitStack() as stack:
         for name in ('monitor', 'feedforward'):
             stack.enter_context(node_process(

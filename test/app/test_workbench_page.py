@@ -9,7 +9,6 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -21,8 +20,8 @@ from workbench_server import Workbench, workbench
 
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench.session_file import SavedSession
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import read_steps
-from pprs_dynamics.physics.model.model_file import load_model
 
 pytestmark = needs_browser
 
@@ -169,82 +168,6 @@ def test_a_mark_says_where_the_error_is_from(page: Page) -> None:
     page.tab.wait_for_function("!document.querySelector('#share-list li')")
 
 
-def test_what_is_seen_is_saved_for_slides_and_as_numbers(page: Page, tmp_path: Path) -> None:
-    page.tab.evaluate('bench.curves.zoom([3, 5])')
-    saved = {}
-    for kind in ('svg', 'csv'):
-        with page.tab.expect_download() as download:
-            page.tab.locator(f'#save-{kind}').click()
-        assert download.value.suggested_filename == f'error.{kind}'
-        download.value.save_as(path := tmp_path / f'error.{kind}')
-        saved[kind] = path
-    table = np.genfromtxt(saved['csv'], delimiter=',', skip_header=1)
-    assert table.shape[1] == 13
-    assert table[0, 0] >= 3.0
-    assert table[-1, 0] <= 5.0
-    assert len(table) > 100
-    shown = np.array(page.tab.evaluate('Array.from(bench.curves.before[3])'), dtype=float)
-    time = np.array(page.tab.evaluate('Array.from(bench.curves.times[3])'))
-    seen = (time >= 3.0) & (time <= 5.0)
-    np.testing.assert_allclose(table[:, 7], shown[seen], rtol=1e-6)
-    drawing = ElementTree.parse(saved['svg']).getroot()
-    texts = [each.text for each in drawing.iter('{http://www.w3.org/2000/svg}text')]
-    assert {'time [s]', 'lift 1 [N]', 'slide 1 [N]', '3', '5'} <= set(texts)
-
-
-def test_an_answer_that_comes_after_the_mark_was_forgotten_is_not_shown(page: Page) -> None:
-    held: list[Any] = []
-    page.tab.route('**/api/shares', lambda route: held.append(route))
-    page.mark(3, 0.3, 0.6)
-    page.tab.wait_for_function("document.getElementById('brush-drive').value === 'lift_1'")
-    page.tab.keyboard.press('Escape')
-    while not held:
-        page.tab.wait_for_timeout(10)
-    with page.tab.expect_response('**/api/shares'):
-        held[0].continue_()
-    page.tab.evaluate('new Promise((done) => requestAnimationFrame(() => setTimeout(done)))')
-    assert page.tab.locator('#share-list li').count() == 0
-
-
-def test_what_did_not_change_is_not_sent_again(page: Page, bench: Workbench) -> None:
-    """A change of one effect is not answered with all of them and all curves."""
-    whole = bench.get('/api/screen')
-    same = bench.get(f'/api/screen?since={whole.header["version"]}')
-    assert same.header['effects'] == []
-    assert same.arrays == {}
-    assert len(same.body) < 200 < 50_000 < len(whole.body)
-    tick = bench.post('/api/tick', effect='payload_mass', since=whole.header['version'],
-                      revision=whole.header['revision'])
-    assert 'payload_mass' in [one['name'] for one in tick.header['effects']]
-    assert tick.arrays['now'].shape == whole.arrays['now'].shape
-    assert 'recordings' in tick.header
-    assert 'verdict' not in tick.header
-    page.tab.wait_for_function("document.getElementById('tick-payload_mass').checked")
-    # The page, by changes alone, shows what a page shows that is opened now.
-    whole = bench.settled()
-    state = page.settled()
-    for key in ('effects', 'errors', 'overall', 'recordings', 'revision', 'stage'):
-        assert state[key] == whole[key]
-
-
-def test_a_region_of_a_scatter_leads_to_its_times(page: Page) -> None:
-    page.tick('payload_mass')
-    page.tab.keyboard.press('2')
-    page.tab.select_option('#scatter-drive', 'lift_2')
-    page.tab.wait_for_function("bench.scatter.x.length && bench.scatter.names[0] === 'velocity'")
-    box = page.tab.locator('#scatter').bounding_box()
-    page.tab.mouse.move(box['x'] + 0.55 * box['width'], box['y'] + 20)
-    page.tab.mouse.down()
-    page.tab.mouse.move(box['x'] + 0.95 * box['width'], box['y'] + 0.4 * box['height'], steps=4)
-    page.tab.mouse.up()
-    page.tab.locator('#share-list', has_text='friction on lift_2').wait_for()
-    page.tab.locator('#spans button').click()
-    assert page.tab.locator('#view-curves').is_visible()
-    whole = page.tab.evaluate('bench.curves.times[0].at(-1) - bench.curves.times[0][0]')
-    seen = page.tab.evaluate('bench.curves.range()')
-    assert seen[1] - seen[0] < whole
-
-
 def test_the_robot_moves(page: Page) -> None:
     page.tab.keyboard.press('3')
     page.tab.wait_for_function('bench.robot.time')
@@ -316,7 +239,7 @@ def test_adopt_refuse_export_undo(page: Page, folder: Path) -> None:
     with page.tab.expect_download() as started:
         page.tab.locator('#export').click()
     started.value.save_as(folder / 'model.yaml')
-    assert [step.effect for step in read_steps(load_model(folder / 'model.yaml').values)] == [
+    assert [step.effect for step in read_steps(DriveModel.load(folder / 'model.yaml').values)] == [
         'payload_mass']
     page.tick('coulomb_friction')
     ticked = page.settled()
@@ -348,53 +271,7 @@ def test_adopt_refuse_export_undo(page: Page, folder: Path) -> None:
     (folder / 'elsewhere.csv').rename(run)
 
 
-def test_an_adoption_is_called_off(page: Page) -> None:
-    page.tick('payload_mass')
-    page.tab.locator('[data-effect=payload_mass]').get_by_role('button', name='Adopt').click()
-    page.tab.get_by_role('button', name='Cancel judging payload mass').click()
-    page.tab.locator('#message', has_text='called off').wait_for()
-    assert page.settled()['steps'] == []
-
-
-def test_a_button_stays_while_it_is_pressed(page: Page) -> None:
-    """Progress comes in between: a button that it replaces would never be clicked."""
-    page.tab.evaluate("""async () => {
-        const {showJobs} = await import('/static/panels.mjs');
-        const job = {number: 1e6, kind: 'experiment', what: '', share: 0.1, is_running: true};
-        window.shown = (share) => showJobs([{...job, share}], () => { window.pressed = true; });
-        window.shown(0.1);
-    }""")
-    button = page.tab.get_by_role('button', name='Cancel designing')
-    box = button.bounding_box()
-    page.tab.mouse.move(box['x'] + box['width'] / 2, box['y'] + box['height'] / 2)
-    page.tab.mouse.down()
-    page.tab.evaluate('window.shown(0.6)')
-    page.tab.mouse.up()
-    assert page.tab.evaluate('window.pressed') is True
-    assert page.tab.get_by_role('progressbar', name='designing').evaluate('bar => bar.value') == 0.6
-
-
-def test_nothing_moves_under_a_press(page: Page, bench: Workbench) -> None:
-    """A fit that ends in between, or another browser, would carry the button away."""
-    page.tick('payload_mass')
-    field = page.tab.locator('[id="payload_mass-mass"]')
-    field.fill('1.5')
-    field.press('Enter')
-    page.tab.wait_for_function('bench.state.departure > 10')
-    page.settled()
-    release = page.tab.locator('[data-effect=payload_mass]').get_by_role('button', name='Best')
-    release.hover()
-    box = release.bounding_box()
-    page.tab.mouse.down()
-    assert bench.post('/api/release', effect='payload_mass',
-                      revision=bench.screen()['revision']).status == 200
-    page.tab.wait_for_function('bench.state.departure === 0 && bench.state.is_settled')
-    assert release.bounding_box() == box
-    with page.tab.expect_response('**/api/release'):
-        page.tab.mouse.up()
-    release.wait_for(state='hidden')
-
-
+@pytest.mark.slow
 def test_the_next_experiment_is_designed_and_downloaded(page: Page, folder: Path) -> None:
     page.tab.keyboard.press('4')
     page.tab.locator('#experiment-duration').fill('5')
@@ -407,24 +284,6 @@ def test_the_next_experiment_is_designed_and_downloaded(page: Page, folder: Path
     lines = (folder / 'next.csv').read_text().splitlines()
     assert lines[0].startswith('time,x,y,z,qx,qy,qz,qw')
     assert len(lines) == 1 + 501
-
-
-def test_a_link_shows_what_is_seen(page: Page, browser: Any, bench: Workbench) -> None:
-    page.mark(1, 0.3, 0.4)
-    page.tab.keyboard.press('z')
-    page.tab.wait_for_function("location.hash.includes('window')")
-    seen = page.tab.evaluate('[bench.curves.range(), bench.curves.span, bench.curves.on]')
-    second = Page(browser, bench)
-    second.settled()
-    second.tab.evaluate('hash => { location.hash = hash; }', page.tab.evaluate('location.hash'))
-    second.tab.wait_for_function('window.bench?.curves?.span && bench.curves.window')
-    assert second.tab.evaluate('[bench.curves.range(), bench.curves.span, bench.curves.on]') == [
-        pytest.approx(seen[0], abs=1e-3), pytest.approx(seen[1], abs=1e-3), seen[2]]
-    second.tab.evaluate("location.hash = '#view=robot'")
-    second.tab.wait_for_function('window.bench?.robot?.time')
-    second.tab.locator('#view-robot').wait_for()
-    assert second.complaints == []
-    second.context.close()
 
 
 def test_a_tick_is_taken_back_and_done_again_by_keys(page: Page) -> None:
@@ -457,33 +316,6 @@ def test_files_are_dropped_and_let_go_of(page: Page, folder: Path) -> None:
     page.tab.get_by_role('button', name='Remove dropped.csv').click()
     page.tab.wait_for_function('bench.state.recordings.length === 1')
     page.settled()
-
-
-def test_the_robot_is_where_a_curve_was_clicked_on(page: Page) -> None:
-    page.tab.keyboard.press('3')
-    page.tab.wait_for_function('bench.robot.time')
-    page.tab.keyboard.press('1')
-    box = page.tab.locator('#curves .u-over').nth(2).bounding_box()
-    page.tab.mouse.click(box['x'] + 0.5 * box['width'], box['y'] + 0.5 * box['height'])
-    where, time, end = page.tab.evaluate(
-        '[bench.curves.playhead, bench.robot.time[bench.robot.frame], bench.curves.range()[1]]')
-    assert where == pytest.approx(0.5 * end, rel=0.02)
-    assert time == pytest.approx(where, abs=0.2)
-
-
-def test_the_error_is_seen_closer_with_alt_and_the_wheel(page: Page) -> None:
-    height = ('(() => { const {min, max} = bench.curves.plots[0].scales.y; return max - min; })()')
-    before, other = page.tab.evaluate(height), page.tab.evaluate(height.replace('[0]', '[1]'))
-    page.tab.locator('#curves .u-over').nth(0).hover()
-    page.tab.keyboard.down('Alt')
-    page.tab.mouse.wheel(0, -120)
-    page.tab.keyboard.up('Alt')
-    page.tab.wait_for_function(f'{height} < {0.9 * before}')
-    assert page.tab.evaluate(height) == pytest.approx(0.8 * before, rel=1e-6)
-    assert page.tab.evaluate(height.replace('[0]', '[1]')) == other
-    page.tab.locator('h1').click()
-    page.tab.keyboard.press('a')
-    page.tab.wait_for_function(f'Math.abs({height} - {before}) < 1e-9')
 
 
 @pytest.mark.parametrize('scheme', ['light', 'dark'])

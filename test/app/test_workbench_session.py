@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from workbench_bench import HIDDEN, write_hidden
 
-from pprs_dynamics import MechanismModel, read_recording
+from pprs_dynamics import DriveModel, read_recording
 from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench import Session
@@ -28,11 +28,8 @@ from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.jobs import DesignedMotion
 from pprs_dynamics.app.workbench.masks import (
     MOST_POINTS,
-    Share,
     drawn_samples,
     region_mask,
-    shares_in,
-    span_mask,
 )
 from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
@@ -41,7 +38,6 @@ from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.ledger import read_steps
-from pprs_dynamics.physics.model.model_file import load_model
 
 FORCE = HIDDEN['effects.coulomb_friction.lift_2.force']
 MASS = HIDDEN['effects.payload_mass.mass']
@@ -69,12 +65,6 @@ def session(shared: Session) -> Session:
 
 def steps_of(session: Session) -> list[str]:
     return [step.effect for step in read_steps(session.ticks.model.values)]
-
-
-def shares(session: Session, start: float, end: float, drives: list[str] | None = None,
-           ) -> list[Share]:
-    ticks = session.ticks
-    return shares_in(span_mask(ticks, start, end, drives), ticks.fits, ticks.view)
 
 
 def compared(folder: Path, recording: Path, model: Path) -> dict[str, Any]:
@@ -105,14 +95,7 @@ def test_ticks_lower_the_error_at_once_and_find_what_was_hidden(session: Session
     assert math.isnan(session.errors()['lift_2'].noise)
 
 
-def test_without_ticks_the_error_is_that_of_the_model(session: Session) -> None:
-    session.ticks.tick('payload_mass')
-    session.ticks.untick('payload_mass')
-    np.testing.assert_array_equal(session.ticks.view.residual, session.ticks.fits.before)
-
-
-@pytest.mark.parametrize('ticks', [('payload_mass', 'coulomb_friction'), ('time_delay',),
-                                   ('homing_error', 'payload_mass'), ('stribeck_friction',)])
+@pytest.mark.parametrize('ticks', [('payload_mass', 'coulomb_friction'), ('time_delay',)])
 def test_errors_that_are_shown_are_those_of_compare_after_export(
     session: Session, recording: Path, tmp_path: Path, ticks: tuple[str, ...],
 ) -> None:
@@ -146,30 +129,20 @@ def test_a_value_that_is_typed_holds_and_costs_what_it_departs(session: Session)
     assert session.ticks.release('coulomb_friction').departure == 0.0
 
 
-def test_a_shape_that_is_dragged_costs_what_it_departs(session: Session) -> None:
-    session.ticks.tick('payload_mass')
-    session.ticks.tick('stribeck_friction', ['lift_2'])
-    best = session.ticks.settle().estimates['stribeck_friction']['lift_2.velocity'].value
-    near = session.ticks.choose('stribeck_friction', 'lift_2.velocity', 0.8 * best).departure
-    far = session.ticks.choose('stribeck_friction', 'lift_2.velocity', 0.3 * best).departure
-    assert 0 <= near < far
-    session.ticks.release('stribeck_friction')
-
-
 def test_shares_say_where_an_error_is_from_less_its_prior_cost(session: Session) -> None:
-    lifts = shares(session, 2.0, 6.0, ['lift_1', 'lift_3'])
+    lifts = session.shares(2.0, 6.0, ['lift_1', 'lift_3'])
     assert lifts[0].net > 0.8
     assert 'payload_mass' in {one.effect for one in lifts if one.net > 0.9 * lifts[0].net}
     session.ticks.tick('payload_mass')
     session.ticks.settle()
-    of_lift_2 = shares(session, 2.0, 6.0, ['lift_2'])
+    of_lift_2 = session.shares(2.0, 6.0, ['lift_2'])
     assert of_lift_2[0].effect in ('coulomb_friction', 'asymmetric_friction', 'load_friction')
     assert of_lift_2[0].net > 0.8
     assert all(one.net <= max(one.explained, 0.0) + 1e-12 for one in of_lift_2)
     session.ticks.tick('coulomb_friction', ['lift_2'])
     session.ticks.settle()
     # Nothing is left to be explained: what fits to noise does not pay.
-    assert all(one.net < 0.05 for one in shares(session, 2.0, 6.0))
+    assert all(one.net < 0.05 for one in session.shares(2.0, 6.0))
 
 
 def test_a_region_of_a_scatter_is_found_in_time(session: Session) -> None:
@@ -232,10 +205,8 @@ def test_everything_on_the_screen_is_json(session: Session) -> None:
     assert found['errors']['lift_1']['now'] < found['errors']['lift_1']['before']
 
 
-def test_an_effect_is_adopted_refused_exported_and_taken_back(
-    recording: Path, tmp_path: Path,
-) -> None:
-    other = write_hidden(tmp_path / 'other.csv', 2)
+def test_an_effect_is_adopted_refused_exported_and_taken_back(tmp_path: Path) -> None:
+    recording, other = (write_hidden(tmp_path / f'{seed}.csv', seed, 6.0) for seed in (1, 2))
     session = Session.open([recording], validation=[other])
     given = dict(session.ticks.model.values)
     session.jobs.diagnose().result(300)
@@ -252,7 +223,8 @@ def test_an_effect_is_adopted_refused_exported_and_taken_back(
     assert set(session.ticks.view.ticks) == {'coulomb_friction'}
     assert steps_of(session) == ['payload_mass']
     session.export(tmp_path / 'adopted.yaml')
-    assert [step.effect for step in read_steps(load_model(tmp_path / 'adopted.yaml').values)] == [
+    assert [step.effect for step in read_steps(DriveModel.load(
+        tmp_path / 'adopted.yaml').values)] == [
         'payload_mass']
     found = compared(tmp_path, recording, tmp_path / 'adopted.yaml')
     for name, error in session.errors().items():
@@ -265,10 +237,6 @@ def short_session(folder: Path) -> tuple[Session, Path]:
     """Return a session of one recording, and another recording."""
     return (Session.open([write_hidden(folder / 'one.csv', 1, 4.0)]),
             write_hidden(folder / 'two.csv', 2, 4.0))
-
-
-def names_of(session: Session) -> list[str]:
-    return [one['name'] for one in session.to_dict()['recordings']]
 
 
 def test_a_recording_may_be_given_once(recording: Path, tmp_path: Path) -> None:
@@ -293,12 +261,6 @@ def test_a_job_is_cancelled_at_its_next_report() -> None:
     assert shares == [0, 1, 2, 3]
     assert job.to_dict()['error'] == ''
     assert not job.is_running
-
-
-def test_work_that_was_done_when_it_was_called_off_counts() -> None:
-    job: Job[str] = Job('adopt', 'this', lambda report: job.cancel() or 'done')
-    assert job.start().result(10) == 'done'
-    assert not job.to_dict()['is_cancelled']
 
 
 def sleep(seconds: float, progress: Any) -> str:
@@ -338,7 +300,7 @@ def test_the_session_imports_neither_ros_nor_a_server() -> None:
     code = ('import sys; from pprs_dynamics.app.workbench import Session; '
             'print(" ".join({name.split(".")[0] for name in sys.modules}))')
     loaded = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
-                            check=True).stdout.split()
+                            check=True, timeout=120).stdout.split()
     assert not set(loaded) & {'rclpy', 'starlette', 'uvicorn', 'plotly', 'rich', 'matplotlib'}
 
 
@@ -356,24 +318,6 @@ def test_the_notebook_runs_as_it_stands(capsys: pytest.CaptureFixture[str]) -> N
     assert said.endswith("['payload_mass']\n[]\n")
     costs = names['costs']
     assert costs[0] > costs[4] < costs[-1]
-
-
-def test_an_arm_is_shown_in_its_own_words_and_units(tmp_path: Path) -> None:
-    model = arm.real_arm(tmp_path)
-    real = arm.real_arm(tmp_path, **{'friction.viscous': (14.0, 5.0, 20.0)})
-    session = Session(model, {'run': arm.record(real, arm.motion(10.0))})
-    session.ticks.tick('viscous_friction', ['turn'])
-    session.ticks.settle()
-    state = session.to_dict()
-    assert state['unit'] == 'N or N m'
-    assert state['units']['turn'] == {'effort': 'N m', 'position': 'rad', 'velocity': 'rad/s',
-                                      'acceleration': 'rad/s²'}
-    assert state['units']['reach']['position'] == 'm'
-    effects = {one['name']: one for one in state['effects']}
-    assert effects['payload_mass']['equation'].startswith('tau')
-    shown, = effects['viscous_friction']['parameters']
-    assert (shown['key'], shown['unit']) == ('turn.coefficient', 'N m s/rad')
-    assert shown['value'] == pytest.approx(6.0, rel=0.05)
 
 
 def ticked(session: Session) -> dict[str, Any]:
@@ -470,12 +414,12 @@ def test_a_reference_stays_when_a_recording_goes(tmp_path: Path) -> None:
     np.testing.assert_allclose(session.ticks.fits.before, alone, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_session_says_since_when(tmp_path: Path) -> None:
     """Of an arm with drag that was always there: only the dry friction has changed."""
     moved = arm.motion(12.0, seed=0)
-    model = load_model(arm.write_arm(tmp_path, **{
+    model = DriveModel.load(arm.write_arm(tmp_path, **{
         key.replace('.', '__'): list(value) for key, value in arm.FRICTION.items()}))
-    assert isinstance(model, MechanismModel)
 
     def write(name: str, seed: int, force: float = 0.0) -> Path:
         clean = arm.record(model, moved, 0.05, seed)
@@ -549,7 +493,7 @@ class TestASavedSession:
             session.resume(saved)
 
     def test_is_not_written_of_what_is_in_no_file(self, recording: Path, tmp_path: Path) -> None:
-        session = Session(load_model('config/paper.yaml'), {'run': read_recording(recording)})
+        session = Session(DriveModel.load('config/paper.yaml'), {'run': read_recording(recording)})
         with pytest.raises(SessionError, match='recording run is in no file'):
             session.save(tmp_path / 'session.json')
         assert not (tmp_path / 'session.json').exists()

@@ -22,7 +22,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.model.keys import NAMES
 from pprs_dynamics.physics.model.parameter_values import is_known
 from pprs_dynamics.ros.messages.status_codes import CODES, LEVELS
-from pprs_dynamics.simulation.injected_effects import IN_CATALOGUE, NOT_IN_CATALOGUE
+from pprs_dynamics.simulation.injection import NAMES as INJECTED
 
 # Options of other programs that pages show.
 FOREIGN = {'--ros-args', '--params-file', '--packages-select', '--symlink-install', '--upgrade',
@@ -121,7 +121,7 @@ def wrong_names(line: str) -> Iterator[str]:
         if found not in NAMES and not any(name.startswith(f'{found}.') for name in NAMES):
             yield found
     for found in re.findall(r'--effect ([a-z_]+)', line):
-        if found not in (*IN_CATALOGUE, *NOT_IN_CATALOGUE, *CATALOGUE):
+        if found not in (*INJECTED, *CATALOGUE):
             yield found
 
 

@@ -12,8 +12,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from pprs_dynamics import load_model
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics import DriveModel
 
 PAGE = Path(__file__).parents[2] / 'docs' / 'own_loop.py'
 RATE = 200.0
@@ -41,7 +40,7 @@ def test_single_samples_with_a_state_are_the_samples_of_one_call(
     assert len(sent) == len(took) == len(late) == 20
     assert np.all(took > 0)
     assert np.all(late >= 0)
-    model = load_model(path)
+    model = DriveModel.load(path)
     motions = [script.one_sample(model, k / RATE) for k in range(20)]
     names = POSES if path == 'config/paper.yaml' else ('position', 'velocity', 'acceleration')
     whole = type(motions[0])(**{
@@ -51,8 +50,8 @@ def test_single_samples_with_a_state_are_the_samples_of_one_call(
 
 
 def test_a_memory_goes_on_from_call_to_call(script: ModuleType) -> None:
-    model = build_model({
-        **load_model('config/paper.yaml').values, 'effects.active': ['hysteresis'],
+    model = DriveModel.from_parameters({
+        **DriveModel.load('config/paper.yaml').values, 'effects.active': ['hysteresis'],
         'effects.hysteresis.lift_1.force': 0.5, 'effects.hysteresis.lift_1.distance': 1e-3})
     motions = [script.one_sample(model, k / RATE) for k in range(20)]
     state = model.initial_state()

@@ -35,7 +35,6 @@ from pprs_dynamics.measurement.files.fingerprint import fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.ledger import read_steps
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters, read_parameters
 
@@ -183,9 +182,9 @@ def test_force_overrides_and_is_recorded(files: Files) -> None:
 def synthetic(values: dict[str, Any], **recorded: Any) -> tuple[DriveModel, Recording]:
     """Return a model and a recording of a robot that differs from it."""
     motion = Excitation(DURATION, seed=5).motion(np.arange(0, DURATION, 0.002))
-    forces = build_model({**default_parameters(), **recorded}).drive_forces(motion)
+    forces = DriveModel.from_parameters({**default_parameters(), **recorded}).drive_forces(motion)
     noise = np.random.default_rng(8).normal(0, NOISE, forces.total.shape)
-    return build_model({**default_parameters(), **values}), Recording.from_arrays(
+    return DriveModel.from_parameters({**default_parameters(), **values}), Recording.from_arrays(
         'synthetic', motion.time, forces.mechanism.position, None, forces.total + noise)
 
 
@@ -225,7 +224,7 @@ def test_a_damaged_model_file_is_left_alone(files: Files, tmp_path: Path, damage
     model = tmp_path / 'model.yaml'
     text = files.new.read_text()
     model.write_bytes({
-        'cut': text[:len(text) // 3].encode(), 'binary': b'\x00\xff\xfe' * 50,
+        'cut': text[:text.index('effect: coulomb') + 3].encode(), 'binary': b'\x00\xff\xfe' * 50,
         'value': text.replace('effect: coulomb_friction', 'effect: 5', 1).encode(),
         'ledger': text.replace('forced: false', 'forced: perhaps', 1).encode()}[damage])
     content = model.read_bytes()

@@ -13,17 +13,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.experiments.arm_motions import (
-    ArmLimits,
-    ArmMotions,
-    _Information,
-    excite_arm,
-)
+from pprs_dynamics.inference.experiments.arm_excitation import ArmInformation, excite_arm
+from pprs_dynamics.inference.experiments.motion_design import ArmMotions, random_motions
+from pprs_dynamics.inference.experiments.motion_limits import ArmLimits
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
 
 DURATION = 12.0
@@ -32,16 +28,16 @@ NOISE = 1.5  # [N m, N], white: so much that the corners do not tell
 
 
 @pytest.fixture(scope='module')
-def model(tmp_path_factory: pytest.TempPathFactory) -> MechanismModel:
+def model(tmp_path_factory: pytest.TempPathFactory) -> DriveModel:
     return arm.real_arm(tmp_path_factory.mktemp('arm'))
 
 
 @pytest.fixture(scope='module')
-def found(model: MechanismModel):
+def found(model: DriveModel):
     return excite_arm(model, ArmLimits(), DURATION, seed=1)
 
 
-def test_it_keeps_the_limits_with_their_margin(model: MechanismModel, found) -> None:
+def test_it_keeps_the_limits_with_their_margin(model: DriveModel, found) -> None:
     motion = found.motion(np.linspace(0, DURATION, 5001))
     tree = model.robot.structure
     assert np.all(np.abs(motion.position) <= 0.901 * np.minimum(tree.upper, np.pi))
@@ -61,12 +57,9 @@ def test_it_is_a_motion_from_rest_to_rest(found) -> None:
         assert np.gradient(before, time, axis=0)[1:-1] == pytest.approx(after[1:-1], abs=2e-3)
 
 
-def test_it_tells_more_than_motions_drawn_at_random(model: MechanismModel, found) -> None:
-    motions = ArmMotions(model, ArmLimits(), DURATION)
-    known = _Information(motions)
-    random = np.random.default_rng(99)
-    drawn = [motions.within_limits(random.normal(size=found.series.coefficients.shape))
-             for _ in range(20)]
+def test_it_tells_more_than_motions_drawn_at_random(model: DriveModel, found) -> None:
+    motions = ArmMotions(model, ArmLimits(), DURATION, (8,), 1.0)
+    known, drawn = ArmInformation(motions), random_motions(motions, 99, 20)
     told = [np.sum(np.log1p(known.of(one))) for one in (found.series, *drawn)]
     assert told[0] > max(told[1:])
 
@@ -84,7 +77,7 @@ def test_the_command_writes_what_a_controller_can_play(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope='module')
-def one_speed(model: MechanismModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def one_speed(model: DriveModel, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a recording in which swing hardly changes its speed: what lacks there is open."""
     folder = tmp_path_factory.mktemp('one_speed')
     period, rate = 8.0, 100.0
@@ -101,15 +94,15 @@ def one_speed(model: MechanismModel, tmp_path_factory: pytest.TempPathFactory) -
         q[1, :, joint], q[2, :, joint] = v, np.gradient(v, 1 / rate)
     viscous = list(model.values['friction.viscous'])
     viscous[1] += 6.0
-    real = build_model({**model.values, 'friction.viscous': tuple(viscous)}, model.source)
-    assert isinstance(real, MechanismModel)
+    real = DriveModel.from_parameters(
+        {**model.values, 'friction.viscous': tuple(viscous)}, model.source)
     path = folder / 'run.csv'
     write_recording(path, arm.record(real, JointMotion(*q, time), NOISE))
     return path
 
 
 def test_a_motion_is_designed_that_tells_rivals_apart(
-    model: MechanismModel, one_speed: Path, tmp_path: Path,
+    model: DriveModel, one_speed: Path, tmp_path: Path,
 ) -> None:
     path, answer = tmp_path / 'arm.yaml', tmp_path / 'next.json'
     write_model(path, model.values, model.source)
@@ -129,9 +122,8 @@ def test_a_motion_is_designed_that_tells_rivals_apart(
     moved = JointMotion(*(table[[f'{joint}/{name}' for joint in arm.JOINTS]].to_numpy()
                           for name in ('position', 'velocity', 'acceleration')),
                         table['time'].to_numpy())
-    real = build_model({**model.values, 'friction.viscous': tuple(
+    real = DriveModel.from_parameters({**model.values, 'friction.viscous': tuple(
         np.add(model.values['friction.viscous'], (0, 6.0, 0)))}, model.source)
-    assert isinstance(real, MechanismModel)
     second = tmp_path / 'second.csv'
     write_recording(second, arm.record(real, moved, NOISE, seed=1))
     found = diagnose(model, [read_recording(one_speed, model.drives),

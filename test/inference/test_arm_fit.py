@@ -14,7 +14,7 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 
-from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
@@ -24,14 +24,13 @@ from pprs_dynamics.inference.fit.bodies import Bodies, pseudo_inertia
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 from pprs_dynamics.measurement.motion.rests import find_rests
-from pprs_dynamics.physics.model.model_file import build_model
 
 NOISE = 0.2
 
 
-def heavier(folder: Path) -> MechanismModel:
+def heavier(folder: Path) -> DriveModel:
     """Return an arm that is not as described: heavier links, rotors, friction."""
-    model = MechanismModel.load(arm.write_arm(folder))
+    model = DriveModel.load(arm.write_arm(folder))
     mass = np.array(model.robot.inertial)
     factors = np.array([1.2, 0.8, 1.3])[:, None]
     changed = mass * factors
@@ -43,7 +42,7 @@ def heavier(folder: Path) -> MechanismModel:
 
 def test_a_fit_recovers_friction_and_predicts_a_motion_it_never_saw(tmp_path: Path) -> None:
     real = heavier(tmp_path)
-    described = MechanismModel.load(arm.write_arm(tmp_path))
+    described = DriveModel.load(arm.write_arm(tmp_path))
     runs = [arm.record(real, arm.motion(seed=seed), NOISE, seed) for seed in (0, 1)]
     fit = fit_base(described, runs, [arm.record(real, arm.motion(seed=7), NOISE, 7)])
     for key in ('friction.viscous', 'friction.coulomb'):
@@ -79,7 +78,7 @@ def test_a_base_that_predicts_worse_is_not_taken(tmp_path: Path) -> None:
 
 def test_uncertainties_hold_the_truth(tmp_path: Path) -> None:
     real = heavier(tmp_path)
-    described = MechanismModel.load(arm.write_arm(tmp_path))
+    described = DriveModel.load(arm.write_arm(tmp_path))
     inside = []
     for seed in range(4):
         runs = [arm.record(real, arm.motion(20.0, seed=seed), NOISE, seed)]
@@ -95,7 +94,7 @@ def test_what_does_not_move_stays_and_is_told(tmp_path: Path) -> None:
     moved = arm.motion()
     still = JointMotion(*(values * [1, 1, 0] for values in (
         moved.position, moved.velocity, moved.acceleration)), moved.time)
-    described = MechanismModel.load(arm.write_arm(tmp_path, friction__viscous=[1.0, 1.0, 33.0]))
+    described = DriveModel.load(arm.write_arm(tmp_path, friction__viscous=[1.0, 1.0, 33.0]))
     fit = fit_base(described, [arm.record(real, still, NOISE)])
     assert fit.model.values['friction.viscous'][2] == 33.0
     assert any('reach hardly moves' in sentence for sentence in fit.told)
@@ -103,8 +102,8 @@ def test_what_does_not_move_stays_and_is_told(tmp_path: Path) -> None:
 
 def test_a_joint_stands_however_sharply_another_ones_friction_turns_over(tmp_path: Path) -> None:
     # Its noise is motion to the narrow width that is fitted to the others, and would be its only.
-    model = MechanismModel.load(arm.write_arm(tmp_path, friction__reversal_velocity=0.01))
-    sharp = build_model({**model.values, **arm.FRICTION,
+    model = DriveModel.load(arm.write_arm(tmp_path, friction__reversal_velocity=0.01))
+    sharp = DriveModel.from_parameters({**model.values, **arm.FRICTION,
                          'friction.reversal_velocities': (1e-4, 1e-4, 1e-4)}, model.source)
     moved = arm.motion()
     still = JointMotion(*(values * [1, 1, 0] for values in (
@@ -120,27 +119,27 @@ def test_a_joint_stands_however_sharply_another_ones_friction_turns_over(tmp_pat
 
 
 def test_fitted_links_are_bodies(tmp_path: Path) -> None:
-    described = MechanismModel.load(arm.write_arm(tmp_path))
+    described = DriveModel.load(arm.write_arm(tmp_path))
     fit = fit_base(described, [arm.record(heavier(tmp_path), arm.motion(20.0), 5.0)])
-    assert isinstance(fit.model, MechanismModel)
     for link in fit.model.robot.inertial:
         assert np.linalg.eigvalsh(pseudo_inertia(link)).min() > -1e-6
 
 
 def test_points_of_bodies_begin_at_the_description(tmp_path: Path) -> None:
-    described = MechanismModel.load(arm.write_arm(tmp_path)).robot.inertial
+    described = DriveModel.load(arm.write_arm(tmp_path)).robot.inertial
     bodies = Bodies(described)
     assert bodies.inertial(np.zeros(len(bodies))) == pytest.approx(described, rel=1e-9, abs=1e-12)
     assert np.all(bodies.distance(np.zeros(len(bodies))) == 0)
 
 
 def test_tolerances_of_other_models_are_fitted(tmp_path: Path) -> None:
-    from pprs_dynamics import MechanismModel
+    from pprs_dynamics import DriveModel
     from pprs_dynamics.measurement.files.recording import Recording
 
-    given = MechanismModel.load('config/single_axis.yaml')
-    open_values = {**given.values, 'tolerances.axis.mass': 0.2, 'tolerances.axis.coulomb': 0.3}
-    real = build_model({**given.values, 'axis.mass': 100.0, 'axis.coulomb': 22.0})
+    given = DriveModel.load('config/single_axis.yaml')
+    open_values = {**given.values, 'tolerances.links.mass': 0.2, 'tolerances.friction.coulomb': 0.3}
+    real = DriveModel.from_parameters({
+        **given.values, 'links.mass': [100.0], 'friction.coulomb': [22.0]})
     time = np.arange(0, 20, 0.002)
     q = 0.05 * np.sin(2 * time)[:, None] + 0.01 * np.sin(9 * time)[:, None]
     v = 0.1 * np.cos(2 * time)[:, None] + 0.09 * np.cos(9 * time)[:, None]
@@ -148,12 +147,12 @@ def test_tolerances_of_other_models_are_fitted(tmp_path: Path) -> None:
     force = real.drive_forces(JointMotion(q, v, a, time)).total
     force = force + 0.5 * np.random.default_rng(0).normal(size=force.shape)
     run = Recording.from_arrays('run', time, q, None, force, ('axis',))
-    fit = fit_base(build_model(open_values), [run])
-    assert fit.model.values['axis.mass'] == pytest.approx(100.0, rel=0.01)
-    assert fit.model.values['axis.coulomb'] == pytest.approx(22.0, rel=0.01)
+    fit = fit_base(DriveModel.from_parameters(open_values), [run])
+    assert fit.model.values['links.mass'][0] == pytest.approx(100.0, rel=0.01)
+    assert fit.model.values['friction.coulomb'][0] == pytest.approx(22.0, rel=0.01)
 
 
-def write_currents(folder: Path, model: MechanismModel, gain: tuple[float, ...], name: str) -> Path:
+def write_currents(folder: Path, model: DriveModel, gain: tuple[float, ...], name: str) -> Path:
     """Write a packed CSV of currents, joints in another order, stamps that jitter."""
     run = arm.record(model, arm.motion(20.0), NOISE)
     header = ['time']
@@ -188,7 +187,8 @@ def test_a_gain_within_its_tolerance_is_calibrated_and_leaves_the_payload_alone(
     gain, wrong = (10.0, 4.0, 30.0), (10.0, 4.2, 30.0)
     real = arm.real_arm(tmp_path, **{'robot.gain': gain})
     path = write_currents(tmp_path, real, gain, 'run.csv')
-    given = build_model({**real.values, 'robot.gain': wrong, 'tolerances.robot.gain': 0.1},
+    given = DriveModel.from_parameters(
+        {**real.values, 'robot.gain': wrong, 'tolerances.robot.gain': 0.1},
                         real.source)
     run = read_recording(path, given.recorded)
     found = diagnose(given, [run])
@@ -221,9 +221,8 @@ def test_a_reversal_is_no_rest() -> None:
 
 def test_a_hidden_payload_is_named_alone_and_its_mass_is_right(tmp_path: Path) -> None:
     given = arm.real_arm(tmp_path)
-    loaded = build_model({**given.values, 'effects.active': ['payload_mass'],
+    loaded = DriveModel.from_parameters({**given.values, 'effects.active': ['payload_mass'],
                           'effects.payload_mass.mass': 1.2}, given.source)
-    assert isinstance(loaded, MechanismModel)
     found = diagnose(given, [arm.record(loaded, arm.motion(), NOISE)])
     assert [one.name for one in found.effects] == ['payload_mass']
     mass = found.effects[0].parameters['mass']
@@ -235,7 +234,8 @@ def test_friction_on_a_turning_joint_has_its_units(tmp_path: Path) -> None:
     real = arm.real_arm(tmp_path)
     without = list(arm.FRICTION['friction.viscous'])
     without[1] = 0.0
-    given = build_model({**real.values, 'friction.viscous': tuple(without)}, real.source)
+    given = DriveModel.from_parameters(
+        {**real.values, 'friction.viscous': tuple(without)}, real.source)
     found = diagnose(given, [arm.record(real, arm.motion(), NOISE)])
     assert found.effects[0].name == 'viscous_friction'
     assert found.effects[0].drives == ('swing',)
@@ -268,10 +268,9 @@ def test_a_fault_in_the_run_that_is_fitted_is_hidden_by_the_fit_which_is_said(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv('COLUMNS', '400')
-    healthy, described = arm.real_arm(tmp_path), MechanismModel.load(tmp_path / 'arm.yaml')
-    loaded = build_model({**healthy.values, 'effects.active': ['payload_mass'],
+    healthy, described = arm.real_arm(tmp_path), DriveModel.load(tmp_path / 'arm.yaml')
+    loaded = DriveModel.from_parameters({**healthy.values, 'effects.active': ['payload_mass'],
                           'effects.payload_mass.mass': 1.5}, healthy.source)
-    assert isinstance(loaded, MechanismModel)
     for name, real, seed in (('healthy', healthy, 0), ('loaded', loaded, 1)):
         write_recording(tmp_path / f'{name}.csv', arm.record(real, arm.motion(20.0, seed=seed),
                                                              NOISE, seed))

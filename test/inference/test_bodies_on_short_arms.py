@@ -17,13 +17,12 @@ from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model, load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 NOISE = 0.05  # [N m]
 
 
-def record(model: ForceModel, seed: int = 0, pace: float = 1.0) -> Recording:
+def record(model: DriveModel, seed: int = 0, pace: float = 1.0) -> Recording:
     time = np.arange(1500) * 0.01 / pace ** 0.5
     rates = np.array([[0.31, 0.83], [0.47, 1.13]])[:, :len(model.drives)] * pace
     phase = 2 * np.pi * rates[:, None] * time[:, None] + np.arange(len(model.drives))
@@ -41,7 +40,7 @@ def record(model: ForceModel, seed: int = 0, pace: float = 1.0) -> Recording:
 def test_a_load_is_found_and_adopted_where_a_motion_shows_it(joints: int, tmp_path: Path) -> None:
     """Half a kilogram half a metre from the axis: the arm with one joint has no other length."""
     model = planar_arm(tmp_path, joints)
-    true = build_model({**model.values, 'effects.active': ['payload_mass'],
+    true = DriveModel.from_parameters({**model.values, 'effects.active': ['payload_mass'],
                         'effects.payload_mass.mass': 0.5, 'effects.payload_mass.z': -0.5},
                        model.source)
     recording = record(true)
@@ -57,7 +56,7 @@ def test_a_load_is_found_and_adopted_where_a_motion_shows_it(joints: int, tmp_pa
 def test_a_slow_motion_tells_the_moment_of_a_load_and_not_its_mass(tmp_path: Path) -> None:
     """What holds 0.25 kg m may be any mass: only m c acts without acceleration."""
     model = planar_arm(tmp_path, 1)
-    recording = record(build_model({
+    recording = record(DriveModel.from_parameters({
         **model.values, 'effects.active': ['payload_mass'], 'effects.payload_mass.mass': 0.5,
         'effects.payload_mass.z': -0.5}, model.source), pace=0.1)
     # At rest a weight on a joint and a spring on a lever hold alike.
@@ -86,8 +85,8 @@ def test_the_interval_of_a_mass_has_every_centre_that_the_path_allows(tmp_path: 
         '<link name="flange"/><joint name="fixed" type="fixed"><parent link="rod_1"/>'
         '<child link="flange"/><origin xyz="0 0 -0.5"/></joint></robot>')))
     file.write_text(file.read_text().replace('tool: rod_1', 'tool: flange'))
-    model = load_model(file)
-    recording = record(build_model({
+    model = DriveModel.load(file)
+    recording = record(DriveModel.from_parameters({
         **model.values, 'effects.active': ['payload_mass'], 'effects.payload_mass.mass': 0.48,
         'effects.payload_mass.z': 0.35}, model.source), pace=0.1)
     adoption = adopt(model, requested('payload_mass', model), [recording])

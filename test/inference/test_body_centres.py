@@ -12,7 +12,7 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.body_centres import find_centre
 from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
@@ -26,7 +26,7 @@ MASS = 4.0
 
 
 def test_the_columns_about_a_centre_are_exact_for_a_body_there(tmp_path: Path) -> None:
-    model = MechanismModel.load(arm.write_arm(tmp_path))
+    model = DriveModel.load(arm.write_arm(tmp_path))
     kind = model.bound(LinkMass)
     prefix, link, centre, *_ = kind.places[0]
     away = np.array([0.3, -0.2, 0.5])
@@ -49,7 +49,7 @@ def test_the_columns_about_a_centre_are_exact_for_a_body_there(tmp_path: Path) -
 
 
 def test_the_centre_is_found_from_the_error(tmp_path: Path) -> None:
-    model = MechanismModel.load(arm.write_arm(tmp_path))
+    model = DriveModel.load(arm.write_arm(tmp_path))
     real = arm.real_arm(tmp_path)
     kind = model.bound(LinkMass)
     name = model.robot.body_names[1]

@@ -16,13 +16,13 @@ from pprs_dynamics.inference.readings.check import find_mistakes
 from pprs_dynamics.inference.readings.findings import OtherReading
 from pprs_dynamics.inference.residuals.excerpt import excerpt_of, forces_on
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.model_file import build_model
 
 MODEL = DriveModel.load()
 TIME = np.arange(10_000) * 0.002
 AFTER = (TIME > 12.0)[:, None]
 # Effects that the model lacks are no other unit.
-REAL = build_model({**MODEL.values, 'effects.active': ['stribeck_friction', 'viscous_friction'],
+REAL = DriveModel.from_parameters(
+    {**MODEL.values, 'effects.active': ['stribeck_friction', 'viscous_friction'],
                     'effects.stribeck_friction.lift_1.force': 1.2,
                     'effects.stribeck_friction.lift_1.velocity': 0.02,
                     'effects.viscous_friction.slide_2.coefficient': 12.0})

@@ -16,7 +16,7 @@ import pytest
 
 from benchmarks.real import davinci as closed_chain
 from benchmarks.real.recorded_data import find_data, missing
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.fit.arm_fit import columns_of, fit_arm
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import EffectCandidate
@@ -30,7 +30,7 @@ PART = 12.0  # [s], a period of the path
 LEVER = 0.105 * 0.535  # [kg m], the weight on the front link and its place above the pitch axis
 
 
-def part_of(model: MechanismModel, name: str) -> Recording:
+def part_of(model: DriveModel, name: str) -> Recording:
     """Return the first seconds of a recording."""
     assert DATA is not None
     whole = read_recording(DATA / name, model.recorded)
@@ -39,17 +39,17 @@ def part_of(model: MechanismModel, name: str) -> Recording:
 
 
 @pytest.fixture(scope='module')
-def base(tmp_path_factory: pytest.TempPathFactory) -> MechanismModel:
+def base(tmp_path_factory: pytest.TempPathFactory) -> DriveModel:
     """Return the base model of a part of the free run."""
     assert DATA is not None
     folder = tmp_path_factory.mktemp('dvrk')
     shutil.copyfile(DATA / 'psm.urdf', folder / 'psm.urdf')
     (folder / 'psm.yaml').write_text(closed_chain.model_text())
-    model = MechanismModel.load(folder / 'psm.yaml')
+    model = DriveModel.load(folder / 'psm.yaml')
     return fit_arm(model, columns_of(model, [part_of(model, closed_chain.FREE)])).model
 
 
-def test_friction_of_the_base_turns_over_within_the_motion(base: MechanismModel) -> None:
+def test_friction_of_the_base_turns_over_within_the_motion(base: DriveModel) -> None:
     """A width beyond the speeds would make a curve of dry friction, and drives that do not move."""
     run = part_of(base, closed_chain.FREE)
     design = Design.of(base, [run])
@@ -58,7 +58,7 @@ def test_friction_of_the_base_turns_over_within_the_motion(base: MechanismModel)
     assert np.all(np.array(error) < [0.093, 0.178, 0.191])  # published, on another path
 
 
-def test_the_weight_on_top_is_a_body_on_the_pitch_links(base: MechanismModel) -> None:
+def test_the_weight_on_top_is_a_body_on_the_pitch_links(base: DriveModel) -> None:
     fits = FittedSets(Design.of(base, [part_of(base, 'load_insertion_105_fast.csv.gz')]), DECISIONS)
     found = [fits.refined(fits.evaluate((EffectCandidate.of([component]),)))
              for component in fits.components.structure]

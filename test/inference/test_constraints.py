@@ -8,8 +8,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from made_up_arm import real_arm
+from single_axis import axis_motion
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.constrained import (
     Inequalities,
@@ -28,9 +29,7 @@ from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.description import pseudo_inertia
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
-from pprs_dynamics.physics.model.model_file import build_model
 
 SPREAD = np.array([0.05, 0.01, 0.01, 0.01, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02])
 
@@ -215,27 +214,18 @@ def test_a_body_of_which_the_fit_says_nothing_is_any(robot: Mechanism) -> None:
 
 # Totals of a drive.
 
-MODEL = MechanismModel.load('config/single_axis.yaml')
+MODEL = DriveModel.load('config/single_axis.yaml')
 TIME = np.arange(0, 8, 0.005)
-
-
-def motion() -> JointMotion:
-    q = np.zeros((3, len(TIME), 1))
-    for rate, size in ((0.2, 0.1), (0.5, 0.05), (1.3, 0.01)):
-        w = 2 * np.pi * rate
-        q[:, :, 0] += size * np.array([np.sin(w * TIME), w * np.cos(w * TIME),
-                                       -w * w * np.sin(w * TIME)])
-    return JointMotion(*q, TIME)
 
 
 @pytest.mark.parametrize('inertia', [-1.2, -1.6])
 def test_no_total_of_a_drive_is_negative_when_one_constraint_moves_another(inertia: float) -> None:
     """Less inertia than none moves the frictions; all are within their bounds afterwards."""
-    moved = motion()
-    exact = build_model({**MODEL.values, **dict.fromkeys(
+    moved = axis_motion(TIME)
+    exact = DriveModel.from_parameters({**MODEL.values, **dict.fromkeys(
         (f'tolerances.axis.{key}' for key in ('mass', 'viscous', 'coulomb')), 1e-6)})
-    effort = exact.drive_forces(moved).total + MODEL.values['axis.mass'] * inertia * (
-        moved.acceleration) - 0.99 * MODEL.values['axis.viscous'] * moved.velocity
+    effort = exact.drive_forces(moved).total + MODEL.values['links.mass'][0] * inertia * (
+        moved.acceleration) - 0.99 * MODEL.values['friction.viscous'][0] * moved.velocity
     effort += np.random.default_rng(5).normal(0, 1.0, effort.shape)
     design = Design.of(exact, [Recording.from_arrays('run', TIME, moved.position, None, effort,
                                                      ('axis',))])
@@ -248,8 +238,8 @@ def test_no_total_of_a_drive_is_negative_when_one_constraint_moves_another(inert
     mass, viscous, more = (dict(zip(one.names, found.coefficients(one), strict=True))
                            for one in components)
     values, tiny = exact.values, 1e-6
-    assert values['axis.mass'] + mass['mass'] > -tiny
+    assert values['links.mass'][0] + mass['mass'] > -tiny
     for way in ('forward', 'backward'):
-        assert (values['axis.viscous'] + viscous['coefficient']
+        assert (values['friction.viscous'][0] + viscous['coefficient']
                 + more[f'viscous_{way}']) > -tiny
-        assert values['axis.coulomb'] + more[f'force_{way}'] > -tiny
+        assert values['friction.coulomb'][0] + more[f'force_{way}'] > -tiny

@@ -21,7 +21,7 @@ from shared_cases import shared_case
 from short_recordings import short_recordings
 
 from benchmarks.hidden import recordings
-from pprs_dynamics import DriveModel, JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
@@ -30,13 +30,12 @@ from pprs_dynamics.inference.readings.findings import OtherReading, columns_line
 from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
 from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
-from pprs_dynamics.physics.model.model_file import build_model, load_model
-from pprs_dynamics.simulation.injected_effects import INJECTED_EFFECTS, draw_effect
+from pprs_dynamics.simulation.injection import NOT_IN_CATALOGUE, Choice
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / 'docs'
 MODEL = DriveModel.load()
-AXIS = MechanismModel.load('config/single_axis.yaml')
+AXIS = DriveModel.load('config/single_axis.yaml')
 RATE, DURATION = 250.0, 10.0
 NOISE = 0.05  # [N]
 Arrays = tuple[Array, Array, Array, Array]
@@ -135,9 +134,8 @@ def test_a_mistake_is_said_in_one_sentence_each(mistake: str) -> None:
 
 @pytest.mark.parametrize('mistake', ['kN', 'sign', 'ms', 'mm', 'negated', 'lifts for slides'])
 def test_a_mistake_is_recognised_where_the_model_lacks_an_effect(mistake: str) -> None:
-    lacking = build_model({**MODEL.values, 'masses.payload': 1.3, 'effects.active': [
+    lacking = DriveModel.from_parameters({**MODEL.values, 'masses.payload': 1.3, 'effects.active': [
         'viscous_friction'], 'effects.viscous_friction.slide_2.coefficient': 5.0})
-    assert isinstance(lacking, DriveModel)
     change, patterns = MISTAKES[mistake]
     expect(told(change(robot(lacking, 3))), patterns)
 
@@ -159,15 +157,14 @@ def benchmark() -> Iterator[ModuleType]:
         yield recordings
 
 
-@pytest.mark.parametrize('name', INJECTED_EFFECTS)
+@pytest.mark.parametrize('name', [*recordings.IN_CATALOGUE, *NOT_IN_CATALOGUE])
 def test_no_hidden_effect_is_called_a_mistake(benchmark: ModuleType, name: str) -> None:
     place = benchmark.scene(11, 0.0)
-    read = place.plant.readings([draw_effect(name, np.random.default_rng(4), 4.0)])
-    part = slice(benchmark.LEAD, None)
-    time = place.motion.time[part]
-    effort = read.effort[part] + np.random.default_rng(5).normal(0, 0.08, (len(time), 6))
+    run = place.inject([Choice(name, np.random.default_rng(4))])
+    part, time = slice(benchmark.LEAD, None), place.time
+    effort = run.efforts[part] + np.random.default_rng(5).normal(0, 0.08, (len(time), 6))
     found = find_mistakes(place.model, Recording.from_arrays(
-        name, time - time[0], np.round(read.position[part], 6), None, effort))
+        name, time - time[0], np.round(run.position[part], 6), None, effort))
     assert found == ()
 
 
@@ -192,9 +189,9 @@ def test_a_zero_that_is_off_is_no_mistake_of_units(offset: float) -> None:
 
 
 def test_a_recording_of_another_robot_is_told_nothing_false() -> None:
-    other = build_model({**MODEL.values, 'geometry.rod_length': 0.36, 'masses.payload': 3.0,
+    other = DriveModel.from_parameters(
+        {**MODEL.values, 'geometry.rod_length': 0.36, 'masses.payload': 3.0,
                          'friction.drives.coulomb': (0.2,) * 6})
-    assert isinstance(other, DriveModel)
     assert told(robot(other)) == []
 
 
@@ -284,7 +281,7 @@ def test_commands_say_it_before_they_compare(tmp_path: Path) -> None:
         assert done.stderr == stopped
 
 
-def arm_recording(model: MechanismModel, motion: float | list[float] = 1.0,
+def arm_recording(model: DriveModel, motion: float | list[float] = 1.0,
                   effort: float | list[float] = 1.0,
                   changes: Callable[[Arrays], Arrays] | None = None,
                   ) -> Recording:
@@ -295,7 +292,7 @@ def arm_recording(model: MechanismModel, motion: float | list[float] = 1.0,
     return recording(scaled(motion=motion, effort=effort)(arrays), model.drives)
 
 
-def read_as_told(model: MechanismModel, folder: Path, run: Recording,
+def read_as_told(model: DriveModel, folder: Path, run: Recording,
                  ) -> tuple[str, tuple[Defect, ...]]:
     """Return the line that is told, and what is told of the recording once it is written."""
     readings = [one for one in find_mistakes(model, run) if isinstance(one, OtherReading)]
@@ -303,7 +300,7 @@ def read_as_told(model: MechanismModel, folder: Path, run: Recording,
     write_recording(folder / 'run.csv', run)
     path = folder / 'corrected.yaml'
     path.write_text((folder / 'arm.yaml').read_text() + f'    {line}\n')
-    corrected = load_model(path)
+    corrected = DriveModel.load(path)
     return line, find_mistakes(corrected, read_recording(folder / 'run.csv', corrected.recorded))
 
 
@@ -317,7 +314,7 @@ ARM_MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
 @pytest.mark.parametrize('mistake', ARM_MISTAKES)
 def test_the_line_that_is_told_mends_a_recording_of_an_arm(mistake: str, tmp_path: Path) -> None:
     """The model has no friction, of which most of these efforts are."""
-    model = MechanismModel.load(arm.write_arm(tmp_path))
+    model = DriveModel.load(arm.write_arm(tmp_path))
     change, entry = ARM_MISTAKES[mistake]
     line, left = read_as_told(model, tmp_path, arm_recording(model, **change))
     assert entry in line
@@ -329,7 +326,7 @@ def test_efforts_in_percent_of_the_largest_are_told(tmp_path: Path) -> None:
     text = arm.urdf()
     for limit in largest:
         text = text.replace('effort="200"', f'effort="{limit:g}"', 1)
-    model = MechanismModel.load(arm.write_arm(tmp_path, text))
+    model = DriveModel.load(arm.write_arm(tmp_path, text))
     run = arm_recording(model, effort=(100 / largest).tolist())
     (finding,) = find_mistakes(model, run)
     assert "percent of the drives' largest" in finding.what
@@ -351,7 +348,7 @@ def test_beside_columns_the_line_that_is_told_is_added_to_theirs(
                             for joint, one in columns.items()})
         path.write_text(f'{plain}    columns: {block}\n')
 
-    write_recording(tmp_path / 'run.csv', arm_recording(MechanismModel.load(path), effort=-1.0))
+    write_recording(tmp_path / 'run.csv', arm_recording(DriveModel.load(path), effort=-1.0))
     with_columns({})
     assert main(['info', str(tmp_path / 'run.csv'), '--model', str(path)]) == 0
     told = ' '.join(capsys.readouterr().out.split())
@@ -369,7 +366,7 @@ def test_a_joint_that_stands_is_no_reason_to_doubt_a_unit(tmp_path: Path) -> Non
         effort[:, 1] += 40.0
         return a[0], position, velocity, effort
 
-    model = MechanismModel.load(arm.write_arm(tmp_path))
+    model = DriveModel.load(arm.write_arm(tmp_path))
     assert [one for one in find_mistakes(model, arm_recording(model, changes=standing))
             if isinstance(one, OtherReading)] == []
 

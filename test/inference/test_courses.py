@@ -19,7 +19,6 @@ from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.model_file import build_model
 
 MODEL = DriveModel.load()
 TIME = np.arange(6000) * 0.002
@@ -40,7 +39,7 @@ def diagnosed(effort: np.ndarray, position: np.ndarray | None = None) -> Diagnos
 
 
 def loaded(mass: float) -> np.ndarray:
-    heavier = build_model({**MODEL.values, 'effects.active': ['payload_mass'],
+    heavier = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['payload_mass'],
                            'effects.payload_mass.mass': mass})
     return heavier.drive_forces(MOTION).total
 

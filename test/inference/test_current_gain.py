@@ -10,12 +10,11 @@ import pytest
 from made_up_arm import motion, real_arm
 from numpy.testing import assert_allclose
 
-from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.inference.regression.design import Design, searched_in_drives
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.current_gain import CurrentGain
-from pprs_dynamics.physics.model.model_file import build_model
 
 JOINT = 1
 VALUES = {'temperature': 0.002, 'ripple': 0.05, 'phase': 0.3, 'reference': 30.0, 'pitch': 0.2}
@@ -27,10 +26,9 @@ def arm(tmp_path_factory):
 
 
 def with_gain(arm, **values):
-    found = build_model({**arm.values, 'effects.active': ['current_gain'], **{
+    found = DriveModel.from_parameters({**arm.values, 'effects.active': ['current_gain'], **{
         f'effects.current_gain.swing.{key}': value for key, value in {**VALUES, **values}.items()}},
         arm.source)
-    assert isinstance(found, MechanismModel)
     return found
 
 
@@ -76,7 +74,7 @@ def test_other_columns_are_seen_through_the_gain_that_the_model_has(arm):
     run = recorded(arm, arm)
     more = {'effects.active': ['current_gain', 'coulomb_friction'],
             'effects.coulomb_friction.swing.force': 2.0}
-    changed = build_model({**model.values, **more}, model.source)
+    changed = DriveModel.from_parameters({**model.values, **more}, model.source)
     before, after = (Design.of(one, [run]) for one in (model, changed))
     rows = before.drive_rows(CoulombFriction, JOINT, {})
     assert_allclose(after.forces[:, JOINT] - before.forces[:, JOINT], 2.0 * rows[0], atol=1e-9)

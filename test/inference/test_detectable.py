@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from single_axis import AXIS, axis_values
 
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.sentences import detectable_rows, word_detectable
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.model.robot_block import AXIS
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MASS, VISCOUS, COULOMB, WIDTH = 20.0, 40.0, 6.0, 0.001
 NOISE = 0.3  # [N]
@@ -28,8 +28,8 @@ LAWS = {'coulomb_friction': np.tanh(Q_DOT / WIDTH), 'viscous_friction': Q_DOT,
 
 
 def told(seed: int, more: np.ndarray | float = 0.0) -> Diagnosis:
-    model = build_model({'axis.mass': MASS, 'axis.viscous': VISCOUS, 'axis.coulomb': COULOMB,
-                         'axis.offset': 0.0, 'friction.reversal_velocity': WIDTH})
+    model = DriveModel.from_parameters(
+        axis_values(MASS, VISCOUS, COULOMB, width=WIDTH))
     force = (MASS * Q_DDOT + VISCOUS * Q_DOT + COULOMB * np.tanh(Q_DOT / WIDTH) + more
              + NOISE * np.random.default_rng(seed).standard_normal(len(TIME)))
     return diagnose(model, [Recording.from_arrays('run', TIME, Q[:, None], None, force[:, None],

@@ -34,7 +34,6 @@ from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
-from pprs_dynamics.physics.model.model_file import build_model
 
 MODEL = DriveModel.load()
 TOLERANCES = {'tolerances.masses.payload': 0.05, 'tolerances.masses.slides': 0.05,
@@ -43,7 +42,7 @@ TOLERANCES = {'tolerances.masses.payload': 0.05, 'tolerances.masses.slides': 0.0
 
 @pytest.fixture(scope='module')
 def design() -> Design:
-    return Design.of(build_model({**MODEL.values, **TOLERANCES}), [record(MODEL)])
+    return Design.of(DriveModel.from_parameters({**MODEL.values, **TOLERANCES}), [record(MODEL)])
 
 
 @pytest.fixture(scope='module')
@@ -55,7 +54,7 @@ def components(design: Design) -> Components:
 def change(design: Design, effect: str, values: dict[str, float], drive: str = '') -> np.ndarray:
     """Return what an effect changes in the model's treated effort on the same recording."""
     prefix = f'effects.{effect}.{drive}.' if drive else f'effects.{effect}.'
-    model = build_model({**MODEL.values, 'effects.active': [effect],
+    model = DriveModel.from_parameters({**MODEL.values, 'effects.active': [effect],
                          **{prefix + key: value for key, value in values.items()}})
     with_it, _ = measure_residuals(model, [record(MODEL)])
     return with_it.model - design.residuals.model
@@ -144,7 +143,8 @@ def test_numbers_within_tolerances_move_the_prediction_as_the_model_does(design:
         value = MODEL.values[key]
         moved = (value + number.deviation if element is None else tuple(
             one + number.deviation * (k == element) for k, one in enumerate(value)))
-        with_it, _ = measure_residuals(build_model({**MODEL.values, key: moved}), [record(MODEL)])
+        with_it, _ = measure_residuals(DriveModel.from_parameters(
+            {**MODEL.values, key: moved}), [record(MODEL)])
         expected = with_it.model - design.residuals.model
         for d in range(6):
             np.testing.assert_allclose(found[label].rows.get(d, np.zeros(len(expected))),
@@ -152,7 +152,8 @@ def test_numbers_within_tolerances_move_the_prediction_as_the_model_does(design:
 
 
 def test_the_catalogues_own_form_is_found_with_its_values_and_to_the_noise() -> None:
-    true = build_model({**MODEL.values, 'effects.active': ['stribeck_friction', 'payload_mass'],
+    true = DriveModel.from_parameters(
+        {**MODEL.values, 'effects.active': ['stribeck_friction', 'payload_mass'],
                         'effects.stribeck_friction.lift_1.force': 0.6,
                         'effects.stribeck_friction.lift_1.velocity': 0.02,
                         'effects.payload_mass.mass': 0.25})
@@ -177,7 +178,7 @@ def test_what_another_recording_refutes_is_unknown_and_not_adequate() -> None:
     """Friction that one recording shows, and the other does not: no model, and no noise."""
     values = {**MODEL.values, 'effects.active': ['coulomb_friction'],
               'effects.coulomb_friction.slide_1.force': 1.0}
-    found = diagnose(MODEL, [record(build_model(values), noise=0.05)],
+    found = diagnose(MODEL, [record(DriveModel.from_parameters(values), noise=0.05)],
                      [record(MODEL, noise=0.05, seed=1)])
     assert not found.effects
     assert [one.name for one in found.unconfirmed] == ['coulomb_friction']
@@ -191,7 +192,7 @@ WRENCH = {'force_x': 0.66, 'force_y': 0.78, 'force_z': 0.1,
 
 
 def test_a_tilted_base_is_no_friction_on_drives_that_stand() -> None:
-    true = build_model({**MODEL.values, 'effects.active': ['base_tilt'],
+    true = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['base_tilt'],
                         'effects.base_tilt.x': 0.045, 'effects.base_tilt.y': -0.048})
     family = FourierPath.at_rest(TIME[-1], np.tile((1, 2, 3), (6, 1)), HOME)
     up_and_down = np.zeros((6, family.size // 6))
@@ -206,7 +207,7 @@ def test_a_tilted_base_is_no_friction_on_drives_that_stand() -> None:
 
 
 def test_a_wrench_is_found_with_its_moments_and_no_offsets() -> None:
-    true = build_model({**MODEL.values, 'effects.active': ['external_wrench'], **{
+    true = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['external_wrench'], **{
         f'effects.external_wrench.{key}': value for key, value in WRENCH.items()}})
     found = diagnose(MODEL, [record(true, 0.08)])
     assert [one.name for one in found.effects] == ['external_wrench']
@@ -216,7 +217,7 @@ def test_a_wrench_is_found_with_its_moments_and_no_offsets() -> None:
 
 
 def test_offsets_on_all_drives_are_offsets_and_no_springs() -> None:
-    true = build_model({**MODEL.values, 'effects.active': ['effort_offset'], **{
+    true = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['effort_offset'], **{
         f'effects.effort_offset.{key}.force': value for key, value in OFFSETS.items()}})
     found = diagnose(MODEL, [record(true, 0.08)])
     assert [one.name for one in found.effects] == ['effort_offset']
@@ -224,7 +225,8 @@ def test_offsets_on_all_drives_are_offsets_and_no_springs() -> None:
 
 
 def test_a_constant_beside_friction_is_no_noise() -> None:
-    true = build_model({**MODEL.values, 'effects.active': ['stribeck_friction', 'payload_mass'],
+    true = DriveModel.from_parameters(
+        {**MODEL.values, 'effects.active': ['stribeck_friction', 'payload_mass'],
                         'effects.payload_mass.mass': 0.11, **{
                             f'effects.stribeck_friction.{d}.{key}': value for d in DRIVES
                             for key, value in (('force', 0.8), ('velocity', 0.02))}})
@@ -234,7 +236,7 @@ def test_a_constant_beside_friction_is_no_noise() -> None:
 
 
 def test_the_page_is_told_the_runner_up_and_evidence_is_the_difference_of_costs() -> None:
-    true = build_model({**MODEL.values, 'effects.active': ['payload_mass'],
+    true = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['payload_mass'],
                         'effects.payload_mass.mass': 0.2})
     found = diagnose(MODEL, [record(true, 0.08)])
     assert found.sets[0].cost == 0
@@ -257,7 +259,7 @@ def test_the_page_is_told_the_runner_up_and_evidence_is_the_difference_of_costs(
 
 def test_friction_fades_from_the_start_of_the_recording_not_of_what_is_kept() -> None:
     tau, force = 1.0, 1.5
-    true = build_model({**MODEL.values, 'effects.active': ['friction_drift'], **{
+    true = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['friction_drift'], **{
         f'effects.friction_drift.{d}.{key}': value for d in DRIVES
         for key, value in (('force', force), ('time', tau))}})
     recording = record(true)
@@ -366,9 +368,10 @@ def test_what_no_effect_explains_is_told_with_its_variable(name: str, variable: 
                                                ('time_delay.slide_3.delay', 0.006)])
 def test_the_width_of_reversals_is_that_behind_the_sensor(sensor: str, value: float) -> None:
     """Friction as the sensor shows it would be told as one that turns over elsewhere."""
-    model = build_model({**MODEL.values, 'effects.active': [sensor.partition('.')[0]],
+    model = DriveModel.from_parameters(
+        {**MODEL.values, 'effects.active': [sensor.partition('.')[0]],
                          f'effects.{sensor}': value})
-    true = build_model({**model.values, 'friction.reversal_velocities':
+    true = DriveModel.from_parameters({**model.values, 'friction.reversal_velocities':
                         (0.0, 0.0, 0.004, 0.0, 0.0, 0.0)})
     fits = FittedSets(Design.of(model, [record(true, noise=0.02)]), DECISIONS)
     assert estimate_widths(fits, fits.evaluate(())) == {2: pytest.approx(0.004, rel=0.02)}
@@ -376,7 +379,7 @@ def test_the_width_of_reversals_is_that_behind_the_sensor(sensor: str, value: fl
 
 def test_the_width_of_reversals_is_that_of_all_friction_on_a_drive() -> None:
     effect = 'effects.stribeck_friction.slide_1.'
-    true = build_model({
+    true = DriveModel.from_parameters({
         **MODEL.values, 'friction.reversal_velocities': (0.0015, 0.0, 0.0, 0.0, 0.0, 0.0),
         'effects.active': ['stribeck_friction'],
         effect + 'force': 0.8, effect + 'velocity': 0.02, effect + 'exponent': 2.0})
@@ -397,7 +400,8 @@ def test_the_width_of_reversals_is_that_of_all_friction_on_a_drive() -> None:
 
 @pytest.mark.filterwarnings('error')
 def test_a_drive_that_was_never_measured_takes_no_part_behind_a_delay_either() -> None:
-    late = build_model({**MODEL.values, 'effects.active': ['time_delay', 'viscous_friction'],
+    late = DriveModel.from_parameters(
+        {**MODEL.values, 'effects.active': ['time_delay', 'viscous_friction'],
                         **{f'effects.time_delay.{drive}.delay': 0.008 for drive in DRIVES},
                         'effects.viscous_friction.slide_2.coefficient': 12.0})
     recording = record(late, 0.05)

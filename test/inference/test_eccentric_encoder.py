@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pprs_dynamics import DriveModel, MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.eccentric_encoder import EccentricEncoder
-from pprs_dynamics.physics.model.model_file import build_model
 
 JOINT = 1
 GEAR = 20.0
@@ -31,9 +30,8 @@ def arm(tmp_path_factory):
 
 
 def with_effect(arm, name, **values):
-    found = build_model({**arm.values, 'effects.active': [name], **{
+    found = DriveModel.from_parameters({**arm.values, 'effects.active': [name], **{
         f'effects.{name}.swing.{key}': value for key, value in values.items()}}, arm.source)
-    assert isinstance(found, MechanismModel)
     return found
 
 
@@ -138,7 +136,8 @@ def test_a_slide_without_a_lead_and_a_3_pprs_do_not_have_it(arm):
     design = Design.of(arm, [recorded(arm)])
     assert [design.acts_on(EccentricEncoder, d) for d in range(3)] == [True, True, False]
     with pytest.raises(ModelError, match='eccentric_encoder'):
-        build_model({**DriveModel.load().values, 'effects.active': ['eccentric_encoder'],
+        DriveModel.from_parameters(
+            {**DriveModel.load().values, 'effects.active': ['eccentric_encoder'],
                      'effects.eccentric_encoder.lift_1.amplitude': 1e-4,
                      'effects.eccentric_encoder.lift_1.phase': 0.0,
                      'effects.eccentric_encoder.lift_1.pitch': 0.005})

@@ -30,7 +30,6 @@ from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.ledger import without_last_step
-from pprs_dynamics.physics.model.model_file import build_model, load_model
 from pprs_dynamics.physics.model.model_writer import write_model
 
 MODEL = DriveModel.load()
@@ -60,7 +59,6 @@ WRONG: dict[str, tuple[Effects, Effects]] = {
 def booked(adoption: object, recording: Recording) -> DriveModel:
     entry = RecordingEntry.of(recording)
     model = LedgerBook((entry,), ()).entered(adoption)  # type: ignore[arg-type]
-    assert isinstance(model, DriveModel)
     return model
 
 
@@ -132,10 +130,10 @@ def test_what_adopt_wrote_holds_on_the_same_and_on_other_recordings(
     # How well it is known stands in the file, and in that of before there was a place for it.
     path = tmp_path / 'better.yaml'
     write_model(path, model.values)
-    read = load_model(path)
+    read = DriveModel.load(path)
     for key in truth:
         assert 0 < read.values[f'uncertainties.{name}.{key}'] < 0.1 * truth[key]
-    old = build_model({key: value for key, value in read.values.items()
+    old = DriveModel.from_parameters({key: value for key, value in read.values.items()
                        if not key.startswith('uncertainties.')})
     other = record(with_effects(MODEL, true), NOISE, seed=1, motion=Excitation(seed=3))
     for given in (read, old):
@@ -192,7 +190,8 @@ def test_an_effect_of_the_model_that_holds_is_not_set_anew() -> None:
     ('uncertainties.payload_mass.mass', np.nan, 'standard deviation')])
 def test_an_uncertainty_of_nothing_is_refused(key: str, value: float, rule: str) -> None:
     with pytest.raises(ModelError, match=rule):
-        build_model({**with_effects(MODEL, {'payload_mass': {'mass': 0.3}}).values, key: value})
+        DriveModel.from_parameters(
+            {**with_effects(MODEL, {'payload_mass': {'mass': 0.3}}).values, key: value})
 
 
 @pytest.mark.parametrize('options', [AUTO, 'payload_mass,stribeck_friction'])

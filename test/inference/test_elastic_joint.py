@@ -18,14 +18,13 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 SWING, NOISE = 1, 0.02  # [N m]
 COMPLIANCE, LOSS = 1.5e-3, 0.02  # [rad/(N m)], [s]
 
 
-def wound_up(model: MechanismModel, compliance: float, loss: float = 0.0, second: bool = True,
+def wound_up(model: DriveModel, compliance: float, loss: float = 0.0, second: bool = True,
              shift: float = 0.0) -> Recording:
     """Record a motor that leads a link which moves smoothly, and the link.
 
@@ -60,15 +59,14 @@ def wound_up(model: MechanismModel, compliance: float, loss: float = 0.0, second
         'link_position': read(moved.position + 0.01)} if second else {})
 
 
-def with_elastic(model: MechanismModel, compliance: float, loss: float) -> MechanismModel:
-    found = build_model({**model.values, 'effects.active': ['elastic_joint'],
+def with_elastic(model: DriveModel, compliance: float, loss: float) -> DriveModel:
+    found = DriveModel.from_parameters({**model.values, 'effects.active': ['elastic_joint'],
                          'effects.elastic_joint.swing.compliance': compliance,
                          'effects.elastic_joint.swing.loss': loss}, model.source)
-    assert isinstance(found, MechanismModel)
     return found
 
 
-def left(model: MechanismModel, recording: Recording) -> float:
+def left(model: DriveModel, recording: Recording) -> float:
     found = reconstruct(model, recording)
     error = found.treat(found.effort) - treated_forces(model, found)['total']
     return float(error[:, SWING].std())

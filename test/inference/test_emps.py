@@ -20,7 +20,7 @@ from benchmarks.real import emps_files as emps
 from benchmarks.real.recorded_data import find_data, missing
 from pprs_dynamics.inference.adoption.loop import adopt_all
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 DATA = find_data('emps', emps.IDENTIFICATION)
 pytestmark = pytest.mark.skipif(DATA is None, reason=missing('emps'))
@@ -81,7 +81,7 @@ def test_pulses_are_no_part_of_the_force() -> None:
 def test_the_loop_lowers_the_error_on_a_run_that_it_never_saw() -> None:
     assert DATA is not None
     run, pulses = (emps.read_emps(DATA / name) for name in (emps.IDENTIFICATION, emps.PULSES))
-    model = load_model(MODEL)
+    model = DriveModel.load(MODEL)
     diagnosis = diagnose(model, [run])
     # Of all candidates the published effect lowers the error by far the most, from 4.1 to 3.1 %.
     assert min(diagnosis.candidates, key=lambda one: one.error_after).name == 'asymmetric_friction'

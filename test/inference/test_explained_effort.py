@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from made_up_arm import JOINTS, motion, real_arm, record, write_arm
 
-from pprs_dynamics import MechanismModel, build_model, compare, diagnose, fit
+from pprs_dynamics import DriveModel, compare, diagnose, fit
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, first_step
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -23,7 +23,7 @@ from pprs_dynamics.physics.model.reference_keys import ReferenceFile, with_refer
 UNRELATED = 12.0  # [N m] of an effort that is no force of this machine
 
 
-def unrelated(model: MechanismModel, seed: int = 5) -> Recording:
+def unrelated(model: DriveModel, seed: int = 5) -> Recording:
     """Return a recording whose first effort follows nothing that the drives do."""
     made = record(model, motion())
     rng = np.random.default_rng(seed)
@@ -71,7 +71,7 @@ def test_diagnose_calls_no_model_adequate_that_explains_little(tmp_path: Path) -
 
 def test_a_description_alone_is_fitted_first_and_explains_then(tmp_path: Path) -> None:
     real = real_arm(tmp_path)
-    bare = MechanismModel.load(write_arm(tmp_path))
+    bare = DriveModel.load(write_arm(tmp_path))
     made = record(real, motion())
     before = compare(bare, made)
     assert before.comparison.little
@@ -109,10 +109,9 @@ def test_a_drive_that_stands_or_whose_effort_is_noise_has_nothing_to_explain(
 
 
 def test_after_a_fit_the_next_step_is_not_the_fit_again(tmp_path: Path) -> None:
-    bare = MechanismModel.load(write_arm(tmp_path))
+    bare = DriveModel.load(write_arm(tmp_path))
     assert first_step(bare, GivenFiles())[1].startswith('pprs fit')
-    fitted = build_model(with_reference(bare.values, [ReferenceFile(tmp_path / 'run.csv', 'x')]),
+    fitted = DriveModel.from_parameters(
+        with_reference(bare.values, [ReferenceFile(tmp_path / 'run.csv', 'x')]),
                          bare.source)
-    words, command = first_step(fitted, GivenFiles())
-    assert 'the model was fitted' in words
-    assert command.startswith('pprs info')
+    assert first_step(fitted, GivenFiles())[1].startswith('pprs info')

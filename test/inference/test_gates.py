@@ -20,13 +20,12 @@ from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
 from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import Decisions
-from pprs_dynamics.inference.search.form_error import FormErrors
+from pprs_dynamics.inference.search.form_error import SHAPES, FormErrors
 from pprs_dynamics.inference.search.held_out import BLOCKS, PredictiveGain, predictive_gain
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.physics.model.model_file import build_model
 
 PLAIN = DriveModel.load()
-FRICTION = build_model({**PLAIN.values, 'effects.active': ['coulomb_friction'],
+FRICTION = DriveModel.from_parameters({**PLAIN.values, 'effects.active': ['coulomb_friction'],
                         'effects.coulomb_friction.lift_2.force': -1.0})
 
 
@@ -203,7 +202,7 @@ def set_of(**columns: tuple[str, float, float]) -> Any:
                                if candidate is one])
 
 
-DECIDED = Decisions(form_share=0.1, exact_share=0.02)
+DECIDED = Decisions(form_share=0.1 * SHAPES ** 0.5, exact_share=0.02)
 
 
 def share(found: Any, which: int, parts: dict[str, np.ndarray] | None = None,

@@ -11,8 +11,9 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 from shared_cases import shared_case
+from single_axis import axis_motion
 
-from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, next_step
@@ -23,25 +24,16 @@ from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
-from pprs_dynamics.physics.model.model_file import build_model
 
-MODEL = MechanismModel.load('config/single_axis.yaml')
-MASS, VISCOUS, COULOMB = (MODEL.values[f'axis.{key}'] for key in ('mass', 'viscous', 'coulomb'))
+MODEL = DriveModel.load('config/single_axis.yaml')
+OWN = 'links.mass', 'friction.viscous', 'friction.coulomb'
+MASS, VISCOUS, COULOMB = (MODEL.values[key][0] for key in OWN)
 TIME = np.arange(0, 20, 0.005)
-
-
-def motion() -> JointMotion:
-    q = np.zeros((3, len(TIME), 1))
-    for rate, size in ((0.2, 0.1), (0.5, 0.05), (1.3, 0.01)):
-        w = 2 * np.pi * rate
-        q[:, :, 0] += size * np.array([np.sin(w * TIME), w * np.cos(w * TIME),
-                                       -w * w * np.sin(w * TIME)])
-    return JointMotion(*q, TIME)
 
 
 def recorded(effort: Array) -> Recording:
     random = np.random.default_rng(5)
-    return Recording.from_arrays('run', TIME, motion().position, None,
+    return Recording.from_arrays('run', TIME, axis_motion(TIME).position, None,
                                  effort + random.normal(0, 1.0, effort.shape), ('axis',))
 
 
@@ -56,12 +48,13 @@ TAKEN: list[tuple[str, tuple[str, ...], Array]] = [
 def test_no_more_is_taken_away_than_there_is(name: str, names: tuple[str, ...], own: Array,
                                              share: float) -> None:
     """What would leave less than nothing is held at nothing, at a cost."""
-    columns = {'drive_inertia': motion().acceleration, 'viscous_friction': motion().velocity,
-               'coulomb_friction': np.sign(motion().velocity)}[name]
-    recording = recorded(MODEL.drive_forces(motion()).total + share * own * columns)
+    moved = axis_motion(TIME)
+    columns = {'drive_inertia': moved.acceleration, 'viscous_friction': moved.velocity,
+               'coulomb_friction': np.sign(moved.velocity)}[name]
+    recording = recorded(MODEL.drive_forces(moved).total + share * own * columns)
     # The model's own numbers are known, so that what is missing is the effect's alone.
-    exact = build_model({**MODEL.values, **dict.fromkeys(
-        (f'tolerances.axis.{key}' for key in ('mass', 'viscous', 'coulomb')), 1e-6)})
+    exact = DriveModel.from_parameters({**MODEL.values, **dict.fromkeys(
+        (f'tolerances.{key}' for key in OWN), 1e-6)})
     fits = FittedSets(Design.of(exact, [recording]), DECISIONS)
     component = Component.of(catalogue()[name], 0, {}, names)
     found = fits.evaluate((EffectCandidate.of([component]),))
@@ -76,8 +69,8 @@ def test_no_more_is_taken_away_than_there_is(name: str, names: tuple[str, ...], 
 
 def test_what_can_only_be_nothing_does_not_void_what_is_there() -> None:
     """One direction may have less than nothing by chance; the other is told all the same."""
-    bare = build_model({**MODEL.values, 'axis.coulomb': 0.0})
-    moved = motion()
+    bare = DriveModel.from_parameters({**MODEL.values, 'friction.coulomb': [0.0]})
+    moved = axis_motion(TIME)
     forward = (1 + np.sign(moved.velocity)) / 2
     effort = bare.drive_forces(moved).total + COULOMB * forward + 0.1 * COULOMB * (1 - forward)
     fits = FittedSets(Design.of(bare, [recorded(effort)]), DECISIONS)
@@ -92,7 +85,7 @@ def test_what_can_only_be_nothing_does_not_void_what_is_there() -> None:
 
 def test_a_ripple_longer_than_the_stroke_is_no_free_curve() -> None:
     """Amplitudes a thousand times the error could cancel within the stroke to any curve."""
-    moved = motion()
+    moved = axis_motion(TIME)
     curve = 60 * moved.position + 2e4 * moved.position ** 3
     fits = FittedSets(Design.of(MODEL, [recorded(MODEL.drive_forces(moved).total + curve)]),
                       DECISIONS)
@@ -116,12 +109,12 @@ def test_a_ripple_longer_than_the_stroke_is_no_free_curve() -> None:
 
 def test_no_gain_beyond_what_a_drive_may_have_is_reported() -> None:
     """Mass and friction that all are too small explain as well what a gain of 1.9 would."""
-    loose = build_model({**MODEL.values, 'tolerances.effort_gain.gain': 1.0})
-    found = diagnose(loose, [recorded(1.9 * MODEL.drive_forces(motion()).total)])
+    loose = DriveModel.from_parameters({**MODEL.values, 'tolerances.effort_gain.gain': 1.0})
+    found = diagnose(loose, [recorded(1.9 * MODEL.drive_forces(axis_motion(TIME)).total)])
     assert found.effects
     assert not [one for one in found.effects if one.name == 'effort_gain']
     fits = FittedSets(Design.of(loose, [recorded(
-        1.9 * MODEL.drive_forces(motion()).total)]), DECISIONS)
+        1.9 * MODEL.drive_forces(axis_motion(TIME)).total)]), DECISIONS)
     component = Component.of(catalogue()['effort_gain'], 0, {}, ('gain',))
     alone = fits.evaluate((EffectCandidate.of([component]),))
     assert alone.coefficients(component) == pytest.approx([0.5])
@@ -144,15 +137,15 @@ def test_a_late_effort_is_found_without_an_impossible_gain() -> None:
 
 
 def test_a_gain_that_a_drive_may_have_is_one() -> None:
-    found = diagnose(MODEL, [recorded(1.2 * MODEL.drive_forces(motion()).total)])
+    found = diagnose(MODEL, [recorded(1.2 * MODEL.drive_forces(axis_motion(TIME)).total)])
     assert [one.name for one in found.effects] == ['effort_gain']
     assert found.effects[0].parameters['axis.gain'].value == pytest.approx(0.2, abs=0.02)
 
 
 def test_less_inertia_than_none_is_no_effect() -> None:
     """Efforts that decelerate where they should accelerate, with the friction that there is."""
-    moved = motion()
-    light = build_model({**MODEL.values, 'axis.mass': 1e-6})
+    moved = axis_motion(TIME)
+    light = DriveModel.from_parameters({**MODEL.values, 'links.mass': [1e-6]})
     effort = light.drive_forces(moved).total - 0.3 * MASS * moved.acceleration
     found = diagnose(MODEL, [recorded(effort)], as_it_is=True)
     assert found.verdict != 'effect'
@@ -165,7 +158,7 @@ def test_an_answer_with_which_the_error_rises_is_none(tmp_path: Path, seed: int)
     real = arm.real_arm(tmp_path)
     run = arm.record(real, arm.motion(12.0, seed=seed), 0.2, seed)
     radians = np.array([np.pi / 180, np.pi / 180, 1.0])
-    found = diagnose(MechanismModel.load(tmp_path / 'arm.yaml'), [Recording.from_arrays(
+    found = diagnose(DriveModel.load(tmp_path / 'arm.yaml'), [Recording.from_arrays(
         'run', run.time, run.position * radians, None, run.effort, run.drives)], as_it_is=True)
     if found.effects:
         assert root_mean_square(found.remaining) < root_mean_square(found.residuals.error)

@@ -12,21 +12,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from planar_arm import planar_arm
+from single_axis import AXIS, axis_values
 
-from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.inference.adoption.loop import adopt_all
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.model_file import build_model, load_model
-from pprs_dynamics.physics.model.robot_block import AXIS
 
 RATE, DURATION = 200.0, 8.0  # [Hz, s]
 NOISE = 0.1  # [N]
 LATER = 4321.0  # [s] on the recording's clock
 # In units of effort: all of them are multiplied where the unit of effort is another.
-EFFORTS = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0}
-OTHERS = {'friction.reversal_velocity': 0.001}
+EFFORTS = 20.0, 40.0, 6.0, -2.0
 HIDDEN = {
     'nothing': {}, 'coulomb_friction': {'force': 1.2}, 'viscous_friction': {'coefficient': 12.0},
     'drive_spring': {'stiffness': 60.0, 'position': 0.02}, 'drive_inertia': {'mass': 2.0},
@@ -34,19 +32,16 @@ HIDDEN = {
 EFFECTS = [name for name in HIDDEN if name != 'nothing']
 
 
-def axis_model(scale: float = 1.0) -> MechanismModel:
-    model = build_model({**OTHERS, **{key: scale * one for key, one in EFFORTS.items()}})
-    assert isinstance(model, MechanismModel)
-    return model
+def axis_model(scale: float = 1.0) -> DriveModel:
+    return DriveModel.from_parameters(axis_values(*(scale * one for one in EFFORTS)))
 
 
 @cache
 def recorded(name: str, seed: int) -> Recording:
     """Return a recording of an axis with an effect, which differs by motion and noise."""
     effect = {f'effects.{name}.{AXIS}.{key}': one for key, one in HIDDEN[name].items()}
-    model = build_model({**EFFORTS, **OTHERS, **effect,
+    model = DriveModel.from_parameters({**axis_values(*EFFORTS), **effect,
                          'effects.active': [name] if effect else []})
-    assert isinstance(model, MechanismModel)
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, DURATION, 1 / RATE)
     omega = 2 * np.pi * np.array([0.25, 0.5, 1.0])[:, None]
@@ -126,8 +121,8 @@ def test_the_answer_does_not_depend_on_the_order_of_drives(tmp_path: Path, name:
     """One arm and one recording, whose drives are listed from the base and from the tool."""
     planar_arm(tmp_path, 2)
     path = tmp_path / 'arm.yaml'
-    model = load_model(path)
-    hidden = build_model({**model.values, 'effects.active': [name], **{
+    model = DriveModel.load(path)
+    hidden = DriveModel.from_parameters({**model.values, 'effects.active': [name], **{
         f'effects.{name}.j2.{key}': one for key, one in HIDDEN[name].items()}}, model.source)
     time = np.arange(0.0, DURATION, 1 / RATE)
     size, omega = np.array([0.6, 0.8]), 2 * np.pi * np.array([0.5, 0.75])
@@ -140,7 +135,7 @@ def test_the_answer_does_not_depend_on_the_order_of_drives(tmp_path: Path, name:
     for order in ([0, 1], [1, 0]):
         drives = tuple(('j1', 'j2')[k] for k in order)
         path.write_text(path.read_text().replace('[j1, j2]', f'[{", ".join(drives)}]'))
-        found.append(diagnose(load_model(path), [Recording.from_arrays(
+        found.append(diagnose(DriveModel.load(path), [Recording.from_arrays(
             'run', time, moved.position[:, order], None, effort[:, order], drives)]))
     assert answer(found[0]) == answer(found[1])
     assert (name, ('j2',)) in answer(found[0])[1]

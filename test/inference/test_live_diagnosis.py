@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from single_axis import AXIS
 
-from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.live_diagnosis import (
@@ -20,8 +21,6 @@ from pprs_dynamics.inference.diagnosis.live_diagnosis import (
 )
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
-from pprs_dynamics.physics.model.model_file import build_model, load_model
-from pprs_dynamics.physics.model.robot_block import AXIS
 
 RATE, LENGTH = 100.0, 20.0  # [Hz, s]
 SPRING = 300.0  # [N/m] that the model lacks
@@ -29,7 +28,7 @@ NOISE = 1.0  # [N]
 SOONER = 8.0  # [s] within the second window
 
 
-def window(model: MechanismModel, worn: MechanismModel, number: int, begins: float = 0.0,
+def window(model: DriveModel, worn: DriveModel, number: int, begins: float = 0.0,
            ) -> Recording:
     """Return efforts of one axis before a moment [s] and of a worn one after it."""
     time = np.arange(0, LENGTH, 1 / RATE)
@@ -46,9 +45,9 @@ def window(model: MechanismModel, worn: MechanismModel, number: int, begins: flo
                                  effort=effort + noise, drives=(AXIS,))
 
 
-def axis(**values: Any) -> MechanismModel:
-    model = build_model({**load_model('config/single_axis.yaml').values, **values})
-    assert isinstance(model, MechanismModel)
+def axis(**values: Any) -> DriveModel:
+    model = DriveModel.from_parameters(
+        {**DriveModel.load('config/single_axis.yaml').values, **values})
     return model
 
 
@@ -71,7 +70,7 @@ def test_a_change_is_claimed_on_the_second_window_that_shows_it_and_withdrawn_af
     found = live.claimed[0].found.parameters['axis.stiffness']
     assert abs(found.value - SPRING) < 4 * found.std + 0.01 * SPRING
     assert live.to_dict()['confirmed'] is True
-    adopted = build_model(live.adopted(), model.source)
+    adopted = DriveModel.from_parameters(live.adopted(), model.source)
     assert adopted.values['effects.drive_spring.axis.stiffness'] == found.value
     beside = replace(live, effects=(*live.effects, replace(live.claimed[0], confirmed=False)))
     assert beside.adopted() == {}  # the numbers were fitted together
@@ -82,9 +81,9 @@ def test_a_change_is_claimed_on_the_second_window_that_shows_it_and_withdrawn_af
 
 def test_what_numbers_within_their_tolerance_explain_keeps_no_effect_alive() -> None:
     """The fit moves a mass that is known to 5 % only, which helps in every window."""
-    mass = axis().values['axis.mass']
-    model, robot = axis(**{'tolerances.axis.mass': 0.05}), axis(**{'axis.mass': 1.04 * mass})
-    pushed = axis(**{'axis.mass': 1.04 * mass, 'effects.active': ['drive_spring'],
+    mass = axis().values['links.mass'][0]
+    model, robot = axis(**{'tolerances.links.mass': 0.05}), axis(**{'links.mass': [1.04 * mass]})
+    pushed = axis(**{'links.mass': [1.04 * mass], 'effects.active': ['drive_spring'],
                      'effects.drive_spring.axis.stiffness': SPRING,
                      'effects.drive_spring.axis.position': 0.01})
     live = LiveDiagnosis(model)

@@ -10,14 +10,13 @@ from pathlib import Path
 import made_up_arm
 import numpy as np
 import pytest
+from single_axis import axis_values
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.model.parameter_file import parse_parameters
 
 TIME = np.arange(0, 30, 0.01)
 MASS, GRAVITY = 20.0, -9.81
@@ -52,13 +51,9 @@ def test_losses_that_are_alike_in_both_quadrants_are_friction_by_load(tmp_path: 
     assert [one.name for one in found.effects] == ['load_friction']
 
 
-def axis() -> MechanismModel:
+def axis() -> DriveModel:
     """Return a vertical axis of a screw."""
-    text = ('/**:\n  ros__parameters:\n    axis: {mass: 20.0, viscous: 100.0, coulomb: 20.0, '
-            'offset: 0.0, gravity: -9.81}\n    friction: {reversal_velocity: 0.001}\n')
-    model = build_model(parse_parameters(text))
-    assert isinstance(model, MechanismModel)
-    return model
+    return DriveModel.from_parameters(axis_values(20.0, 100.0, 20.0, gravity=-9.81))
 
 
 def lifting(acceleration: float, losses: tuple[float, float] = (0.08, 0.08)) -> Diagnosis:

@@ -78,7 +78,7 @@ def test_a_shift_is_the_mean_error_of_its_range_also_beside_other_statements() -
     assert (first.kind, first.variable) == ('range', 'position')
     assert first.range is not None
     inside = (position >= first.range[0]) & (position <= first.range[1])
-    told = re.search(r'shifted there by ([-+][0-9.]+) N', first.text)
+    told = re.search(r'shifted by ([-+][0-9.]+) N', first.text)
     assert told is not None
     assert float(told.group(1)) == pytest.approx(
         float(recording.error[inside, 4].mean()), abs=0.01)
@@ -99,7 +99,7 @@ def test_what_holds_nearly_all_of_a_recording_is_no_place() -> None:
 def test_friction_names_the_direction_and_says_which_way_the_model_errs() -> None:
     recording = noisy(FIRST_SEED + 201)
     sign = np.tanh(recording.variables['velocity'][:, 0] / 0.001)
-    for factor, word in ((0.3, 'too small'), (-0.3, 'too large')):
+    for factor, word in ((0.3, 'too little friction'), (-0.3, 'too much friction')):
         measured = recording.measured.copy()
         measured[:, 0] += factor * sign
         first = localise(replace(recording, measured=measured)).statements[0]

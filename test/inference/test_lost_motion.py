@@ -15,15 +15,12 @@ import pytest
 from planar_arm import planar_arm
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import UnknownNameError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.laws.lost_motion import LostMotion, behind_play, reversals
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 SWING = 1  # the joint that carries weight
 TIME = np.arange(0, 12, 0.005)
@@ -37,13 +34,13 @@ def on_swing(**parameters: float) -> dict[str, object]:
             **{f'effects.lost_motion.swing.{name}': value for name, value in every.items()}}
 
 
-def recorded(model: ForceModel, position: Array, effort: Array, time: Array) -> Recording:
+def recorded(model: DriveModel, position: Array, effort: Array, time: Array) -> Recording:
     noise = NOISE * np.random.default_rng(3).normal(size=effort.shape)
     grain = 1e-5 * np.random.default_rng(4).normal(size=position.shape)
     return Recording.from_arrays('run', time, position + grain, None, effort + noise, model.drives)
 
 
-def with_play(model: MechanismModel, play: float, width: float = 0.05) -> Recording:
+def with_play(model: DriveModel, play: float, width: float = 0.05) -> Recording:
     """Record a motor that crosses a play while the link turns over: faster than the link."""
     moved = made_up_arm.motion(20.0)
     position = moved.position.copy()
@@ -61,7 +58,7 @@ def with_backlash(model: Any, backlash: float) -> Recording:
     return recorded(model, moved.position, forces, moved.time)
 
 
-def found_on(model: ForceModel, recording: Recording) -> tuple[Diagnosis, list[object]]:
+def found_on(model: DriveModel, recording: Recording) -> tuple[Diagnosis, list[object]]:
     found = diagnose(model, [recording])
     return found, [(one.name, one.drives) for one in found.effects]
 
@@ -109,26 +106,18 @@ def test_loads_choose_the_flank() -> None:
     np.testing.assert_allclose(error, [[0.0, -0.002], [0.0, 0.002]], rtol=1e-12)
 
 
-def test_a_windup_of_nothing_in_an_older_file_is_none() -> None:
-    values = {'swing': {'backlash': 0.01, 'play': 0.0, 'windup': 0.0}}
-    assert LostMotion.from_file(values).drives == {'swing': {'backlash': 0.01, 'play': 0.0}}
-    with pytest.raises(UnknownNameError, match='windup'):
-        LostMotion.from_file({'swing': {**values['swing'], 'windup': 1e-5}})
-
-
 @pytest.mark.parametrize('size', [0.008, 0.03])
 def test_a_model_with_the_play_leaves_the_noise(tmp_path: Path, size: float) -> None:
     model = made_up_arm.real_arm(tmp_path)
     recording = with_play(model, size)
 
     def left(one: object) -> float:
-        assert isinstance(one, MechanismModel)
         found = reconstruct(one, recording)
         error = found.treat(found.effort) - treated_forces(one, found)['total']
         return float(error[:, SWING].std())
 
     before = left(model)
-    after = left(build_model({**model.values, **on_swing(play=size)}, model.source))
+    after = left(DriveModel.from_parameters({**model.values, **on_swing(play=size)}, model.source))
     assert after < 0.5 * before
     assert after < 6 * NOISE
 
@@ -139,7 +128,8 @@ def test_bursts_of_an_encoder_do_not_choose_the_window(tmp_path: Path) -> None:
     size, moved = 0.03, made_up_arm.motion(20.0)
     recording = with_play(model, size, width=0.1)
     read = reconstruct(model, recording)
-    behind = reconstruct(build_model({**model.values, **on_swing(play=size)}, model.source),
+    behind = reconstruct(DriveModel.from_parameters(
+        {**model.values, **on_swing(play=size)}, model.source),
                          recording)
     assert behind.read.smoothing.duration == read.smoothing.duration
     np.testing.assert_array_equal(behind.index, read.index)
@@ -170,10 +160,9 @@ def test_backlash_by_the_side_of_the_load_is_lost_motion(tmp_path: Path) -> None
 def test_what_it_is_taken_for_stays_what_it_is(tmp_path: Path, name: str,
                                                values: dict[str, float]) -> None:
     model = made_up_arm.real_arm(tmp_path)
-    other = build_model({**model.values, 'effects.active': [name],
+    other = DriveModel.from_parameters({**model.values, 'effects.active': [name],
                          **{f'effects.{name}.swing.{key}': one for key, one in values.items()}},
                         model.source)
-    assert isinstance(other, MechanismModel)
     moved = made_up_arm.motion(20.0)
     forces = other.measured(other.drive_forces(moved)).total
     recording = recorded(model, moved.position + other.position_error(moved.position), forces,

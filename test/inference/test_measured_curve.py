@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from pprs_dynamics import DriveModel, load_model
+from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.inference.adoption.adopt import adopt
@@ -105,7 +105,7 @@ def test_a_model_file_holds_it_and_its_undoing(model: DriveModel, tmp_path: Path
     answer = adopt(model, requested('measured_curve:lift_1@position', model), [run], [other])
     file = tmp_path / 'with_curve.yaml'
     write_model(file, answer.after.values, 'config/paper.yaml')
-    read = load_model(file)
+    read = DriveModel.load(file)
     motion = Excitation(3.0, seed=9).motion(np.arange(0, 3.0, 0.01))
     np.testing.assert_allclose(read.drive_forces(motion).total,
                                answer.after.drive_forces(motion).total, atol=1e-9)

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from shared_cases import shared_case
 
-from pprs_dynamics import DriveModel, JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
@@ -32,8 +32,6 @@ from pprs_dynamics.inference.readings.efforts import (
 )
 from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model
 
 RATE = 200.0  # [Hz]
 DURATION = 20.0  # [s]
@@ -45,7 +43,7 @@ WITHOUT_GRAVITY = {'swing': 'without_gravity', 'reach': 'without_gravity'}
 class Run:
     """A machine, its motion and the parts of what its drives apply, (N, D) each."""
 
-    model: ForceModel
+    model: DriveModel
     time: Array
     position: Array
     velocity: Array
@@ -69,7 +67,7 @@ class Run:
         return kinds_of(looks_like(self.model, [self.of(effort, noise)]))
 
 
-def run_of(model: ForceModel, motion: Any, still: Any) -> Run:
+def run_of(model: DriveModel, motion: Any, still: Any) -> Run:
     forces, rest = model.drive_forces(motion), model.drive_forces(still)
     position, velocity, _ = forces.drive_motion
     rigid, gravity = (one.parts['rigid_body'] for one in (forces, rest))
@@ -91,8 +89,8 @@ def platform_run() -> Run:
 
 
 def axis_run(gravity: float) -> Run:
-    given = MechanismModel.load('config/single_axis.yaml').values
-    model = build_model({**given, 'axis.gravity': gravity})
+    given = DriveModel.load('config/single_axis.yaml').values
+    model = DriveModel.from_parameters({**given, 'robot.gravity': [0.0, 0.0, gravity]})
     time = np.arange(0, DURATION, 1 / RATE)
     q = np.zeros((3, len(time), 1))
     for rate, size in ((0.2, 0.1), (0.5, 0.05), (1.3, 0.01)):
@@ -189,7 +187,8 @@ def test_nothing_is_claimed_of_what_is_no_measurement(tmp_path: Path) -> None:
 
 def test_effort_kind_says_that_gravity_was_taken_out(tmp_path: Path) -> None:
     run = mechanism_run(tmp_path)
-    model = build_model({**run.model.values, 'effort_kind': 'without_gravity'}, run.model.source)
+    model = DriveModel.from_parameters(
+        {**run.model.values, 'effort_kind': 'without_gravity'}, run.model.source)
     recording = run.of(run.total - run.gravity)
     assert looks_like(model, [recording]) == {}
     motion = arm.motion(DURATION, RATE)
@@ -199,25 +198,26 @@ def test_effort_kind_says_that_gravity_was_taken_out(tmp_path: Path) -> None:
 
 def test_effort_kind_says_that_efforts_are_commands(tmp_path: Path) -> None:
     run = mechanism_run(tmp_path)
-    model = build_model({**run.model.values, 'effort_kind': 'commanded'}, run.model.source)
+    model = DriveModel.from_parameters(
+        {**run.model.values, 'effort_kind': 'commanded'}, run.model.source)
     assert kinds_of(looks_like(model, [run.of(run.total)])) == every(run, 'command')
 
 
 def test_effort_kind_says_that_efforts_are_currents(tmp_path: Path) -> None:
     run = mechanism_run(tmp_path)
     values = {**run.model.values, 'robot.gain': (2.0, 3.0, 4.0), 'effort_kind': 'current'}
-    model = build_model(values, run.model.source)
+    model = DriveModel.from_parameters(values, run.model.source)
     write_recording(tmp_path / 'run.csv', run.of(run.total))
     read = [read_recording(tmp_path / 'run.csv', one.recorded) for one in (run.model, model)]
     np.testing.assert_allclose(read[1].effort, read[0].effort * (2.0, 3.0, 4.0))
     with pytest.raises(ModelError, match='only an arm and a robot with loops have a gain'):
-        build_model({**MechanismModel.load('config/single_axis.yaml').values,
+        DriveModel.from_parameters({**DriveModel.load('config/single_axis.yaml').values,
                      'effort_kind': 'current'})
 
 
 def test_another_kind_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r'effort_kind is .*torque.*, must be one of measured, '):
-        build_model({**MechanismModel.load('config/single_axis.yaml').values,
+        DriveModel.from_parameters({**DriveModel.load('config/single_axis.yaml').values,
                      'effort_kind': 'torque'})
 
 

@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from single_axis import AXIS, axis_values
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.regression.design import Design
@@ -23,12 +24,9 @@ from pprs_dynamics.inference.search.table import ModelTable
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.model.robot_block import AXIS
 
 TIME = np.arange(0.0, 8.0, 0.005)
-VALUES = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0,
-          'friction.reversal_velocity': 0.001}
+VALUES = axis_values(20.0, 40.0, 6.0, -2.0)
 HIDDEN = {
     'nothing': {},
     'spring': {'drive_spring': {'stiffness': 60.0, 'position': 0.02}},
@@ -37,12 +35,11 @@ HIDDEN = {
     'two': {'drive_inertia': {'mass': 3.0}, 'viscous_friction': {'coefficient': 20.0}}}
 
 
-def axis(hidden: dict[str, dict[str, float]]) -> MechanismModel:
+def axis(hidden: dict[str, dict[str, float]]) -> DriveModel:
     """Return an axis with effects."""
     values = {f'effects.{name}.{AXIS}.{key}': value for name, block in hidden.items()
               for key, value in block.items()}
-    model = build_model({**VALUES, 'effects.active': list(hidden), **values})
-    assert isinstance(model, MechanismModel)
+    model = DriveModel.from_parameters({**VALUES, 'effects.active': list(hidden), **values})
     return model
 
 

@@ -22,8 +22,6 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model
 
 pytestmark = pytest.mark.slow
 
@@ -41,14 +39,14 @@ ALIKE = {('pendulum', 'effort_gain'): 'effort_gain', ('pendulum', 'base_tilt'): 
          ('planar arm', 'effort_gain'): 'effort_gain', ('planar arm', 'base_tilt'): 'base_tilt'}
 
 
-def robot(kind: str, folder: Path) -> ForceModel:
+def robot(kind: str, folder: Path) -> DriveModel:
     if kind == '3-PPRS':
         return DriveModel.load()
     return real_arm(folder) if kind == 'spatial arm' else planar_arm(
         folder, 1 if kind == 'pendulum' else 2)
 
 
-def record(model: ForceModel, kind: str) -> Recording:
+def record(model: DriveModel, kind: str) -> Recording:
     """Return ten seconds, with what the model has hidden."""
     if kind == '3-PPRS':
         time = np.arange(2000) * 0.005
@@ -75,7 +73,8 @@ def test_what_is_there_is_adopted_by_the_command_that_is_printed(
               for key, value in HIDDEN[name].items()}
     if name == 'payload_mass' and kind in ('pendulum', 'planar arm'):
         values['effects.payload_mass.z'] = -0.5
-    recording = record(build_model({**model.values, 'effects.active': [name], **values},
+    recording = record(DriveModel.from_parameters(
+        {**model.values, 'effects.active': [name], **values},
                                    model.source), kind)
     found = diagnose(model, [recording])
     costs = [one.cost for one in found.sets]

@@ -24,18 +24,22 @@ from pprs_dynamics.inference.experiments.criteria import (
     whitened,
 )
 from pprs_dynamics.inference.experiments.fourier_path import FourierPath
-from pprs_dynamics.inference.experiments.motion_limits import MotionLimits, limit_names
+from pprs_dynamics.inference.experiments.motion_design import (
+    NoMotionError,
+    PlatformMotions,
+    limits_of,
+    random_motions,
+)
+from pprs_dynamics.inference.experiments.motion_design import (
+    design as design_motion,
+)
+from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import (
     PurposeError,
     experiment_of,
     next_experiment,
 )
 from pprs_dynamics.inference.experiments.question import commissioning, question_after
-from pprs_dynamics.inference.experiments.trajectory_search import (
-    NoMotionError,
-    TrajectorySearch,
-    forces_of,
-)
 from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
     PresentCoefficient,
@@ -58,6 +62,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.model.parameter_file import default_parameters
+from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 
 DURATION = 8.0
 HARMONICS = np.array([[1, 2, 4], [1, 3, 5], [2, 3, 4], [1, 2, 3], [1, 4, 5], [2, 4, 5]])
@@ -154,7 +159,7 @@ def test_what_a_motion_would_tell_is_what_its_recording_tells(
     known = information.of_recordings(design, regression, fit) - information.prior()
     # Smoothing drops half a window at either end, and the transform a few samples more.
     time = design.recordings[0].time[:5 * len(regression.series[0])]
-    columns = plan.on_motions(forces_of(plan.model, [path], time), time, 5)[0]
+    columns = plan.on_motion(plan.model.drive_forces(path.motion(time)), time, 5)
     told = information.of_motion(columns, len(time) * 0.002)
     scale = np.sqrt(np.diag(known))
     assert np.diag(told) == pytest.approx(np.diag(known), rel=0.05)
@@ -173,8 +178,8 @@ def test_a_drive_that_stood_may_turn_over_in_a_motion(
     found = []
     for one in (design, stood):
         plan = ColumnPlan.of_design(one, ())
-        forces = forces_of(plan.model, [FAMILY.with_parameters(parameters)], time)
-        index, rows = plan.on_motions(forces, time)[0][2]
+        forces = plan.model.drive_forces(FAMILY.with_parameters(parameters).motion(time))
+        index, rows = plan.on_motion(forces, time)[2]
         mine = [k for k, at in enumerate(index) if isinstance(plan.base[at], ReversalShape)
                 and plan.base[at].drive == 2]
         found.append(rows[mine])
@@ -190,9 +195,9 @@ def test_few_samples_tell_nearly_the_same(model: DriveModel, parameters: np.ndar
     information = Information(plan, dict.fromkeys(range(6), noise))
     fine, coarse = np.arange(0, DURATION, 0.002), np.arange(120) * DURATION / 120
     full = information.of_motion(
-        plan.on_motions(forces_of(model, [path], fine), fine, 5)[0], DURATION)
+        plan.on_motion(model.drive_forces(path.motion(fine)), fine, 5), DURATION)
     few = information.of_motion(
-        plan.on_motions(forces_of(model, [path, path], coarse), coarse)[1], DURATION)
+        plan.on_motion(model.drive_forces(path.motion(coarse)), coarse), DURATION)
     for k in [*plan.numbers, *range(len(plan.base), plan.size)]:
         assert few[k, k] == pytest.approx(full[k, k], rel=0.3)
 
@@ -254,65 +259,55 @@ def test_use_of_limits_is_measured_against_what_the_margin_leaves(
     model: DriveModel, parameters: np.ndarray,
 ) -> None:
     time = np.linspace(0, DURATION, 500)
-    forces = forces_of(model, [FAMILY.with_parameters(parameters)], time)
+    forces = model.drive_forces(FAMILY.with_parameters(parameters).motion(time))
     limits = MotionLimits(velocity=0.4, margin=0.2, effort_reserve=1.0)
-    uses = dict(zip(limit_names(model), limits.uses(model, forces, 500)[0], strict=True))
+    uses = limits.uses(model, forces)
     state = forces.mechanism
     assert uses['velocity of lift_2'] == pytest.approx(
         np.abs(state.velocity[:, 4]).max() / (0.4 * 0.8))
     assert uses['effort of slide_1'] == pytest.approx(
-        (np.abs(forces.total[:, 0]).max() + 1.0) / (model.limits.effort[0] * 0.8))
-    lower, upper = model.limits.lift_stroke
+        (np.abs(forces.total[:, 0]).max() + 1.0) / (model.limits.efforts[0] * 0.8))
+    lower, upper = model.values['limits.lift_stroke']
     room = 0.8 * (upper - lower) / 2
     assert uses['stroke of lift_1'] == pytest.approx(
         np.abs(state.position[:, 3] - (lower + upper) / 2).max() / room)
 
 
-def test_a_design_keeps_tight_limits_and_repeats_with_its_seed(
-    model: DriveModel, monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_design_keeps_tight_limits_and_repeats_with_its_seed(model: DriveModel) -> None:
     """Every limit in turn is made the one that stops the motion."""
-    for name, value in (('trajectory_search.DRAWS', 3), ('climbing.STEPS', 10),
-                        ('trajectory_search.HIGHEST_FREQUENCY', 0.5)):
-        monkeypatch.setattr(f'pprs_dynamics.inference.experiments.{name}', value)
-    tight = replace(model, limits=replace(model.limits, lift_stroke=(0.12, 0.30),
-                                          effort=(9.0,) * 3 + (18.0,) * 3,
-                                          condition_number=2.2, rod_sine=0.45))
-    question = commissioning(tight, [], 0.05)
-    limits = MotionLimits(velocity=0.1, acceleration=0.5, tilt=0.1)
-    found = TrajectorySearch(question, limits, DURATION, 1).run()
-    assert 0.8 < max(found.uses.values()) <= 1.0
+    tight = DriveModel.from_parameters({
+        **model.values, 'limits.lift_stroke': (0.12, 0.30),
+        'limits.effort': (9.0,) * 3 + (18.0,) * 3, 'limits.condition_number': 2.2,
+        'limits.rod_sine': 0.45})
+    motions = PlatformMotions(tight, MotionLimits(velocity=0.1, acceleration=0.5, tilt=0.1),
+                              DURATION)
+
+    def size(path: FourierPath) -> float:
+        return float(np.abs(path.parameters).sum())
+
+    found = design_motion(motions, size, 1)
+    assert 0.8 < max(limits_of(motions, found).values()) <= 1.0
+    assert size(found) > max(map(size, random_motions(motions, 1, 40)))
     time = np.linspace(0, DURATION, 8001)
-    forces = tight.drive_forces(found.path.motion(time))
+    forces = tight.drive_forces(found.motion(time))
     assert np.abs(forces.mechanism.velocity).max() <= 0.09 + 1e-6
     assert np.abs(forces.mechanism.acceleration).max() <= 0.45 + 1e-5
     assert forces.mechanism.motion.tilt.max() <= 0.09 + 1e-6
     tight.limits.check_strokes(forces.mechanism.position)
-    assert tight.condition_number(found.path.motion(time)).max() <= 0.9 * 2.2 + 1e-3
-    assert np.abs(forces.mechanism.chains.sin_u).min() >= 0.5
+    number = condition_number(tight.robot.geometry, forces.mechanism.links.jacobians.J)
+    assert number.max() <= 0.9 * 2.2 + 1e-3
+    assert np.abs(forces.mechanism.links.chains.sin_u).min() >= 0.5
     tight.limits.check_efforts(forces.total)
-    again = TrajectorySearch(question, limits, DURATION, 1).run()
-    assert np.array_equal(found.path.parameters, again.path.parameters)
-    other = TrajectorySearch(question, limits, DURATION, 2).screen(draws=1)[0]
-    assert not np.array_equal(found.path.harmonics, other.path.harmonics)
-
-
-def test_improving_a_motion_makes_it_tell_more(
-    model: DriveModel, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(
-        'pprs_dynamics.inference.experiments.trajectory_search.HIGHEST_FREQUENCY', 0.6)
-    question = commissioning(model, [], 0.05)
-    search = TrajectorySearch(question, MotionLimits(), DURATION, 0)
-    start = search.screen()[0]
-    assert search.run().value > search.assess(start.path).value + 1.0
+    first, again, other = (random_motions(motions, seed, 1)[0] for seed in (1, 1, 2))
+    assert np.array_equal(first.parameters, again.parameters)
+    assert not np.array_equal(first.harmonics, other.harmonics)
 
 
 def test_no_room_is_said(model: DriveModel) -> None:
-    question = commissioning(replace(model, limits=replace(
-        model.limits, effort=(1.0,) * 6)), [], 0.05)
+    question = commissioning(replace(model, limits=model.limits.with_efforts(
+        (1.0,) * 6)), [], 0.05)
     with pytest.raises(NoMotionError, match=r'no motion is allowed.*effort of lift'):
-        TrajectorySearch(question, MotionLimits(), DURATION, 0)
+        PlatformMotions(question.model, MotionLimits(), DURATION)
 
 
 def test_a_recording_is_needed_to_know_what_to_tell_apart(model: DriveModel) -> None:
@@ -334,9 +329,9 @@ def test_a_design_that_cannot_separate_says_so(model: DriveModel) -> None:
     contests = [Contest(a, b, (*base, *b.index)) for a, b in (both, both[::-1])]
     question = replace(question, kind='separate', plan=plan, known=gram,
                        subjects=()).with_contests(contests)
-    drawn = TrajectorySearch(question, MotionLimits(), DURATION, 0)
-    found = drawn.assess(drawn.screen(draws=1)[0].path)
-    told = experiment_of(question, found)
+    motions = PlatformMotions(question.model, MotionLimits(), DURATION)
+    (found,) = random_motions(motions, 0, 1)
+    told = experiment_of(question, found, limits_of(motions, found))
     assert told.separates == ()
     assert told.to_dict()['does_not_separate'] == [['coulomb_friction', 'load_friction']]
     # Friction by load grows with a mass, a tenth of the platform's with its load: no motion needed.
@@ -349,7 +344,7 @@ def test_a_design_that_cannot_separate_says_so(model: DriveModel) -> None:
     strong = [replace(one, truth=3e4 * one.truth) for one in both]
     question = question.with_contests(
         [Contest(a, b, (*base, *b.index)) for a, b in (strong, strong[::-1])])
-    assert experiment_of(question, found).separates == (('coulomb_friction', 'load_friction'),)
+    assert experiment_of(question, found, {}).separates == (('coulomb_friction', 'load_friction'),)
 
 
 # From recordings to the question.
@@ -387,9 +382,7 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
     for contest in question.contests:
         assert contest.now == costs[contest.rival.name] - costs[contest.truth.name]
     # What the same motion tells again doubles the misfit and leaves the priors as they are.
-    fine = np.arange(0.0, DURATION, 0.002)
-    again = question.known + question.grams(
-        forces_of(model, [path], fine), fine, DURATION, 5)[0]
+    again = question.known + question.gram(path)
     for contest in question.contests:
         once = contest.misfit(question.known)
         assert once < contest.misfit(again) < 2.6 * once + 1.0

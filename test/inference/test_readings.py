@@ -20,7 +20,7 @@ from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.inference.readings.check import find_mistakes
 from pprs_dynamics.inference.readings.findings import OtherReading
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 DRIVES = ('shoulder', 'elbow')
 MOTOR = ('<robot name="motor"><link name="base"/><joint name="motor" type="revolute"><parent '
@@ -31,7 +31,7 @@ MOTOR = ('<robot name="motor"><link name="base"/><joint name="motor" type="revol
 
 
 @pytest.fixture
-def arm(tmp_path: Path) -> ForceModel:
+def arm(tmp_path: Path) -> DriveModel:
     (tmp_path / 'arm.urdf').write_text(ARM)
     return first_model(tmp_path / 'arm.urdf', output=tmp_path / 'arm.yaml').model
 
@@ -43,13 +43,13 @@ def run(seed: int = 0) -> tuple[np.ndarray, ...]:
     return time, q, v, arm_efforts(q, v, a) + random.normal(0, 0.03, q.shape)
 
 
-def told(model: ForceModel, time: np.ndarray, q: np.ndarray, effort: np.ndarray) -> str:
+def told(model: DriveModel, time: np.ndarray, q: np.ndarray, effort: np.ndarray) -> str:
     """Return all mistakes of a recording as one text."""
     found = find_mistakes(model, Recording.from_arrays('run', time, q, None, effort, model.drives))
     return '; '.join(each.what for each in found)
 
 
-def test_held_poses_show_the_offset_of_a_sensor(arm: ForceModel) -> None:
+def test_held_poses_show_the_offset_of_a_sensor(arm: DriveModel) -> None:
     random = np.random.default_rng(3)
     poses = np.repeat(random.uniform(-1.5, 1.5, (40, 2)), 30, axis=0)
     time = np.repeat(3.0 * np.arange(40), 30) + np.tile(np.arange(30) / 50, 40)
@@ -64,7 +64,7 @@ def test_held_poses_show_the_offset_of_a_sensor(arm: ForceModel) -> None:
 
 
 def test_friction_of_a_joint_at_some_milliradians_per_second_is_found(
-    arm: ForceModel, tmp_path: Path,
+    arm: DriveModel, tmp_path: Path,
 ) -> None:
     time = np.arange(6000) / 50
     w = 2 * np.pi * np.array([0.011, 0.017])
@@ -96,7 +96,7 @@ def test_limits_of_a_motor_that_turns_freely_say_nothing(constant: bool, tmp_pat
     (10.197, 'as if it were in kgf cm'), (-10.197, 'in kgf cm'), (9.3, 'or in amperes'),
     (8.0, 'it looks like currents in amperes'), (1e3, 'in mN m'), (1e-3, 'in kN m')])
 def test_a_common_factor_is_a_unit_only_near_its_constant(
-    arm: ForceModel, factor: float, words: str,
+    arm: DriveModel, factor: float, words: str,
 ) -> None:
     time, q, _, effort = run(1)
     found = told(arm, time, q, effort * factor)
@@ -105,7 +105,7 @@ def test_a_common_factor_is_a_unit_only_near_its_constant(
 
 
 @pytest.mark.parametrize('seed', range(3))
-def test_errors_of_position_and_external_torques_are_in_no_unit(arm: ForceModel, seed: int) -> None:
+def test_errors_of_position_and_external_torques_are_in_no_unit(arm: DriveModel, seed: int) -> None:
     time, q, v, _ = run(seed)
     noise = np.random.default_rng(seed).normal(0, 1, q.shape)
     lag = told(arm, time, q, 0.05 * v + 1e-3 * noise)
@@ -183,7 +183,7 @@ def test_init_shows_each_column_and_those_that_it_does_not_use(tmp_path: Path) -
     assert (tmp_path / 'a.png').stat().st_size > 5000
 
 
-def test_no_reading_is_found_where_nothing_is_wrong(arm: ForceModel) -> None:
+def test_no_reading_is_found_where_nothing_is_wrong(arm: DriveModel) -> None:
     for seed in range(5):
         time, q, _, effort = run(seed)
         found = find_mistakes(arm, Recording.from_arrays('run', time, q, None, effort, DRIVES))

@@ -32,7 +32,7 @@ from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruct
 from pprs_dynamics.measurement.motion.sampling_grid import find_grid
 from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.three_pprs import forward_motion
 from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.physics.three_pprs.forward_motion import (
@@ -333,7 +333,7 @@ def test_zeros_elsewhere_are_those_of_a_whole_new_reconstruction():
     recording = recording_of(truth())
     shift = np.array([0.004, 0.0, -0.002, 0.001, 0.0, 0.003])
     names = ['slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3']
-    moved = build_model({**MODEL.values, 'effects.active': ['homing_error'], **{
+    moved = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['homing_error'], **{
         f'effects.homing_error.{name}.zero': float(by)
         for name, by in zip(names, shift, strict=True)}})
     assert_allclose(moved.position_error(np.zeros((1, 6)))[0], shift)

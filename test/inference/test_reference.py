@@ -14,7 +14,7 @@ import pytest
 
 import pprs_dynamics as pprs
 from benchmarks.scores.reference_robots import Change, Robot
-from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import MisreadError, ModelError, UnreadableFileError
@@ -22,14 +22,13 @@ from pprs_dynamics.inference.diagnosis.diagnosis import SinceReference
 from pprs_dynamics.inference.diagnosis.sentences import word_reference
 from pprs_dynamics.inference.fit.reference import Reference, ReferenceRunError
 from pprs_dynamics.inference.fit.reference_runs import read_reference
-from pprs_dynamics.inference.regression.carried_over import CarriedOver
+from pprs_dynamics.inference.regression.base_columns import CarriedOver
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
 from pprs_dynamics.physics.model.ledger import read_steps
-from pprs_dynamics.physics.model.model_file import build_model, load_model
 from pprs_dynamics.physics.model.model_writer import write_model
 
 NOISE = 0.2
@@ -43,7 +42,7 @@ def healthy(moved: JointMotion) -> Array:
     return force
 
 
-def run(model: MechanismModel, seed: int, noise: int, change: float = 0.0, day: float = 0.0,
+def run(model: DriveModel, seed: int, noise: int, change: float = 0.0, day: float = 0.0,
         ) -> Recording:
     """Return a recording of a motion, with Coulomb friction of `swing` otherwise.
 
@@ -67,13 +66,13 @@ def variance(carried: CarriedOver, drive: int) -> Array:
 
 
 @pytest.fixture(scope='module')
-def machine(tmp_path_factory: pytest.TempPathFactory) -> tuple[MechanismModel, Reference]:
+def machine(tmp_path_factory: pytest.TempPathFactory) -> tuple[DriveModel, Reference]:
     model = arm.real_arm(tmp_path_factory.mktemp('arm'))
     return model, Reference.of(model, [run(model, 0, 1)])
 
 
 def test_what_was_in_the_reference_has_not_changed(
-    machine: tuple[MechanismModel, Reference],
+    machine: tuple[DriveModel, Reference],
 ) -> None:
     model, _ = machine
     again = run(model, 0, 2)
@@ -91,7 +90,7 @@ def test_what_was_in_the_reference_has_not_changed(
 @pytest.mark.parametrize(('pace', 'is_told'), [
     (1.0, False), (1.1, False), (0.5, True), (2.0, True)])
 def test_another_speed_than_the_references_is_told(
-    machine: tuple[MechanismModel, Reference], pace: float, is_told: bool,
+    machine: tuple[DriveModel, Reference], pace: float, is_told: bool,
 ) -> None:
     model, reference = machine
     moved = arm.motion(20.0, seed=0)
@@ -105,7 +104,7 @@ def test_another_speed_than_the_references_is_told(
     assert bool(told) == is_told
 
 
-def test_a_change_of_friction_is_told_alone(machine: tuple[MechanismModel, Reference]) -> None:
+def test_a_change_of_friction_is_told_alone(machine: tuple[DriveModel, Reference]) -> None:
     model, _ = machine
     found = pprs.diagnose(model, run(model, 0, 3, change=0.4), reference=run(model, 0, 1))
     assert [one.name for one in found.effects] == ['coulomb_friction']
@@ -129,7 +128,7 @@ def finer(moved: JointMotion) -> Array:
 
 @pytest.mark.parametrize('change', [0.0, 0.4])
 def test_ripple_and_reversals_of_the_reference_are_no_change(
-        machine: tuple[MechanismModel, Reference], change: float) -> None:
+        machine: tuple[DriveModel, Reference], change: float) -> None:
     # Of both the noise of a single run hides a part from sample to sample: forms tell it.
     model, _ = machine
     moved = arm.motion(20.0, seed=0)
@@ -145,7 +144,7 @@ def test_ripple_and_reversals_of_the_reference_are_no_change(
 
 @pytest.mark.parametrize(('path', 'day'), [(0, 0.0), (0, 0.05), (5, 0.0), (5, 0.05)])
 def test_what_is_carried_over_is_as_uncertain_as_it_is_wrong(
-        machine: tuple[MechanismModel, Reference], path: int, day: float) -> None:
+        machine: tuple[DriveModel, Reference], path: int, day: float) -> None:
     model, reference = machine
     design = Design.of(model, [run(model, path, 4, day=day)])
     carried = reference.carried_over(design)
@@ -156,7 +155,7 @@ def test_what_is_carried_over_is_as_uncertain_as_it_is_wrong(
         assert 0.25 < np.nanmean(left[:, d] ** 2 / (noise + variance(carried, d))) < 2
 
 
-def test_a_delay_moves_what_is_carried_over(machine: tuple[MechanismModel, Reference]) -> None:
+def test_a_delay_moves_what_is_carried_over(machine: tuple[DriveModel, Reference]) -> None:
     model, _ = machine
     moved, late = arm.motion(20.0, seed=0), 0.005
 
@@ -188,14 +187,14 @@ def test_a_delay_moves_what_is_carried_over(machine: tuple[MechanismModel, Refer
 
 @pytest.mark.parametrize(('path', 'day'), [(0, 0.1), (5, 0.0)])
 def test_what_a_reference_leaves_open_is_no_change(
-        machine: tuple[MechanismModel, Reference], path: int, day: float) -> None:
+        machine: tuple[DriveModel, Reference], path: int, day: float) -> None:
     model, _ = machine
     found = pprs.diagnose(model, run(model, path, 5, day=day), reference=run(model, 0, 1))
     assert found.verdict == 'adequate'
 
 
 def test_two_runs_tell_how_far_the_machine_repeats(
-    machine: tuple[MechanismModel, Reference],
+    machine: tuple[DriveModel, Reference],
 ) -> None:
     model, _ = machine
     first, same = run(model, 0, 1), run(model, 0, 2)
@@ -212,7 +211,7 @@ def test_two_runs_tell_how_far_the_machine_repeats(
 
 
 def test_a_drive_that_stood_in_the_reference_is_told_of_by_nothing(
-        machine: tuple[MechanismModel, Reference]) -> None:
+        machine: tuple[DriveModel, Reference]) -> None:
     model, _ = machine
     whole = run(model, 0, 1)
     effort = whole.effort.copy()
@@ -228,7 +227,7 @@ def test_a_drive_that_stood_in_the_reference_is_told_of_by_nothing(
 
 
 def test_on_another_path_a_reference_does_no_harm(
-    machine: tuple[MechanismModel, Reference],
+    machine: tuple[DriveModel, Reference],
 ) -> None:
     model, reference = machine
     design = Design.of(model, [run(model, 5, 4)])
@@ -239,7 +238,7 @@ def test_on_another_path_a_reference_does_no_harm(
 
 
 def test_far_from_its_states_a_reference_knows_less(
-        machine: tuple[MechanismModel, Reference]) -> None:
+        machine: tuple[DriveModel, Reference]) -> None:
     model, reference = machine
     near, far = (reference.carried_over(Design.of(model, [run(model, seed, 4)]))
                  for seed in (0, 5))
@@ -256,7 +255,7 @@ def test_a_fit_names_its_runs_and_a_diagnosis_takes_them(tmp_path: Path) -> None
     base = tmp_path / 'models' / 'base.yaml'
     free, later = (str(tmp_path / f'{name}.csv') for name in ('free', 'later'))
     assert main(['fit', free, '--model', str(tmp_path / 'arm.yaml'), '--output', str(base)]) == 0
-    values = load_model(base).values
+    values = DriveModel.load(base).values
     assert list(values['reference']) == ['../free.csv']
     assert base.stat().st_size < 50_000
     said = tmp_path / 'said.json'
@@ -265,36 +264,36 @@ def test_a_fit_names_its_runs_and_a_diagnosis_takes_them(tmp_path: Path) -> None
     assert content['changed_since'] == ['coulomb_friction']
     # What is written elsewhere names it from there.
     write_model(tmp_path / 'new.yaml', values, base)
-    assert list(load_model(tmp_path / 'new.yaml').values['reference']) == ['free.csv']
+    assert list(DriveModel.load(tmp_path / 'new.yaml').values['reference']) == ['free.csv']
     with pytest.raises(UnreadableFileError, match='a reference must be another run'):
         pprs.diagnose(base, free, reference=())
     with (tmp_path / 'free.csv').open('a') as file:
         file.write('\n')
     with pytest.raises(UnreadableFileError, match='SHA-256'):
-        read_reference(load_model(base))
+        read_reference(DriveModel.load(base))
     (tmp_path / 'free.csv').unlink()
     with pytest.raises(UnreadableFileError, match='is not there'):
-        read_reference(load_model(base))
+        read_reference(DriveModel.load(base))
 
 
 def test_a_model_file_that_keeps_the_residual_stands_alone(
-        machine: tuple[MechanismModel, Reference], tmp_path: Path) -> None:
+        machine: tuple[DriveModel, Reference], tmp_path: Path) -> None:
     model, reference = machine
-    kept = build_model({**model.values, 'reference_residual': reference.residual}, model.source)
+    kept = DriveModel.from_parameters(
+        {**model.values, 'reference_residual': reference.residual}, model.source)
     path = tmp_path / 'kept.yaml'
     write_model(path, kept.values, model.source)
     assert path.stat().st_size < 50_000
     design = Design.of(model, [run(model, 0, 4)])
     error = design.residuals.error
-    carried = read_reference(load_model(path)).carried_over(design)
+    carried = read_reference(DriveModel.load(path)).carried_over(design)
     left = error - carried.shown(design.residuals)
     assert np.all(np.nanstd(left, axis=0) < 0.35 * np.nanstd(error, axis=0))
 
 
 @pytest.mark.slow
 def test_dry_friction_of_passive_joints_is_carried_over_and_no_change() -> None:
-    model = load_model(Path(__file__).parents[2] / 'config' / 'delta.yaml')
-    assert isinstance(model, MechanismModel)
+    model = DriveModel.load(Path(__file__).parents[2] / 'config' / 'delta.yaml')
     robot = Robot(model, 20.0)
     nothing = Change('nothing', '', value=0.0)
     robot.forms.clear()  # dry friction of all twelve passive joints is left, twelve times the noise
@@ -307,7 +306,7 @@ def test_dry_friction_of_passive_joints_is_carried_over_and_no_change() -> None:
                          ).verdict == 'adequate'
 
 
-def test_what_is_no_reference_is_refused(machine: tuple[MechanismModel, Reference]) -> None:
+def test_what_is_no_reference_is_refused(machine: tuple[DriveModel, Reference]) -> None:
     model, _ = machine
     whole = run(model, 0, 1)
     with pytest.raises(ReferenceRunError, match='names no reference run'):
@@ -322,12 +321,12 @@ def test_what_is_no_reference_is_refused(machine: tuple[MechanismModel, Referenc
             'other', whole.time, whole.position, None,
             30 * np.cumsum(other, axis=0) / 40, whole.drives)])
     with pytest.raises(ModelError, match='SHA-256'):
-        build_model({**model.values, 'reference': ['free.csv']}, model.source)
+        DriveModel.from_parameters({**model.values, 'reference': ['free.csv']}, model.source)
 
 
 @pytest.mark.slow
 def test_what_has_changed_is_added_since_the_reference(
-        machine: tuple[MechanismModel, Reference], tmp_path: Path) -> None:
+        machine: tuple[DriveModel, Reference], tmp_path: Path) -> None:
     model, _ = machine
     for name, one in (('free', run(model, 0, 1)), ('later', run(model, 0, 2, change=0.6)),
                       ('last', run(model, 0, 3, change=0.6))):
@@ -342,7 +341,7 @@ def test_what_has_changed_is_added_since_the_reference(
     assert content['parameters']['swing.force']['value'] == pytest.approx(0.6, abs=0.05)
     # Beyond what the reference shows as well.
     assert content['error_after'] < 1.5 * NOISE < content['error_before']
-    (step,) = read_steps(load_model(better).values)
+    (step,) = read_steps(DriveModel.load(better).values)
     assert step.reference == ('free.csv',)
     # With it in the model nothing else has changed.
     assert pprs.diagnose(better, last, reference=free).verdict == 'adequate'
@@ -352,7 +351,7 @@ def test_what_has_changed_is_added_since_the_reference(
 
 
 def test_a_reference_in_other_signs_is_refused_as_a_recording_is(
-        machine: tuple[MechanismModel, Reference], tmp_path: Path) -> None:
+        machine: tuple[DriveModel, Reference], tmp_path: Path) -> None:
     model, _ = machine
     whole = run(model, 0, 1)
     write_recording(tmp_path / 'negated.csv', Recording.from_arrays(

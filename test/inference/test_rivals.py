@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from single_axis import AXIS, axis_values
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.diagnosis.answer import rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.quantities import in_unit
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.model.robot_block import AXIS
 
 MASS, VISCOUS, COULOMB, WIDTH = 20.0, 40.0, 6.0, 0.001
 SPRING, OMEGA = 55.0, 2 * np.pi * 0.5  # [N/m], [rad/s]
@@ -30,9 +29,8 @@ def ambiguous() -> Diagnosis:
     q, q_dot = 0.08 * np.sin(OMEGA * time), 0.08 * OMEGA * np.cos(OMEGA * time)
     force = (MASS * -OMEGA ** 2 * q + VISCOUS * q_dot + COULOMB * np.tanh(q_dot / WIDTH)
              + SPRING * q + NOISE * np.random.default_rng(3).standard_normal(len(time)))
-    model = build_model({'axis.mass': MASS, 'axis.viscous': VISCOUS, 'axis.coulomb': COULOMB,
-                         'axis.offset': 0.0, 'friction.reversal_velocity': WIDTH})
-    assert isinstance(model, MechanismModel)
+    model = DriveModel.from_parameters(
+        axis_values(MASS, VISCOUS, COULOMB, width=WIDTH))
     return diagnose(model, [Recording.from_arrays('sine', time, q[:, None], None, force[:, None],
                                                   (AXIS,))])
 

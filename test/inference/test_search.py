@@ -5,40 +5,34 @@
 
 from __future__ import annotations
 
-from itertools import chain, combinations, repeat
+from itertools import combinations
 
 import numpy as np
 import pytest
+from single_axis import AXIS, axis_values
 
-from pprs_dynamics import DriveModel, MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.regression import design as design_module
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.search import relinearisation
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,
     linear_prediction,
+    next_operating_point,
     squared,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.relinearisation import (
-    linearised,
-    next_operating_point,
-)
 from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.inference.search.table import Row, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.model.robot_block import AXIS
 
-AXIS_VALUES = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0,
-               'friction.reversal_velocity': 0.001}
+AXIS_VALUES = {**axis_values(20.0, 40.0, 6.0, -2.0)}
 SMALL = ('coulomb_friction', 'viscous_friction', 'quadratic_friction', 'effort_offset',
          'drive_spring', 'drive_inertia', 'effort_gain')
 MODEL = DriveModel.load()
@@ -50,8 +44,7 @@ def axis_recording(hidden: dict[str, dict[str, float]], seed: int, noise: float 
     """Return a recording of an axis that has some effects which its model has not."""
     values = {f'effects.{name}.{AXIS}.{key}': value for name, block in hidden.items()
               for key, value in block.items()}
-    model = build_model({**AXIS_VALUES, 'effects.active': list(hidden), **values})
-    assert isinstance(model, MechanismModel)
+    model = DriveModel.from_parameters({**AXIS_VALUES, 'effects.active': list(hidden), **values})
     rng = np.random.default_rng(seed)
     time = np.arange(0, 20, 0.002)
     omega = 2 * np.pi * np.array([0.21, 0.37, 0.83])[:, None]
@@ -81,7 +74,7 @@ def small_catalogue(monkeypatch: pytest.MonkeyPatch) -> None:
     ({'quadratic_friction': {'coefficient': 30.0}, 'drive_spring': {
         'stiffness': 20.0, 'position': -0.05}}, 4)])
 def test_the_search_ends_at_the_best_of_all_sets(hidden: dict, seed: int) -> None:
-    design = Design.of(build_model(AXIS_VALUES), [axis_recording(hidden, seed)])
+    design = Design.of(DriveModel.from_parameters(AXIS_VALUES), [axis_recording(hidden, seed)])
     search = Search(FittedSets(design, DECISIONS))
     found = search.run()
     exhaustive = FittedSets(design, DECISIONS)
@@ -105,7 +98,7 @@ def test_the_search_ends_at_the_best_of_all_sets(hidden: dict, seed: int) -> Non
 @pytest.mark.usefixtures('small_catalogue')
 def test_what_does_not_pay_in_a_set_is_pruned() -> None:
     recording = axis_recording({'drive_spring': {'stiffness': 30.0, 'position': 0.02}}, 1)
-    fits = FittedSets(Design.of(build_model(AXIS_VALUES), [recording]), DECISIONS)
+    fits = FittedSets(Design.of(DriveModel.from_parameters(AXIS_VALUES), [recording]), DECISIONS)
     spring, drag, gain = (EffectCandidate.of([Component.of(
         CATALOGUE[name], 0, {}, CATALOGUE[name].variants[0])])
         for name in ('drive_spring', 'quadratic_friction', 'effort_gain'))
@@ -122,7 +115,7 @@ def recording_of(effects: dict[str, dict], noise: float = 0.08, seed: int = 0) -
                 values |= {f'effects.{name}.{key}.{p}': v for p, v in value.items()}
             else:
                 values[f'effects.{name}.{key}'] = value
-    model = build_model({**MODEL.values, 'effects.active': list(effects), **values})
+    model = DriveModel.from_parameters({**MODEL.values, 'effects.active': list(effects), **values})
     forces = model.drive_forces(Excitation().motion(TIME).with_time(TIME))
     said = model.measured(forces)
     rng = np.random.default_rng(seed)
@@ -175,26 +168,6 @@ def test_what_a_set_costs_by_its_exact_forces_does_not_depend_on_where_it_was_fo
     assert costs[0] < tilted.total
 
 
-def test_a_set_of_which_no_step_lowers_the_exact_error_stands_for_the_best_model_so_far(
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    fits = FittedSets(Design.of(MODEL, [recording_of({'base_tilt': {'x': 0.1, 'y': -0.05}})]),
-                      DECISIONS)
-    point = next_operating_point(fits, fits.evaluate((TILTED,)))
-    assert point is not None
-    around = FittedSets(fits.design.around(point), DECISIONS, fits.regression.error_scale)
-    free = around.evaluate((TILTED,))
-    # Far from linear, and every step leaves more than the point does.
-    losses = chain([100.0, 100.0, 0.0], repeat(100.0))
-    monkeypatch.setattr(relinearisation, 'squared', lambda *given: next(losses))
-    last, held = linearised(around, free)
-    assert last is around
-    assert not np.allclose(exact_forces(fits.design, fitted_model(around, free)),
-                           around.design.forces, atol=1e-3)
-    np.testing.assert_allclose(exact_forces(fits.design, fitted_model(around, held)),
-                               around.design.forces, atol=1e-6)
-    assert held.total > free.total
-
-
 def test_a_relinearised_set_is_on_the_drives_where_it_costs_least() -> None:
     hidden = {drive: {'zero': 0.004} for drive in DRIVES[:2]}
     fits = FittedSets(Design.of(MODEL, [recording_of({'homing_error': hidden})]), DECISIONS)
@@ -218,7 +191,7 @@ def test_a_small_effect_beside_a_large_one_is_the_form_error_of_that() -> None:
 def test_a_wrench_on_guides_that_feel_it_hides_no_effect_and_makes_none() -> None:
     wrench = {'force_x': 6.0, 'force_y': -4.0, 'force_z': 5.0, 'moment_x': 0.1, 'moment_y': 0.1,
               'moment_z': 0.0}
-    model = build_model({**MODEL.values, 'effects.active': ['external_wrench'],
+    model = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['external_wrench'],
                          **{f'effects.external_wrench.{k}': v for k, v in wrench.items()}})
     forces = model.drive_forces(Excitation().motion(TIME).with_time(TIME))
     total = forces.total
@@ -259,13 +232,3 @@ def test_a_line_on_one_drive_is_unknown_at_its_frequency() -> None:
     assert not found.effects
     assert [c.drives for c in found.unknowns] == [(3,)]
     assert found.unknowns[0].pattern.scale == pytest.approx(6.1, rel=0.001)
-
-
-def test_every_decision_has_a_unit_and_a_reason() -> None:
-    table = DECISIONS.table()
-    for name, _, unit, decides, reason in table:
-        assert unit, name
-        assert decides, name
-        assert len(reason) > 5 or reason == '95 %' or reason == 'the same', name
-    assert {name: value for name, value, *_ in table if name in vars(Decisions())} == vars(
-        Decisions())

@@ -33,7 +33,7 @@ from pprs_dynamics.app.report.diagnosis_figures import unknown_picture
 from pprs_dynamics.app.report.diagnosis_report import diagnosis_page, diagnosis_view
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.found_effects import RankedSet, RivalEffect
+from pprs_dynamics.inference.diagnosis.found_effects import RivalEffect
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
 from pprs_dynamics.inference.diagnosis.partial_errors import error_steps, partial_residual
 from pprs_dynamics.inference.diagnosis.quantities import (
@@ -42,15 +42,12 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     percent,
     with_uncertainty,
 )
-from pprs_dynamics.inference.diagnosis.sentences import runner_up, set_rows, word_diagnosis
+from pprs_dynamics.inference.diagnosis.sentences import set_rows, word_diagnosis
 from pprs_dynamics.inference.search.candidates import DRIFT, SINCE, Course
-from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.estimates import Calibration
 from pprs_dynamics.inference.search.patterns import OWN, PLATFORM
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.model.parameter_file import default_parameters
 
 VARIABLES = (*OWN, *PLATFORM, 'velocity', 'direction', 'time', 'frequency', 'position of lift_1',
              'velocity of slide_3')
@@ -107,15 +104,6 @@ def test_what_changes_within_a_recording_is_not_added_throughout(kind: str, said
     assert words.command == 'pprs diagnose SECOND_RECORDING'
 
 
-def test_blocks_are_told_as_the_weaker_evidence_and_another_recording_is_not() -> None:
-    blocks = word_diagnosis(one_effect()).effects[0].why
-    assert 'blocks of the same recording' in blocks
-    assert 'stronger evidence' in blocks
-    other = word_diagnosis(one_effect(held_out_on='validation')).effects[0].why
-    assert 'stronger' not in other
-    assert 'On the --validate recordings it falls from 0.26 N to 0.056 N' in other
-
-
 def test_a_held_out_error_that_rises_stands_in_the_headline_and_forbids_adoption() -> None:
     worse = made_up_diagnosis('adequate', unconfirmed=(
         found_effect('hysteresis', held_out_after=0.3,
@@ -137,25 +125,6 @@ def test_a_model_of_another_machine_is_fitted_before_another_motion_is_recorded(
     impossible = replace(made_up_diagnosis('unknown', unconfirmed=(
         found_effect('effort_gain', objection=objection),)), model=arm.real_arm(tmp_path))
     assert word_diagnosis(impossible).command == command
-
-
-def test_an_error_above_the_noise_is_told_where_nothing_holds() -> None:
-    above = made_up_diagnosis('adequate', unconfirmed=(
-        found_effect('hysteresis', held_out_after=0.3,
-                     objection='held-out data are predicted worse with it'),))
-    above = replace(above, remaining=2 * above.remaining)
-    assert re.match(r'No effect is supported by held-out data. The error, 0.1\d* N, is more than '
-                    r'the noise, 0.05 N\.', word_diagnosis(above).headline)
-    unknown = word_diagnosis(replace(above, verdict='unknown'))
-    assert unknown.following.startswith('Do not add hysteresis')
-
-
-def test_what_is_left_above_the_noise_is_not_called_the_noise() -> None:
-    above = made_up_diagnosis(remaining=1.6 * made_up_residuals().error,
-        effects=(found_effect('coulomb_friction'),))
-    headline = word_diagnosis(above).headline
-    assert 'which is the noise' not in headline
-    assert 'the noise is 0.05 N' in headline
 
 
 def test_a_drive_that_keeps_more_than_its_noise_is_named_beside_what_was_found() -> None:
@@ -207,23 +176,6 @@ def test_every_variable_has_words_a_lead_and_a_picture(variable: str) -> None:
     assert all(np.isfinite(np.asarray(curve.y, dtype=float)).all() for curve in picture.data)
 
 
-def test_suspects_ask_for_another_recording() -> None:
-    words = word_diagnosis(made_up_diagnosis('adequate', suspects=(SUSPECT,)))
-    assert words.suspects[0].startswith('effort_offset on slide_3')
-    assert 'slow noise explains the data as well' in words.suspects[0]
-    assert 'repeat the recording' in words.suspects[0]
-    assert words.following.startswith('Repeat the recording')
-
-
-def test_a_number_within_its_tolerance_is_calibrated_and_one_beyond_is_not() -> None:
-    values = build_model({**default_parameters(), 'tolerances.masses.payload': 0.05})
-    told = [word_diagnosis(made_up_diagnosis('adequate', model=values,
-                                             calibrated=(calibration(after),))).calibrated[0]
-            for after in (1.02, 1.2)]
-    assert 'masses.payload: 1 kg becomes 1.0200 ± 0.0040 kg, within its tolerance' in told[0]
-    assert 'beyond its tolerance' in told[1]
-
-
 def test_a_width_of_reversal_that_moved_is_not_told_as_what_it_was() -> None:
     moved = Calibration('friction.reversal_velocities', 0, 0.001, 0.0009962, 0.0, 'm/s')
     told = word_diagnosis(made_up_diagnosis('adequate', calibrated=(moved,))).calibrated[0]
@@ -247,12 +199,6 @@ def test_dry_asymmetric_friction_is_also_told_as_the_two_that_it_equals() -> Non
     assert any('coulomb_friction of 0.3 N plus effort_offset of 0.3 N' in one for one in remarks)
     viscous = found_effect('asymmetric_friction', only=('viscous_forward',))
     assert word_diagnosis(made_up_diagnosis(effects=(viscous,))).effects[0].remarks == ()
-
-
-def test_an_effect_of_measurement_is_never_a_command() -> None:
-    for name, told in (('effort_gain', True), ('coulomb_friction', False)):
-        what = word_diagnosis(made_up_diagnosis(effects=(found_effect(name),))).effects[0].what
-        assert ('never in a command' in what) is told
 
 
 @pytest.mark.parametrize('name', CATALOGUE)
@@ -341,66 +287,12 @@ def test_the_runner_up_stands_beside_the_best_set_with_its_cost() -> None:
     assert '>hysteresis on lift_2</th>' in page.html()
 
 
-@pytest.mark.parametrize(('second', 'said'), [
-    (('hysteresis',), 'hysteresis on lift_2 instead of coulomb_friction on lift_2'),
-    (('coulomb_friction', 'hysteresis'), 'hysteresis on lift_2 as well'),
-    ((), 'without coulomb_friction on lift_2')])
-def test_the_runner_up_is_told_by_what_it_has_instead(second: tuple[str, ...], said: str) -> None:
-    best, = ranked_sets('coulomb_friction')
-    diagnosis = one_effect(sets=(best, ranked_set(
-        tuple((name, ('lift_2',)) for name in second), 7.0)))
-    assert runner_up(diagnosis) == f'{said}: costs 7.0 more: names + 7.0'
-    assert runner_up(one_effect()) == ''
-
-
-def test_why_one_set_and_not_another_is_told_by_the_terms_of_their_costs() -> None:
-    terms = CostTerms(fit=2.03, coefficients=-1.3, names=0.04, drives=2.8, signs=-0.001)
-    best, = ranked_sets('coulomb_friction')
-    second = RankedSet((('rod_mass', None),), terms)
-    barred = RankedSet((('payload_mass', None),), CostTerms(fit=-4.0), 'its mass cannot be')
-    found = replace(found_effect('coulomb_friction'), evidence=second.cost, without=second)
-    diagnosis = made_up_diagnosis(effects=(found,), sets=(best, second), barred=(barred,))
-    why = 'costs 3.6 more: fit + 2.0, coefficients - 1.3, drives + 2.8'
-    assert runner_up(diagnosis) == f'rod_mass instead of coulomb_friction on lift_2: {why}'
-    words = word_diagnosis(diagnosis)
-    assert f'The best set without it, rod_mass, {why}.' in words.effects[0].why
-    assert words.barred == ('payload_mass is excluded: its mass cannot be. It '
-                            'costs 4.0 less: fit - 4.0',)
-    told = diagnosis.to_dict()
-    assert told['sets'][1]['terms'] == terms.to_dict()
-    assert told['sets'][1]['cost'] == pytest.approx(sum(told['sets'][1]['terms'].values()))
-    assert told['barred'][0]['barred'] == 'its mass cannot be'
-    assert told['effects'][0]['without']['cost'] == pytest.approx(told['effects'][0]['evidence'])
-    page = diagnosis_page(diagnosis, words, made_up_residuals(), ['a'])
-    assert 'fit + 2.0, coefficients - 1.3, drives + 2.8' in page.html()
-
-
-def test_effects_that_are_only_on_other_drives_in_the_runner_up_are_told_once() -> None:
-    every = tuple(DRIVES)
-    best = ranked_set((('hysteresis', every), ('coulomb_friction', ('lift_2',))), 0.0)
-    second = ranked_set((('hysteresis', every[:4]), ('load_friction', ('lift_2',))), 12.0)
-    assert runner_up(one_effect(sets=(best, second))) == (
-        'load_friction on lift_2 instead of coulomb_friction on lift_2, '
-        'hysteresis on other drives: costs 12.0 more: names + 12.0')
-    alone = ranked_set((('hysteresis', every[:1]), ('coulomb_friction', ('lift_2',))), 12.0)
-    assert runner_up(one_effect(sets=(best, alone))) == (
-        'hysteresis on slide_1 instead of hysteresis on all six drives: costs 12.0 more: '
-        'names + 12.0')
-
-
 def test_one_pattern_on_all_drives_is_one_finding() -> None:
     line = tuple(statement(drive, 'frequency', 'line', (7.0, 7.1)) for drive in DRIVES)
     words = word_diagnosis(made_up_diagnosis('unknown', depends_on=line))
     assert [finding.title for finding in words.unexplained] == [
         'unknown on slide_1, slide_2, slide_3, lift_1, lift_2 and lift_3, at one frequency']
     assert 'place' not in words.headline
-
-
-def test_a_rival_on_another_link_is_named_with_it() -> None:
-    diagnosis = replace(ambiguous(), indistinguishable=(('base_tilt', 'link_mass:bar_upper'),))
-    words = word_diagnosis(diagnosis)
-    assert 'base_tilt or link_mass on bar_upper (the data do not separate these)' in words.headline
-    assert 'link_mass:' not in words.headline
 
 
 def test_a_rival_has_its_card_with_values_and_cost_and_a_picture() -> None:

@@ -15,25 +15,24 @@ from typing import Any
 
 import numpy as np
 import pytest
+from single_axis import AXIS, axis_values
 
 from benchmarks.hidden.recordings import tolerant_model
-from pprs_dynamics import DriveModel, JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.model.robot_block import AXIS
 
 pytestmark = pytest.mark.slow
 
 # Powers of s and k by which base units scale.
 POWERS = {'1': (0.0, 0.0), 'rad': (0.0, 0.0), 'm': (1.0, 0.0), 's': (0.5, 0.0), 'N': (0.0, 1.0),
           'kg': (0.0, 1.0)}
-AXIS_VALUES = {'axis.mass': 20.0, 'axis.viscous': 40.0, 'axis.coulomb': 6.0, 'axis.offset': -2.0,
-               'friction.reversal_velocity': 0.001, 'tolerances.axis.mass': 0.02}
-UNITS = {'axis.mass': 'kg', 'axis.viscous': 'N s/m', 'axis.coulomb': 'N', 'axis.offset': 'N',
-         'friction.reversal_velocity': 'm/s', 'tolerances.axis.mass': '1'}
+AXIS_VALUES = {**axis_values(20.0, 40.0, 6.0, -2.0), 'tolerances.links.mass': 0.02}
+UNITS = {'links.mass': 'kg', 'friction.viscous': 'N s/m', 'friction.coulomb': 'N',
+         'friction.offset': 'N',
+         'friction.reversal_velocity': 'm/s', 'tolerances.links.mass': '1'}
 HIDDEN: dict[str, dict[str, Mapping[str, float]]] = {
     'nothing': {},
     'spring and mass': {'drive_spring': {'stiffness': 30.0, 'position': 0.02},
@@ -63,8 +62,7 @@ def diagnosed(name: str, s: float, k: float) -> Diagnosis:
     hidden = HIDDEN[name]
     values = {f'effects.{effect}.{AXIS}.{key}': value for effect, block in hidden.items()
               for key, value in block.items()}
-    true = build_model({**AXIS_VALUES, 'effects.active': list(hidden), **values})
-    assert isinstance(true, MechanismModel)
+    true = DriveModel.from_parameters({**AXIS_VALUES, 'effects.active': list(hidden), **values})
     time = np.arange(0, 20, 0.002)
     omega = 2 * np.pi * np.array([0.21, 0.37, 0.83])[:, None]
     size = np.array([0.08, 0.04, 0.015])[:, None]
@@ -76,7 +74,7 @@ def diagnosed(name: str, s: float, k: float) -> Diagnosis:
     if name == 'bump':
         force = force + 1.5 * np.exp(-0.5 * ((q - 0.03) / 0.008) ** 2)
     noise = 0.3 * np.random.default_rng(4).normal(size=force.shape)
-    model = build_model({key: value * factor(UNITS[key], s, k)
+    model = DriveModel.from_parameters({key: value * factor(UNITS[key], s, k)
                          for key, value in AXIS_VALUES.items()})
     recording = Recording.from_arrays('axis', np.sqrt(s) * time, s * q, None,
                                       k * (force + noise), (AXIS,))
@@ -87,10 +85,10 @@ def diagnosed(name: str, s: float, k: float) -> Diagnosis:
 def platform_diagnosed(s: float, k: float) -> Diagnosis:
     """Return the diagnosis of a 3-PPRS with a payload and a stiff slide, scaled."""
     given = tolerant_model(0.03)
-    true = build_model({**given.values, 'effects.active': ['payload_mass', 'viscous_friction'],
+    true = DriveModel.from_parameters(
+        {**given.values, 'effects.active': ['payload_mass', 'viscous_friction'],
                         'effects.payload_mass.mass': 0.3,
                         'effects.viscous_friction.slide_2.coefficient': 3.0})
-    assert isinstance(true, DriveModel)
     time = np.arange(0, 10, 0.004)
     forces = true.drive_forces(Excitation(10.0, seed=3).motion(time))
     noise = 0.08 * np.random.default_rng(5).normal(size=forces.total.shape)
@@ -98,7 +96,7 @@ def platform_diagnosed(s: float, k: float) -> Diagnosis:
                                  for key, one in given.keys.items() if key in given.values}}
     recording = Recording.from_arrays('robot', np.sqrt(s) * time, s * forces.mechanism.position,
                                       None, k * (forces.total + noise))
-    return diagnose(build_model(values), [recording])
+    return diagnose(DriveModel.from_parameters(values), [recording])
 
 
 def scaled(value: Any, by: float) -> Any:

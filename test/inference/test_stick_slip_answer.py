@@ -7,23 +7,22 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from single_axis import axis_values
 from sticking_block import TIME, dragged, slow
 
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.next_step import PLACEHOLDERS, next_step
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.model.parameter_file import parse_parameters
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
-MODEL = ('/**:\n  ros__parameters:\n    axis: {mass: 0.02, viscous: 0.4, coulomb: 0.6, '
-         'offset: 0.0, gravity: 0.0}\n    friction: {reversal_velocity: 0.001}\n')
+MODEL = axis_values(0.02, 0.4, 0.6)
 
 
 def test_it_is_named_with_its_frequency_and_no_ripple_is_claimed() -> None:
     position, effort = dragged(slow())
     noise = 0.005 * np.random.default_rng(4).normal(size=len(TIME))
-    found = diagnose(build_model(parse_parameters(MODEL)), [Recording.from_arrays(
+    found = diagnose(DriveModel.from_parameters(MODEL), [Recording.from_arrays(
         'run', TIME, position[:, None], None, (effort + noise)[:, None], ('axis',))])
     assert (found.verdict, found.effects) == ('unknown', ())
     assert found.to_dict()['stick_slip']['axis']['frequency'] == pytest.approx(2.3, abs=0.1)

@@ -11,7 +11,7 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 
-from pprs_dynamics import MechanismModel, ModelError
+from pprs_dynamics import DriveModel, ModelError
 from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
 
 TIME = np.arange(200) / 100
@@ -25,7 +25,7 @@ def read(folder: Path, position: np.ndarray, effort: np.ndarray, lines: str, suf
     path.write_text(path.read_text() + lines)
     run = folder / f'run{suffix}'
     write_recording(run, Recording.from_arrays('run', TIME, position, None, effort, arm.JOINTS))
-    return read_recording(run, MechanismModel.load(path).recorded)
+    return read_recording(run, DriveModel.load(path).recorded)
 
 
 @pytest.mark.parametrize('suffix', ['.csv', '.mcap'])
@@ -53,7 +53,7 @@ def test_a_unit_of_efforts_that_is_not_the_si_unit(tmp_path: Path) -> None:
     run = tmp_path / 'run.csv'
     write_recording(run, Recording.from_arrays(
         'run', TIME, POSITION, None, EFFORT / 0.0980665, arm.JOINTS))
-    found = read_recording(run, MechanismModel.load(path).recorded)
+    found = read_recording(run, DriveModel.load(path).recorded)
     np.testing.assert_allclose(found.effort, EFFORT)
 
 
@@ -67,6 +67,6 @@ def test_a_table_below_a_preamble_with_a_line_of_units(tmp_path: Path) -> None:
                header='Log 7\nChannels;7\nRate;100;Hz\n' + ';'.join(
                    ['t', *arm.JOINTS, *(f'{joint} f' for joint in arm.JOINTS)]) + '\n'
                + ';'.join(['s', *['deg'] * 3, *['N'] * 3]))
-    found = read_recording(run, MechanismModel.load(path).recorded)
+    found = read_recording(run, DriveModel.load(path).recorded)
     np.testing.assert_allclose(found.position, POSITION)
     np.testing.assert_allclose(found.effort, EFFORT)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
 from pprs_dynamics.physics.effects.laws.link_mass import LinkMass
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
@@ -49,22 +49,22 @@ MODEL = """
 
 
 @pytest.fixture(scope='module')
-def parallelogram(tmp_path_factory: pytest.TempPathFactory) -> MechanismModel:
+def parallelogram(tmp_path_factory: pytest.TempPathFactory) -> DriveModel:
     """Return its model."""
     folder: Path = tmp_path_factory.mktemp('parallelogram')
     (folder / 'parallelogram.urdf').write_text(PARALLELOGRAM)
     file = folder / 'model.yaml'
     file.write_text(MODEL)
-    return MechanismModel.load(file)
+    return DriveModel.load(file)
 
 
-def test_links_that_turn_alike_are_grouped_and_no_others(parallelogram: MechanismModel) -> None:
+def test_links_that_turn_alike_are_grouped_and_no_others(parallelogram: DriveModel) -> None:
     robot = parallelogram.robot
     names = [tuple(robot.body_names[k] for k in group) for group in alike_bodies(robot)]
     assert names == [('crank', 'follower'), ('coupler',), ('pointer',)]
 
 
-def test_a_body_on_one_of_them_is_a_body_on_the_other(parallelogram: MechanismModel) -> None:
+def test_a_body_on_one_of_them_is_a_body_on_the_other(parallelogram: DriveModel) -> None:
     """At the same place relative to the pin that stands, whatever the motion."""
     rng = np.random.default_rng(3)
     q, v, a = rng.uniform(-0.5, 0.5, (3, 30, 2))
@@ -85,7 +85,7 @@ def test_a_body_on_one_of_them_is_a_body_on_the_other(parallelogram: MechanismMo
     assert np.abs(on_crank - robot.torques(q, v, a)).max() > 0.1
 
 
-def test_only_one_of_them_is_offered_with_a_free_centre(parallelogram: MechanismModel) -> None:
+def test_only_one_of_them_is_offered_with_a_free_centre(parallelogram: DriveModel) -> None:
     effect = parallelogram.bound(LinkMass)
     places = [{name.rpartition('.')[0] for name in names}.pop() for names in effect.variants
               if len(names) > 1]
@@ -94,7 +94,7 @@ def test_only_one_of_them_is_offered_with_a_free_centre(parallelogram: Mechanism
 
 
 def test_friction_that_turns_with_a_drive_is_left_to_the_drive(
-    parallelogram: MechanismModel,
+    parallelogram: DriveModel,
 ) -> None:
     groups = proportional_joints(parallelogram.robot.structure)
     assert groups == (('crank_pin', 'knee', 'ankle'), ('pivot',))
@@ -110,7 +110,7 @@ def test_friction_that_turns_with_a_drive_is_left_to_the_drive(
 @pytest.mark.parametrize('file', ['hexapod', 'delta'])
 def test_a_model_and_effects_on_its_links_go_to_other_processes(file: str) -> None:
     """The workbench diagnoses in a process of its own: models and effects are pickled."""
-    model = MechanismModel.load(f'config/{file}.yaml')
+    model = DriveModel.load(f'config/{file}.yaml')
     again = pickle.loads(pickle.dumps(model))
     assert again.values == model.values
     for effect in (LinkMass, PayloadMass, JointFrictionEffect):

@@ -59,9 +59,9 @@ def everything(model: DriveModel, motion: PlatformMotion) -> dict[str, np.ndarra
     found = solve_forward_kinematics(geometry, s.position, motion)
     rates = platform_rates(geometry, motion, s.velocity, s.acceleration)
     return {'total': forces.total, **forces.parts, 'in steps': kept.total,
-            'position': s.position, 'acceleration': s.acceleration, 'J': s.jacobians.J,
-            'J_u': s.jacobians.J_u, 'friction_load': s.friction_load,
-            'reactions': np.stack(s.rigid_body.reactions), 'found': found.position,
+            'position': s.position, 'acceleration': s.acceleration, 'J': s.links.jacobians.J,
+            'J_u': s.links.jacobians.J_u, 'friction_load': s.friction_load,
+            'reactions': np.stack(s.reactions.reactions), 'found': found.position,
             'turned': found.orientation, 'rates': rates.rows}
 
 
@@ -106,9 +106,10 @@ def test_the_drives_motion_that_comes_with_the_forces_is_the_mechanisms(plainly,
     model, motion = paper_model(), random_motion(np.random.default_rng(7), samples)
     run = plainly if plain else (lambda function: function())
     forces, state = run(lambda: (model.drive_forces(motion), model.mechanism(motion)))
-    expected = state.chains.position, state.chains.velocity, state.chains.acceleration
+    chains = state.links.chains
+    expected = chains.position, chains.velocity, chains.acceleration
     for kept, built, value in zip(run(lambda: forces.drive_motion),
-                                  run(lambda: forces.mechanism.kinematics.drive_motion),
+                                  run(lambda: forces.mechanism.links.drive_motion),
                                   expected, strict=True):
         assert kept.flags.c_contiguous
         assert_array_equal(kept, built)
@@ -237,7 +238,7 @@ def test_a_motion_does_not_change_with_the_arrays_that_it_was_made_of():
 
 OF_EITHER_KIND = {
     'three_pprs': "model, motion = DriveModel.load(), Excitation(2.0).motion(time)",
-    'hexapod': """model = load_model('config/hexapod.yaml')
+    'hexapod': """model = DriveModel.load('config/hexapod.yaml')
 q = model.robot.structure.home[model.robot.structure.tables.drives] + 0 * time[:, None]
 motion = JointMotion(q, 0 * q, 0 * q, time)"""}
 
@@ -247,7 +248,7 @@ def evaluated(kind: str, begin: str, **environment: str) -> list[str]:
     code = f'''
 import sys
 import numpy as np
-from pprs_dynamics import DriveModel, Excitation, JointMotion, load_model
+from pprs_dynamics import DriveModel, Excitation, JointMotion
 from pprs_dynamics.physics.mechanism import evaluation
 {begin}
 time = np.arange(0.0, 2.0, 0.004)
@@ -271,7 +272,8 @@ def test_a_program_that_soon_ends_does_not_wait_for_the_compiler(kind, pays):
 
 
 def test_a_robot_with_loops_is_read_without_the_compiler():
-    code = ("import sys\nfrom pprs_dynamics import load_model\nload_model('config/hexapod.yaml')\n"
+    code = ("import sys\nfrom pprs_dynamics import DriveModel\n"
+            "DriveModel.load('config/hexapod.yaml')\n"
             "print('numba' in sys.modules)")
     done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == ['False']

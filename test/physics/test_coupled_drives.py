@@ -10,28 +10,26 @@ import pytest
 from made_up_arm import motion, write_arm
 from numpy.testing import assert_allclose
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.regression.design import Design, searched_in_drives
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveSamples
 from pprs_dynamics.physics.effects.laws.counterbalance import Counterbalance
-from pprs_dynamics.physics.model.model_file import build_model
 
 MAP = '{wrist: {turn: -0.5, swing: 2.0}}'
 
 
 @pytest.fixture
 def arm(tmp_path):
-    return MechanismModel.load(write_arm(tmp_path, friction__motors=MAP))
+    return DriveModel.load(write_arm(tmp_path, friction__motors=MAP))
 
 
 def with_effect(model, name, **values):
-    found = build_model({**model.values, 'effects.active': [name], **{
+    found = DriveModel.from_parameters({**model.values, 'effects.active': [name], **{
         f'effects.{name}.{key.replace("__", ".")}': value for key, value in values.items()}},
         model.source)
-    assert isinstance(found, MechanismModel)
     return found
 
 
@@ -62,7 +60,7 @@ def test_where_the_motor_stands_its_joints_feel_nothing(arm):
 
 
 def test_no_map_is_no_candidate(tmp_path, arm):
-    plain = MechanismModel.load(write_arm(tmp_path))
+    plain = DriveModel.load(write_arm(tmp_path))
     for model, expected in ((plain, 0), (arm, 2)):
         assert len(model.bound(CATALOGUE['coupled_drives']).coefficients) == expected
 
@@ -73,7 +71,7 @@ def test_no_map_is_no_candidate(tmp_path, arm):
     ('{wrist: {turn: 1.0, swing: fast}}', 'friction.motors.wrist.swing')])
 def test_a_map_that_cannot_be_is_told(tmp_path, motors, sentence):
     with pytest.raises(ModelError, match=sentence):
-        MechanismModel.load(write_arm(tmp_path, friction__motors=motors))
+        DriveModel.load(write_arm(tmp_path, friction__motors=motors))
 
 
 def stretched(q, nearer, farther, place):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pprs_dynamics import JointMotion, MechanismModel, load_model
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.api.first_model import first_model
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.effects.catalogue import find_effect
@@ -38,27 +38,26 @@ def joint(name: str, parent: str, child: str, axis: str = '0 1 0', kind: str = '
             '</joint>')
 
 
-def load(folder: Path, urdf: str, block: str) -> MechanismModel:
+def load(folder: Path, urdf: str, block: str) -> DriveModel:
     (folder / 'robot.urdf').write_text(f'<robot name="robot">{urdf}</robot>')
     return _load(folder, 'robot.urdf', block)
 
 
-def load_mjcf(folder: Path, mjcf: str, block: str) -> MechanismModel:
+def load_mjcf(folder: Path, mjcf: str, block: str) -> DriveModel:
     (folder / 'robot.xml').write_text(f'<mujoco>{mjcf}</mujoco>')
     return _load(folder, 'robot.xml', block)
 
 
-def _load(folder: Path, name: str, block: str) -> MechanismModel:
+def _load(folder: Path, name: str, block: str) -> DriveModel:
     kind = 'urdf' if name.endswith('urdf') else 'mjcf'
     path = folder / 'robot.yaml'
     path.write_text('/**:\n  ros__parameters:\n    '
                     + block.replace('{', f'{{{kind}: {name}, ', 1) + '\n')
-    model = load_model(path)
-    assert isinstance(model, MechanismModel)
+    model = DriveModel.load(path)
     return model
 
 
-def efforts(model: MechanismModel, *motion: Any) -> Any:
+def efforts(model: DriveModel, *motion: Any) -> Any:
     return model.drive_forces(JointMotion(*(np.atleast_2d(each) for each in motion))).total
 
 

@@ -30,11 +30,12 @@ from random_states import (
 )
 from scipy.spatial.transform import Rotation
 
-from pprs_dynamics import DriveModel, JointMotion, PlatformMotion, load_model
+from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MotionError, PprsError, SingularityError
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.physics.three_pprs.robot import Masses, Robot
+from pprs_dynamics.physics.three_pprs.geometry import Masses
+from pprs_dynamics.physics.three_pprs.robot import ThreePprs
 
 # Forces of some 40 N and powers of some 100 W, with the rounding errors of a few hundred
 # operations; a wrong term shows at 1e-3 or more.
@@ -72,8 +73,8 @@ def power(forces, part):
 
 def reactions_on_platform(robot, forces):
     """Return the force of every rod on the platform, (N, 3, 3) [N], from H, V and W."""
-    (e, n), chains, r = chain_vectors(robot.geometry), forces.mechanism.chains, \
-        forces.mechanism.rigid_body.reactions
+    (e, n), chains, r = chain_vectors(robot.geometry), forces.mechanism.links.chains, \
+        forces.mechanism.reactions.reactions
     c, s = chains.cos_u[..., None], chains.sin_u[..., None]
     along, normal = -c * e + s * UP, -(s * e + c * UP)
     return r.H[..., None] * n + r.V[..., None] * along + r.W[..., None] * normal
@@ -143,7 +144,7 @@ def turned_by_a_third(robot, motion):
     position, *vectors = (x @ Z.T for x in (
         motion.position, motion.linear_velocity, motion.angular_velocity,
         motion.linear_acceleration, motion.angular_acceleration))
-    return (Robot(robot.geometry, masses, tuple(Z @ robot.gravity)),
+    return (ThreePprs(robot.geometry, masses, tuple(Z @ robot.gravity)),
             PlatformMotion(position, orientation.as_quat(), *vectors))
 
 
@@ -152,9 +153,9 @@ def turned_by_a_third(robot, motion):
                          ids=['whole', 'whole-printed', 'independent', 'independent-printed'])
 def test_turning_everything_by_120_degrees_permutes_the_chains(elbow, changes):
     rng = np.random.default_rng(54)
-    robot = Robot(paper_geometry(elbow), random_masses(rng), OBLIQUE)
+    robot = ThreePprs(paper_geometry(elbow), random_masses(rng), OBLIQUE)
     motion = random_motion(rng, STATES, elbow)
-    cos_u = model_of(robot).mechanism(motion).chains.cos_u
+    cos_u = model_of(robot).mechanism(motion).links.chains.cos_u
     motion = motion[np.all(np.abs(cos_u) > 0.06, axis=1)]  # where (13) is defined
     forces = model_of(robot, changes).drive_forces(motion)
     turned_robot, turned_motion = turned_by_a_third(robot, motion)
@@ -191,7 +192,7 @@ def test_reactions_satisfy_the_platforms_newton_euler_equations(robot, motion):
 
 def test_reactions_and_loads_are_those_of_every_body_cut_free(robot, motion):
     forces = model_of(robot).drive_forces(motion)
-    chains, body = forces.mechanism.chains, forces.mechanism.rigid_body
+    chains, body = forces.mechanism.links.chains, forces.mechanism.reactions
     (e, n), g, l = chain_vectors(robot.geometry), np.asarray(robot.gravity), \
         robot.geometry.rod_length  # noqa: E741
     slides, lifts, rods = (np.asarray(m)[:, None] for m in (
@@ -217,8 +218,8 @@ def test_reactions_and_loads_are_those_of_every_body_cut_free(robot, motion):
     assert_allclose(r.V_star, at_C[..., 2], rtol=0, atol=ROUNDING)
     assert_allclose(r.W_star, -np.sum(at_C * e, axis=-1), rtol=0, atol=ROUNDING)
     # A drive pushes along its guide; the rest of the force is the guide's load.
-    assert_allclose(body.force[:, :3], np.sum(from_base * n, axis=-1), rtol=0, atol=ROUNDING)
-    assert_allclose(body.force[:, 3:], from_slide[..., 2], rtol=0, atol=ROUNDING)
+    assert_allclose(body.efforts[:, :3], np.sum(from_base * n, axis=-1), rtol=0, atol=ROUNDING)
+    assert_allclose(body.efforts[:, 3:], from_slide[..., 2], rtol=0, atol=ROUNDING)
     across_slide = from_base - np.sum(from_base * n, axis=-1, keepdims=True) * n
     assert_allclose(body.guide_load[:, :3], np.linalg.norm(across_slide, axis=-1), rtol=0,
                     atol=ROUNDING)
@@ -245,8 +246,8 @@ def joint_friction(robot, motion, forces, c_r, mu_r, d_r, c_s, mu_s, d_s):
     velocities.
     """
     _, n = chain_vectors(robot.geometry)
-    r = forces.mechanism.rigid_body.reactions
-    rod = forces.mechanism.chains.u_dot[..., None] * n
+    r = forces.mechanism.reactions.reactions
+    rod = forces.mechanism.links.chains.u_dot[..., None] * n
     relative = rod - motion.angular_velocity[:, None]
     moments = []
     for velocity, load, c, mu, d in (
@@ -283,7 +284,7 @@ def test_passive_friction_does_the_joints_virtual_work_for_every_drive(robot, mo
             lambda x, p=pose: drive_motion(robot.geometry, moved(p, x))[0][0], 6)
         platform = np.linalg.inv(turns)
         u = central_difference(
-            lambda x, p=pose: model.mechanism(moved(p, x)).chains.rod_angle[0], 6) @ platform
+            lambda x, p=pose: model.mechanism(moved(p, x)).links.chains.rod_angle[0], 6) @ platform
         virtual = np.zeros(6)
         for i in range(3):
             rod = n[i][:, None] * u[i]
@@ -295,7 +296,7 @@ def test_viscous_passive_friction_is_a_symmetric_damping_of_all_but_rising(robot
     # Delta Q = D q_dot with D from its columns: each drive moved alone at 1 m/s.
     model = model_of(robot, VISCOUS_ONLY)
     state = random_motion(np.random.default_rng(55), 1, robot.geometry.elbow)
-    J = model.mechanism(state).jacobians.J[0]
+    J = model.mechanism(state).links.jacobians.J[0]
     zero = np.zeros((6, 3))
     alone = PlatformMotion(state.position.repeat(6, 0), state.orientation.repeat(6, 0),
                            J[:3].T, J[3:].T, zero, zero)
@@ -322,7 +323,7 @@ def test_zero_velocity_gives_zero_friction(robot, motion, changes):
     zero = np.zeros_like(motion.position)
     starting = PlatformMotion(motion.position, motion.orientation, zero, zero,
                               motion.linear_acceleration, motion.angular_acceleration)
-    cos_u = model_of(robot).mechanism(starting).chains.cos_u
+    cos_u = model_of(robot).mechanism(starting).links.chains.cos_u
     starting = starting[np.all(np.abs(cos_u) > 0.06, axis=1)]
     forces = model_of(robot, changes).drive_forces(starting)
     for part in ('active_friction', 'passive_friction'):
@@ -362,8 +363,8 @@ def test_printed_equation_12_leaves_out_a_term_in_pure_translation(robot, motion
     corrected = model_of(robot, changes).drive_forces(translation)
     printed = model_of(robot, {**changes, **PRINTED}).drive_forces(translation)
     _, n = chain_vectors(robot.geometry)
-    spin = 0.02 * corrected.mechanism.chains.u_dot @ n
-    left_out = -np.einsum('nij,ni->nj', corrected.mechanism.jacobians.J_omega, spin)
+    spin = 0.02 * corrected.mechanism.links.chains.u_dot @ n
+    left_out = -np.einsum('nij,ni->nj', corrected.mechanism.links.jacobians.J_omega, spin)
     assert np.abs(left_out).max() > 0.1
     assert_allclose(corrected.parts['passive_friction'] - printed.parts['passive_friction'],
                     left_out, rtol=0, atol=ROUNDING)
@@ -372,7 +373,7 @@ def test_printed_equation_12_leaves_out_a_term_in_pure_translation(robot, motion
 def test_printed_equation_7_lacks_the_rod_length_in_one_term(robot, motion):
     corrected = model_of(robot).drive_forces(motion)
     printed = model_of(robot, PRINTED).drive_forces(motion)
-    c = corrected.mechanism.chains
+    c = corrected.mechanism.links.chains
     difference = np.asarray(robot.masses.rods) / 2 * (1 - robot.geometry.rod_length) * (
         c.u_ddot * c.cos_u - c.u_dot ** 2 * c.sin_u)
     assert np.abs(difference).max() > 0.1  # whatever the rods weigh
@@ -401,7 +402,7 @@ def test_pure_yaw_of_1_rad_per_s_at_home(elbow, changes, slide):
 
 def test_printed_equation_13_has_the_wrong_sign_throughout(robot, motion):
     # Rods of this robot pass through cos u = 0 within the sampled workspace.
-    cos_u = model_of(robot).mechanism(motion).chains.cos_u
+    cos_u = model_of(robot).mechanism(motion).links.chains.cos_u
     defined = motion[np.all(np.abs(cos_u) >= 0.05, axis=1)]
     assert STATES / 3 < len(defined) < STATES
     corrected = model_of(robot, INDEPENDENT).drive_forces(defined).parts['passive_friction']
@@ -412,13 +413,13 @@ def test_printed_equation_13_has_the_wrong_sign_throughout(robot, motion):
 
 
 def test_independent_chains_do_each_chains_virtual_work(robot, motion):
-    cos_u = model_of(robot).mechanism(motion).chains.cos_u
+    cos_u = model_of(robot).mechanism(motion).links.chains.cos_u
     defined = motion[np.all(np.abs(cos_u) >= 0.05, axis=1)]
     changes = {**INDEPENDENT, **HARD_SIGN, **NUMBERS}
     forces = model_of(robot, changes).drive_forces(defined)
     at_C, at_A, *_ = joint_friction(robot, defined, forces, *NUMBERS.values())
     _, n = chain_vectors(robot.geometry)
-    lever = robot.geometry.rod_length * forces.mechanism.chains.cos_u
+    lever = robot.geometry.rod_length * forces.mechanism.links.chains.cos_u
     slides = at_A[..., 2] / lever
     lifts = np.sum((at_A + at_C) * n, axis=-1) / lever
     assert_allclose(forces.parts['passive_friction'], np.concatenate((slides, lifts), axis=1),
@@ -594,4 +595,4 @@ def test_state_of_another_model_is_refused(remembering):
     ('config/delta.yaml', JointMotion(*np.zeros((3, 4, 2))), r'must be \(N, 3\)')])
 def test_a_motion_of_another_machine_is_refused_in_a_sentence(file, motion, rule):
     with pytest.raises(MotionError, match=rule):
-        load_model(file).drive_forces(motion)
+        DriveModel.load(file).drive_forces(motion)

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.mechanism.arithmetic import compiled_solve
 from pprs_dynamics.physics.mechanism.elimination import elimination_order
 
@@ -60,7 +60,7 @@ def test_it_solves_what_lapack_solves_at_home_and_elsewhere(seed: int) -> None:
 
 def test_of_a_hexapod_most_is_zero_for_good() -> None:
     """Of 18 by 18, legs fill 6 columns of the platform and their own: as counted by hand."""
-    t = MechanismModel.load('config/hexapod.yaml').robot.structure.tables
+    t = DriveModel.load('config/hexapod.yaml').robot.structure.tables
     _, below, right = np.diff(t.starts, axis=0).T
     # Each leg: two rows from which 7 columns go, one from which 6; then 6 by 6 in full.
     assert below @ right <= 6 * (2 * 7 + 6) + sum(k * k for k in range(6))

@@ -15,7 +15,7 @@ import pytest
 from failing_effects import FAULTS, fail, model_file
 from feedforward_bench import random_motion
 
-from pprs_dynamics import DriveModel, JointMotion, MechanismModel, PlatformMotion, load_model
+from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import EffectError
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples, GainEffect
 from pprs_dynamics.physics.effects.effect import Card, Parameter
@@ -43,7 +43,7 @@ def test_a_failing_drive_effect_is_one_error_with_its_name(
     ('load', 'longer', 'must be (1, 6)'),
     ('load', 'nan', 'load returned a wrench with nan, must be finite'),
     ('changed', 'raises', 'changed raised ZeroDivisionError'),
-    ('changed', 'none', 'changed returned None, must be a Robot'),
+    ('changed', 'none', 'changed returned None, must be a ThreePprs'),
 ])
 def test_a_failing_effect_on_the_bodies_is_one_error_with_its_name(
     package: ModuleType, tmp_path: Path, place: str, fault: str, told: str,
@@ -55,10 +55,10 @@ def test_a_failing_effect_on_the_bodies_is_one_error_with_its_name(
     assert told in str(raised.value)
 
 
-def hexapod_with(effect: str, **block: float) -> MechanismModel:
+def hexapod_with(effect: str, **block: float) -> DriveModel:
     added = {f'effects.{effect}.{key}': value for key, value in block.items()}
-    values = {**load_model('config/hexapod.yaml').values, 'effects.active': [effect], **added}
-    return MechanismModel.from_parameters(values, 'config/hexapod.yaml')
+    values = {**DriveModel.load('config/hexapod.yaml').values, 'effects.active': [effect], **added}
+    return DriveModel.from_parameters(values, 'config/hexapod.yaml')
 
 
 def test_an_effect_on_the_bodies_acts_on_a_robot_with_loops_as_well(package: ModuleType) -> None:

@@ -33,14 +33,14 @@ from pprs_dynamics.errors import (
     SingularityError,
     WorkspaceError,
 )
+from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.three_pprs.forward_kinematics import home_pose, solve_forward_kinematics
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
     chain_table,
     solve_inverse_kinematics,
 )
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number, inverse_table
-from pprs_dynamics.physics.three_pprs.robot import Robot
-from pprs_dynamics.physics.three_pprs.state import solve_mechanism
+from pprs_dynamics.physics.three_pprs.robot import ThreePprs
 
 POSES = 4000
 # Newton stops at 1e-13 of a rod, which the condition of [B] turns into some 1e-12 rad.
@@ -69,8 +69,8 @@ DIFFERENCE_TOLERANCE = 1e-9
 
 def solve(geometry, motion):
     """Return chains and Jacobians of a motion."""
-    state = solve_mechanism(Robot(geometry, paper_model().robot.masses), motion)
-    return state.chains, state.jacobians
+    state = ThreePprs(geometry, paper_model().robot.masses).state(motion, Reversal())
+    return state.links.chains, state.links.jacobians
 
 
 def home_determinant(geometry):
@@ -379,10 +379,9 @@ def test_condition_number_takes_rotations_times_the_platform_radius():
     robot = random_robot(np.random.default_rng(43))
     motion = random_motion(np.random.default_rng(44), 50)
     model = model_of(robot)
-    J = model.mechanism(motion).jacobians.J.copy()
+    J = model.mechanism(motion).links.jacobians.J.copy()
     J[:, 3:] *= robot.geometry.platform_radius
-    assert_allclose(model.condition_number(motion), np.linalg.cond(J), rtol=1e-10)
-    assert_allclose(condition_number(robot.geometry, model.mechanism(motion).jacobians.J),
+    assert_allclose(condition_number(robot.geometry, model.mechanism(motion).links.jacobians.J),
                     np.linalg.cond(J), rtol=1e-10)
 
 
@@ -432,8 +431,8 @@ def test_pose_at_which_the_drives_cannot_hold_the_platform_raises(elbow):
 def test_condition_limit_is_where_it_says(elbow):
     geometry = paper_geometry(elbow)
     pose = yaw_with_share(geometry, 0.2)
-    number = float(paper_model({'geometry.elbow': elbow, 'limits.condition_number': 1e6})
-                   .condition_number(pose)[0])
+    free = paper_model({'geometry.elbow': elbow, 'limits.condition_number': 1e6}).mechanism(pose)
+    number = float(condition_number(geometry, free.links.jacobians.J)[0])
     above = {'geometry.elbow': elbow, 'limits.condition_number': number * (1 + 1e-9)}
     below = {'geometry.elbow': elbow, 'limits.condition_number': number * (1 - 1e-9)}
     assert np.all(np.isfinite(paper_model(above).drive_forces(pose).total))

@@ -17,6 +17,7 @@ import yaml
 from pprs_command import pprs
 
 from pprs_dynamics.errors import ModelError, UnreadableFileError
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import (
     Step,
     original_values,
@@ -24,7 +25,6 @@ from pprs_dynamics.physics.model.ledger import (
     with_step,
     without_last_step,
 )
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import (
     LEDGER,
@@ -48,7 +48,7 @@ TILT = {'effects.active': ['coulomb_friction', 'base_tilt'], 'effects.base_tilt.
 
 
 def model_values(values: dict[str, Any]) -> dict[str, Any]:
-    return dict(build_model(values).values)
+    return dict(DriveModel.from_parameters(values).values)
 
 
 @pytest.fixture
@@ -232,5 +232,5 @@ def test_a_model_without_steps_has_none_to_take_back(tmp_path: Path) -> None:
     done = pprs('history', str(tmp_path / 'model.yaml'), '--undo', '--output',
                 str(tmp_path / 'new.yaml'))
     assert done.returncode == 1
-    assert 'holds no step' in done.stderr
+    assert 'has no step' in done.stderr
     assert not (tmp_path / 'new.yaml').exists()

@@ -12,12 +12,14 @@ import pytest
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import LimitError, WorkspaceError
-from pprs_dynamics.physics.model.limits import DriveLimits, JointLimits, Limits
+from pprs_dynamics.physics.model.limits import DriveLimits
 
-PAPER = replace(DriveModel.load().limits, slide_stroke=(-0.3, 0.2), lift_stroke=(-0.1, 0.8),
-                effort=(10.0, 20.0, 30.0, 40.0, 50.0, 60.0))
-ARM = JointLimits(('elbow', 'rail'), ('rad', 'm'), ('N m', 'N'), np.array([-2.0, 0.0]),
-                  np.array([1.0, 0.5]), np.array([7.0, 300.0]))
+PAPER = DriveModel.from_parameters({
+    **DriveModel.load().values, 'limits.slide_stroke': [-0.3, 0.2],
+    'limits.lift_stroke': [-0.1, 0.8], 'limits.effort': [10.0, 20.0, 30.0, 40.0, 50.0, 60.0],
+}).limits
+ARM = DriveLimits(('elbow', 'rail'), ('rad', 'm'), ('N m', 'N'), np.array([-2.0, 0.0]),
+                  np.array([1.0, 0.5]), np.array([7.0, 300.0]), ('its range',) * 2, 'the URDF')
 EACH = pytest.mark.parametrize('limits', [PAPER, ARM], ids=['3-PPRS', 'arm'])
 
 
@@ -31,7 +33,7 @@ def test_the_strokes_of_a_3_pprs_are_those_of_slides_and_lifts() -> None:
     lower, upper = PAPER.strokes
     assert lower.tolist() == [-0.3] * 3 + [-0.1] * 3
     assert upper.tolist() == [0.2] * 3 + [0.8] * 3
-    assert [PAPER.stroke_source(drive) for drive in range(6)] == (
+    assert list(PAPER.sources) == (
         ['limits.slide_stroke'] * 3 + ['limits.lift_stroke'] * 3)
     assert PAPER.position_units == ('m',) * 6
     assert PAPER.effort_units == ('N',) * 6
@@ -73,7 +75,7 @@ def test_the_first_position_outside_its_stroke_is_named(limits: DriveLimits) -> 
             unit = limits.position_units[drive]
             text = str(caught.value)
             assert f'{name} would have to be at {end[drive] + out:.6g} {unit}' in text
-            assert (f'{limits.stroke_source(drive)} is [{lower[drive]:g}, {upper[drive]:g}] {unit}'
+            assert (f'{limits.sources[drive]} is [{lower[drive]:g}, {upper[drive]:g}] {unit}'
                     ) in text
     bad = middle(limits)
     bad[1, 0] = np.nan
@@ -128,9 +130,7 @@ def test_what_is_allowed_is_finite_and_within_all_limits(limits: DriveLimits) ->
 
 def test_an_arm_without_limits_in_its_urdf_is_allowed_everything_finite() -> None:
     free = replace(ARM, lower=np.full(2, -np.inf), upper=np.full(2, np.inf),
-                   effort=np.full(2, np.inf))
+                   efforts=np.full(2, np.inf))
     table = np.full((2, 2), 1e12)
     assert free.allow(table, (table, table, table))
     assert not free.allow(table * np.inf, (table, table, table))
-    assert ARM.stroke_source(0) == 'its range in the URDF'
-    assert isinstance(PAPER, Limits)

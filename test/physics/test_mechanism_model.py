@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pprs_dynamics import DriveModel, JointMotion, MechanismModel, PprsError, load_model
+from pprs_dynamics import DriveModel, JointMotion, PprsError
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import ModelError, UnreadableFileError
@@ -32,7 +32,6 @@ from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
 from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.effects.laws.stribeck_friction import StribeckFriction
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import write_model
 
 SAMPLES = 40
@@ -61,7 +60,7 @@ def mujoco_torques(text: str, motion: JointMotion, gravity: tuple[float, ...] = 
 
 
 def test_torques_are_those_of_mujoco(tmp_path: Path) -> None:
-    model = MechanismModel.load(arm.write_arm(tmp_path))
+    model = DriveModel.load(arm.write_arm(tmp_path))
     motion = states()
     assert model.drive_forces(motion).total == pytest.approx(
         mujoco_torques(arm.urdf(), motion), abs=1e-9)
@@ -72,7 +71,7 @@ def test_a_payload_is_a_body_more_to_mujoco(tmp_path: Path) -> None:
     body = ('<link name="load"><inertial><mass value="2.5"/><origin xyz="0.03 -0.05 0.08"/>'
             '<inertia ixx="0.02" iyy="0.03" izz="0.025" ixy="0" ixz="0" iyz="0"/></inertial></link>'
             '<joint name="grip" type="fixed"><parent link="flange"/><child link="load"/></joint>')
-    model = MechanismModel.load(arm.write_arm(tmp_path))
+    model = DriveModel.load(arm.write_arm(tmp_path))
     values = dict(zip(('mass', 'x', 'y', 'z', 'xx', 'yy', 'zz'), (mass, *centre, *inertia),
                       strict=True))
     effect = PayloadMass.bound(model.robot).from_file(values)
@@ -83,7 +82,7 @@ def test_a_payload_is_a_body_more_to_mujoco(tmp_path: Path) -> None:
 
 
 def test_a_tilted_base_is_another_gravity_to_mujoco(tmp_path: Path) -> None:
-    model = MechanismModel.load(arm.write_arm(tmp_path))
+    model = DriveModel.load(arm.write_arm(tmp_path))
     motion = states()
     tilted = BaseTilt({'x': 0.1, 'y': 0.0}).apply(model.mechanism(motion))
     gravity = (0.0, 9.81 * np.sin(0.1), -9.81 * np.cos(0.1))
@@ -92,7 +91,7 @@ def test_a_tilted_base_is_another_gravity_to_mujoco(tmp_path: Path) -> None:
 
 
 def test_an_upward_wrench_holds_what_a_mass_weighs(tmp_path: Path) -> None:
-    model = MechanismModel.load(arm.write_arm(tmp_path))
+    model = DriveModel.load(arm.write_arm(tmp_path))
     rest = JointMotion(states().position, *np.zeros((2, SAMPLES, 3)))
     names = [p.name for p in ExternalWrench.parameters]
     wrench = ExternalWrench({name: 9.81 if name == 'force_z' else 0.0 for name in names})
@@ -102,7 +101,7 @@ def test_an_upward_wrench_holds_what_a_mass_weighs(tmp_path: Path) -> None:
 
 
 def test_torques_are_linear_in_the_regressor(tmp_path: Path) -> None:
-    model = MechanismModel.load(arm.write_arm(tmp_path, joints=('reach', 'turn', 'swing')))
+    model = DriveModel.load(arm.write_arm(tmp_path, joints=('reach', 'turn', 'swing')))
     motion = states()
     rows = model.robot.regressor(motion.position, motion.velocity, motion.acceleration)
     assert rows @ model.robot.inertial.ravel() == pytest.approx(
@@ -112,8 +111,8 @@ def test_torques_are_linear_in_the_regressor(tmp_path: Path) -> None:
 def test_joints_in_another_order_permute_the_torques(tmp_path: Path) -> None:
     motion = states()
     order = [2, 0, 1]
-    model = MechanismModel.load(arm.write_arm(tmp_path))
-    other = MechanismModel.load(arm.write_arm(tmp_path, joints=tuple(arm.JOINTS[k] for k in order)))
+    model = DriveModel.load(arm.write_arm(tmp_path))
+    other = DriveModel.load(arm.write_arm(tmp_path, joints=tuple(arm.JOINTS[k] for k in order)))
     moved = JointMotion(*(values[:, order] for values in (
         motion.position, motion.velocity, motion.acceleration)))
     assert other.drive_forces(moved).total == pytest.approx(
@@ -124,15 +123,15 @@ def test_locked_joints_are_as_those_that_rest(tmp_path: Path) -> None:
     motion = states()
     held = JointMotion(*(values * [1, 0, 1] for values in (
         motion.position, motion.velocity, motion.acceleration)))
-    part = MechanismModel.load(arm.write_arm(tmp_path, joints=('turn', 'reach')))
+    part = DriveModel.load(arm.write_arm(tmp_path, joints=('turn', 'reach')))
     found = part.drive_forces(JointMotion(*(values[:, [0, 2]] for values in (
         held.position, held.velocity, held.acceleration)))).total
-    whole = MechanismModel.load(arm.write_arm(tmp_path))
+    whole = DriveModel.load(arm.write_arm(tmp_path))
     assert found == pytest.approx(whole.drive_forces(held).total[:, [0, 2]], abs=1e-9)
 
 
 def test_friction_armature_and_offset_add_up(tmp_path: Path) -> None:
-    model = MechanismModel.load(arm.write_arm(tmp_path))
+    model = DriveModel.load(arm.write_arm(tmp_path))
     real = arm.real_arm(tmp_path, **{'robot.armature': (1.0, 2.0, 3.0)})
     motion = states()
     v = motion.velocity
@@ -159,7 +158,7 @@ def test_what_is_not_covered_is_refused_in_a_sentence(tmp_path: Path, text: str,
                                                       words: str) -> None:
     path = arm.write_arm(tmp_path, text)
     with pytest.raises(ModelError, match=words) as error:
-        load_model(path)
+        DriveModel.load(path)
     assert str(error.value).count('\n') == 0
     assert str(error.value).startswith(str(path))
 
@@ -168,11 +167,10 @@ def test_joints_that_share_a_transmission_need_the_turns_of_its_motors(tmp_path:
     path = arm.write_arm(tmp_path, arm.urdf(more=TRANSMISSION))
     way = 'friction: {motors: {MOTOR: {turn: 1.0, swing: 1.0}}}'
     with pytest.raises(ModelError, match=re.escape(way)):
-        load_model(path)
+        DriveModel.load(path)
     path = arm.write_arm(tmp_path, arm.urdf(more=TRANSMISSION),
                          friction__motors='{left: {turn: 1.0, swing: 1.0}}')
-    model = load_model(path)
-    assert isinstance(model, MechanismModel)
+    model = DriveModel.load(path)
     assert model.robot.motors == {'left': (1.0, 1.0, 0.0)}
 
 
@@ -193,7 +191,7 @@ def test_a_mistake_in_the_file_is_one_sentence(tmp_path: Path, old: str, new: st
     path = arm.write_arm(tmp_path)
     path.write_text(path.read_text().replace(old, new))
     with pytest.raises(PprsError, match=words):
-        load_model(path)
+        DriveModel.load(path)
 
 
 def test_effects_say_where_they_act(tmp_path: Path) -> None:
@@ -201,14 +199,15 @@ def test_effects_say_where_they_act(tmp_path: Path) -> None:
     text = path.read_text() + '    effects:\n'
     path.write_text(text + '      payload_offset: {x: 0.1, y: 0.0, z: 0.0}\n')
     with pytest.raises(ModelError, match='acts in a serial arm'):
-        load_model(path)
+        DriveModel.load(path)
     path.write_text(text + '      rod_mass: {mass: 0.1}\n')
     with pytest.raises(ModelError, match='unknown effect rod_mass'):
-        load_model(path)
+        DriveModel.load(path)
     with pytest.raises(ModelError, match='acts in a 3-PPRS'):
-        build_model({**DriveModel.load().values, 'effects.coupled_drives.wrist.coulomb': 0.1})
+        DriveModel.from_parameters(
+            {**DriveModel.load().values, 'effects.coupled_drives.wrist.coulomb': 0.1})
     with pytest.raises(ModelError, match=r'unknown key effects\.link_mass\.beam\.mass'):
-        build_model({**DriveModel.load().values, 'effects.link_mass.beam.mass': 0.1})
+        DriveModel.from_parameters({**DriveModel.load().values, 'effects.link_mass.beam.mass': 0.1})
 
 
 def test_a_file_keeps_its_urdf_wherever_it_is_written(tmp_path: Path) -> None:
@@ -220,7 +219,7 @@ def test_a_file_keeps_its_urdf_wherever_it_is_written(tmp_path: Path) -> None:
     block = yaml.safe_load(written.read_text())['/**']['ros__parameters']
     assert block['robot']['urdf'] == os.path.join('..', 'made_up.urdf')
     assert block['friction']['coulomb'] == list(arm.FRICTION['friction.coulomb'])
-    again = load_model(written)
+    again = DriveModel.load(written)
     assert dict(again.values) == dict(real.values)
     motion = states()
     assert np.array_equal(again.drive_forces(motion).total, real.drive_forces(motion).total)
@@ -230,9 +229,9 @@ def test_the_fingerprint_is_that_of_the_description_not_of_its_place(tmp_path: P
     first, second = tmp_path / 'a', tmp_path / 'b'
     for folder in (first, second):
         folder.mkdir()
-    models = [MechanismModel.load(arm.write_arm(folder)) for folder in (first, second)]
+    models = [DriveModel.load(arm.write_arm(folder)) for folder in (first, second)]
     assert models[0].fingerprint == models[1].fingerprint
-    heavier = MechanismModel.load(
+    heavier = DriveModel.load(
         arm.write_arm(second, arm.urdf().replace('value="1.5"', 'value="1.6"')))
     assert heavier.fingerprint != models[0].fingerprint
 
@@ -240,7 +239,7 @@ def test_the_fingerprint_is_that_of_the_description_not_of_its_place(tmp_path: P
 def test_a_body_of_negative_mass_is_refused(tmp_path: Path) -> None:
     path = arm.write_arm(tmp_path, arm.urdf().replace('value="1.5"', 'value="-1.5"'))
     with pytest.raises(UnreadableFileError, match=r'-1\.5 kg.* none may be negative'):
-        load_model(path)
+        DriveModel.load(path)
 
 
 DAMAGED = {
@@ -258,7 +257,7 @@ def test_a_damaged_urdf_is_told_with_link_value_and_rule(
     assert old in arm.urdf()
     path = arm.write_arm(tmp_path, arm.urdf().replace(old, new, 1))
     with pytest.raises(UnreadableFileError, match=re.escape(sentence)):
-        load_model(path)
+        DriveModel.load(path)
 
 
 def test_links_and_mimics_in_a_ring_are_told(tmp_path: Path) -> None:
@@ -266,18 +265,19 @@ def test_links_and_mimics_in_a_ring_are_told(tmp_path: Path) -> None:
             '<child link="{0}"/></joint>')
     ring = hang.format('a', 'b') + hang.format('b', 'a')
     with pytest.raises(UnreadableFileError, match='hang on one another'):
-        load_model(arm.write_arm(tmp_path, arm.urdf().replace('</robot>', f'{ring}</robot>')))
+        DriveModel.load(arm.write_arm(tmp_path, arm.urdf().replace('</robot>', f'{ring}</robot>')))
     mimics = ''.join(
         f'<link name="{name}"/><joint name="{name}" type="revolute"><parent link="stand"/>'
         f'<child link="{name}"/><axis xyz="0 0 1"/><mimic joint="{other}"/></joint>'
         for name, other in (('c', 'd'), ('d', 'c')))
     with pytest.raises(UnreadableFileError, match='must mimic none that mimics it'):
-        load_model(arm.write_arm(tmp_path, arm.urdf().replace('</robot>', f'{mimics}</robot>')))
+        DriveModel.load(
+            arm.write_arm(tmp_path, arm.urdf().replace('</robot>', f'{mimics}</robot>')))
 
 
 def test_an_unreadable_urdf_is_named(tmp_path: Path) -> None:
     with pytest.raises(UnreadableFileError, match=r'made_up\.urdf'):
-        load_model(arm.write_arm(tmp_path, '<robot name="x"><link/></robot'))
+        DriveModel.load(arm.write_arm(tmp_path, '<robot name="x"><link/></robot'))
 
 
 def test_ripple_is_looked_for_where_the_gear_has_it() -> None:
@@ -348,12 +348,12 @@ def test_bounds_of_parameters_are_in_the_unit_of_the_drive(
     tmp_path: Path, effect: str, parameter: str, turning: float, pushing: float,
 ) -> None:
     """A zero may be off by any angle, and by a decimetre."""
-    values = MechanismModel.load(arm.write_arm(tmp_path)).values
+    values = DriveModel.load(arm.write_arm(tmp_path)).values
     force = {} if effect == 'homing_error' else {'force': 1.0}
 
-    def with_one(drive: str, value: float) -> MechanismModel:
+    def with_one(drive: str, value: float) -> DriveModel:
         block = {**force, parameter: value}
-        return MechanismModel.from_parameters({**values, 'effects.active': [effect], **{
+        return DriveModel.from_parameters({**values, 'effects.active': [effect], **{
             f'effects.{effect}.{drive}.{key}': number for key, number in block.items()}})
 
     assert with_one('turn', turning).effects[-1].to_file()['turn'][parameter] == turning

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
-from pprs_dynamics import JointMotion, MechanismModel, load_model
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.errors import PprsError
 
 mujoco = pytest.importorskip('mujoco')
@@ -53,8 +53,7 @@ def arm(folder: Path, dry: float = 0.0, more: str = '', end: str = '') -> Path:
 def test_an_arm_is_that_of_mj_inverse_with_ref_rotor_friction_and_gravity(
     tmp_path: Path, dry: float,
 ) -> None:
-    model = load_model(arm(tmp_path, dry))
-    assert isinstance(model, MechanismModel)
+    model = DriveModel.load(arm(tmp_path, dry))
     engine = mujoco.MjModel.from_xml_path(str(tmp_path / 'robot.xml'))
     engine.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
     data = mujoco.MjData(engine)
@@ -77,7 +76,7 @@ def test_what_the_model_file_says_goes_before_the_description(tmp_path: Path) ->
     content = yaml.safe_load(path.read_text())
     content['/**']['ros__parameters']['friction'] = {'viscous': [0.0, 0.0, 0.0]}
     path.write_text(yaml.safe_dump(content))
-    values = load_model(path).values
+    values = DriveModel.load(path).values
     assert values['friction.viscous'] == (0.0, 0.0, 0.0)
     assert values['friction.coulomb'] == (0.0, 3.0, 0.0)
     assert values['robot.armature'] == (0.3, 0.5, 0.0)
@@ -99,8 +98,7 @@ LOOP = '''<mujoco><compiler angle="radian"/><option gravity="0 -9.81 0"/><worldb
 
 @pytest.mark.parametrize('anchor', ['0 0 0', '0.03 -0.02 0'])
 def test_a_weld_closes_at_its_anchor_and_passive_joints_rub(tmp_path: Path, anchor: str) -> None:
-    model = load_model(write(tmp_path, LOOP.format(ref=0.3, anchor=anchor), 'a', 'rod'))
-    assert isinstance(model, MechanismModel)
+    model = DriveModel.load(write(tmp_path, LOOP.format(ref=0.3, anchor=anchor), 'a', 'rod'))
     engine = mujoco.MjModel.from_xml_path(str(tmp_path / 'robot.xml'))
     engine.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     data = mujoco.MjData(engine)
@@ -133,7 +131,7 @@ def test_a_coupling_counts_from_where_bodies_are_placed(tmp_path: Path) -> None:
       <body name="two" pos="0 1 0"><joint name="b" axis="0 1 0" ref="-0.2"/><inertial
         pos="0.2 0 0" mass="2" diaginertia="0.1 0.1 0.1"/></body></worldbody>
       <equality><joint joint1="b" joint2="a" polycoef="0.1 3 0 0 0"/></equality></mujoco>'''
-    model = load_model(write(tmp_path, text, 'a', 'one'))
+    model = DriveModel.load(write(tmp_path, text, 'a', 'one'))
     q = np.array([[0.3]])
     state = model.mechanism(JointMotion(q, 0 * q, 0 * q)).links.motion
     s = model.robot.structure
@@ -155,7 +153,7 @@ def test_what_a_mechanism_cannot_have_is_refused_by_name(
     tmp_path: Path, more: str, end: str, told: str,
 ) -> None:
     with pytest.raises(PprsError) as error:
-        load_model(arm(tmp_path, more=more, end=end))
+        DriveModel.load(arm(tmp_path, more=more, end=end))
     assert told in str(error.value)
     assert '\n' not in str(error.value)
 
@@ -164,10 +162,10 @@ def test_a_body_that_does_not_weigh_what_it_weighs_is_refused(tmp_path: Path) ->
     text = ARM.format(dry=0, more='', end='').replace('<body name="beam"',
                                                       '<body name="beam" gravcomp="1"')
     with pytest.raises(PprsError, match=r'beam.*gravcomp'):
-        load_model(write(tmp_path, text, 'turn, reach, swing', 'tool'))
+        DriveModel.load(write(tmp_path, text, 'turn, reach, swing', 'tool'))
 
 
 def test_a_rotor_in_a_passive_joint_is_refused_by_name(tmp_path: Path) -> None:
     text = LOOP.format(ref=0.0, anchor='0 0 0').replace('frictionloss="0"', 'armature="0.1"')
     with pytest.raises(PprsError, match=r'c.*armature'):
-        load_model(write(tmp_path, text, 'a', 'rod'))
+        DriveModel.load(write(tmp_path, text, 'a', 'rod'))

@@ -21,7 +21,6 @@ from hypothesis import strategies as st
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
 from pprs_dynamics.physics.model.keys import KEYS
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters, read_parameters
 
 PAPER = Path(__file__).parents[2] / 'config' / 'paper.yaml'
@@ -66,7 +65,7 @@ def test_limits_tolerances_effects_and_node_keys_are_optional(tmp_path: Path) ->
     file = written(tmp_path, {'max_age': 0.2, 'tolerances.masses.payload': 0.05,
                               'effects.active': []}, limits)
     model = DriveModel.load(file)
-    assert model.limits.effort == (100.0,) * 6
+    assert model.limits.efforts.tolist() == [100.0] * 6
     assert [effect.name for effect in model.effects] == ['active_friction', 'passive_friction']
 
 
@@ -199,7 +198,7 @@ def test_a_key_given_nested_and_with_dots_is_refused(tmp_path: Path) -> None:
 def test_an_effect_cannot_be_a_value_and_a_block_at_once() -> None:
     values = {**DriveModel.load().values, 'effects.effort_offset.lift_1.force': 1.0}
     with pytest.raises(ModelError, match='keys stand below it'):
-        build_model({**values, 'effects.effort_offset': 3})
+        DriveModel.from_parameters({**values, 'effects.effort_offset': 3})
 
 
 def test_blocks_left_empty_say_nothing(tmp_path: Path) -> None:
@@ -223,7 +222,7 @@ def test_whatever_a_parameter_is_set_to_gives_a_model_or_one_of_our_errors(
 ) -> None:
     # In a node every other exception would end the feedforward of a moving robot.
     try:
-        model = build_model({**DriveModel.load().values, **changes})
+        model = DriveModel.from_parameters({**DriveModel.load().values, **changes})
         # A platform of 1e-166 m is a model, and singular everywhere.
         forces = model.drive_forces(PlatformMotion.at_rest((0.0, 0.0, 0.5)))
     except PprsError:
@@ -240,8 +239,8 @@ def test_whole_numbers_are_numbers(tmp_path: Path) -> None:
 def test_a_model_can_be_built_again_from_its_own_values() -> None:
     values = {**DriveModel.load().values, 'effects.active': ['effort_offset'],
               'effects.effort_offset.lift_1.force': 0.3}
-    once = build_model(values)
-    again = build_model(once.values)
+    once = DriveModel.from_parameters(values)
+    again = DriveModel.from_parameters(once.values)
     motion = PlatformMotion.at_rest((0.01, 0.02, 0.5))
     np.testing.assert_array_equal(once.drive_forces(motion).total, again.drive_forces(motion).total)
 

@@ -23,7 +23,6 @@ from rclpy.node import Node
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError, UnreadableFileError
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.model_writer import edit_model, format_model, write_model
 from pprs_dynamics.physics.model.parameter_file import (
     LEDGER,
@@ -50,7 +49,7 @@ ADDED = {
 
 
 def values_of(**changes: Any) -> dict[str, Any]:
-    return dict(build_model({**default_parameters(), **ADDED, **changes}).values)
+    return dict(DriveModel.from_parameters({**default_parameters(), **ADDED, **changes}).values)
 
 
 def plain(values: dict[str, Any]) -> dict[str, Any]:
@@ -138,7 +137,7 @@ def test_an_edit_changes_one_line_of_a_file_of_any_form(form: str) -> None:
 
 
 def test_a_file_written_anew_names_every_key_with_its_unit() -> None:
-    text = format_model(build_model(default_parameters()).values)
+    text = format_model(DriveModel.from_parameters(default_parameters()).values)
     assert '  # l, length of the guiding rods [m]' in text
     assert [line for line in text.splitlines() if line.startswith('    masses:')]
 
@@ -165,7 +164,7 @@ def test_files_of_every_form_come_out_right(tmp_path: Path, form: str) -> None:
                 'monitor: {ros__parameters: {window: 0.2}}}\n',
         'block_lists': PAPER.read_text().replace(
             'slides: [0.5, 0.5, 0.5] ', 'slides:\n        - 0.5\n        - 0.5\n        - 0.5 '),
-        'no_newline': format_model(build_model(values).values).rstrip('\n')}[form]
+        'no_newline': format_model(DriveModel.from_parameters(values).values).rstrip('\n')}[form]
     base.write_text(text)
     wanted = values_of(**{'masses.slides': [0.4, 0.5, 0.5]})
     write_model(tmp_path / 'new.yaml', wanted, base)

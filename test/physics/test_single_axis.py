@@ -6,16 +6,15 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from pprs_command import pprs
-from ros_processes import environment, executable
+from single_axis import AXIS, axis_values
 
-from pprs_dynamics import DriveModel, JointMotion, MechanismModel, load_model
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.errors import ModelError, MotionError
 from pprs_dynamics.inference.adoption.request import EffectRequest, EffectRequestError
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
@@ -26,15 +25,14 @@ from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.keys import set_number
+from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import read_parameters
-from pprs_dynamics.physics.model.robot_block import AXIS
 
 CONFIG = Path(__file__).parents[2] / 'config'
 FILE = CONFIG / 'single_axis.yaml'
 MASS, VISCOUS, COULOMB, OFFSET, WIDTH = 20.0, 40.0, 6.0, -2.0, 0.001
-VALUES = {'axis.mass': MASS, 'axis.viscous': VISCOUS, 'axis.coulomb': COULOMB,
-          'axis.offset': OFFSET, 'friction.reversal_velocity': WIDTH}
+VALUES = axis_values(MASS, VISCOUS, COULOMB, OFFSET, width=WIDTH)
 SPRING, CENTRE = 55.0, 0.03  # N/m, m: hidden
 NOISE, RATE = 0.05, 500.0
 EQUAL = 1e-12
@@ -72,8 +70,7 @@ def bench(seed: int, hidden: bool = True, duration: float = 20.0, offset: float 
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with a model file and two recordings of an axis with a hidden spring."""
     folder = tmp_path_factory.mktemp('axis')
-    lines = [f'    {key}: {value!r}' for key, value in VALUES.items()]
-    (folder / 'axis.yaml').write_text('\n'.join(['/**:', '  ros__parameters:', *lines, '']))
+    write_model(folder / 'axis.yaml', VALUES)
     write_recording(folder / 'run.csv', bench(1))
     write_recording(folder / 'other.mcap', bench(2, duration=12.0))
     return folder
@@ -82,7 +79,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.parametrize('gravity', [0.0, -9.81])
 def test_the_force_is_the_textbooks(gravity: float) -> None:
     time, q, q_dot, q_ddot = sweep(3.0)
-    model = build_model({**VALUES, 'axis.gravity': gravity})
+    model = DriveModel.from_parameters({**VALUES, 'robot.gravity': [0.0, 0.0, gravity]})
     forces = model.drive_forces(JointMotion(q[:, None], q_dot[:, None], q_ddot[:, None], time))
     np.testing.assert_allclose(forces.total[:, 0], textbook_force(q_dot, q_ddot, gravity),
                                rtol=0, atol=1e-9)
@@ -90,7 +87,8 @@ def test_the_force_is_the_textbooks(gravity: float) -> None:
 
 
 def test_a_vertical_axis_at_rest_is_held_against_its_weight() -> None:
-    model = build_model({**VALUES, 'axis.offset': 0.0, 'axis.gravity': -9.81})
+    model = DriveModel.from_parameters({**VALUES, 'friction.offset': [0.0],
+                                        'robot.gravity': [0.0, 0.0, -9.81]})
     rest = np.zeros((1, 1))
     assert model.drive_forces(JointMotion(rest, rest, rest)).total[0, 0] == MASS * 9.81
 
@@ -98,30 +96,27 @@ def test_a_vertical_axis_at_rest_is_held_against_its_weight() -> None:
 def test_an_effect_adds_its_closed_form_and_changes_nothing_else() -> None:
     time, q, q_dot, q_ddot = sweep(2.0)
     motion = JointMotion(q[:, None], q_dot[:, None], q_ddot[:, None], time)
-    with_effect = build_model({**VALUES, 'effects.active': ['quadratic_friction'],
+    with_effect = DriveModel.from_parameters({**VALUES, 'effects.active': ['quadratic_friction'],
                                'effects.quadratic_friction.axis.coefficient': 30.0})
-    bare, forces = (model.drive_forces(motion) for model in (build_model(VALUES), with_effect))
+    bare, forces = (model.drive_forces(motion) for model in (DriveModel.from_parameters(
+        VALUES), with_effect))
     np.testing.assert_allclose((forces.total - bare.total)[:, 0], 30 * q_dot * np.abs(q_dot),
                                rtol=0, atol=1e-9)
     for name, part in bare.parts.items():
         np.testing.assert_array_equal(forces.parts[name], part)
 
 
-def test_the_shipped_file_loads_by_both_loaders_and_a_robot_is_no_axis() -> None:
-    assert load_model(FILE).kind == 'axis'
-    assert MechanismModel.load('config/single_axis.yaml').values == load_model(FILE).values
-    with pytest.raises(ModelError, match='single axis'):
-        MechanismModel.load(CONFIG / 'paper.yaml')
-    with pytest.raises(ModelError, match=r'axis\.mass is 95\.109.*3-PPRS'):
-        DriveModel.load(FILE)
+def test_the_shipped_file_is_found_by_its_name() -> None:
+    assert DriveModel.load(FILE).kind == 'slide'
+    assert DriveModel.load('config/single_axis.yaml').values == DriveModel.load(FILE).values
 
 
 @pytest.mark.parametrize(('change', 'sentence'), [
-    ({'axis.mass': 0.0}, 'axis.mass is 0.0, must be greater than 0'),
-    ({'axis.coulomb': -1.0}, 'axis.coulomb is -1.0'),
-    ({'axis.masss': 1.0}, 'did you mean axis.mass?'),
+    ({'links.mass': [0.0]}, 'move a body: no link that it moves has a mass'),
+    ({'friction.coulomb': [-1.0]}, 'friction.coulomb is [-1.0]'),
+    ({'links.masss': [1.0]}, 'did you mean links.mass?'),
     ({'masses.platform': 1.0}, 'unknown key masses.platform'),
-    ({'tolerances.axis.mass': 2.0}, 'between 0 and 1'),
+    ({'tolerances.links.mass': 2.0}, 'between 0 and 1'),
     ({'tolerances.masses.payload': 0.1}, 'unknown key tolerances.masses.payload'),
     ({'effects.payload_mass.mass': 0.1}, 'be an effect that acts in a single axis'),
     ({'effects.homing_error.axis.zero': 0.001}, 'be an effect that acts in a single axis'),
@@ -129,7 +124,7 @@ def test_the_shipped_file_loads_by_both_loaders_and_a_robot_is_no_axis() -> None
 ])
 def test_a_mistake_in_a_file_is_one_sentence(change: dict[str, float], sentence: str) -> None:
     with pytest.raises(ModelError) as caught:
-        build_model({**VALUES, **change})
+        DriveModel.from_parameters({**VALUES, **change})
     assert sentence in str(caught.value)
 
 
@@ -137,19 +132,12 @@ def test_a_robot_has_no_drive_axis() -> None:
     values = {**read_parameters(CONFIG / 'paper.yaml'), 'effects.active': ['viscous_friction'],
               'effects.viscous_friction.axis.coefficient': 1.0}
     with pytest.raises(ModelError, match=r'unknown drive axis \(known: slide_1'):
-        build_model(values)
-
-
-def test_a_missing_key_of_an_axis_is_named() -> None:
-    for key in VALUES:
-        if key != 'axis.offset':
-            with pytest.raises(ModelError, match=f'{key} is missing'):
-                build_model({name: value for name, value in VALUES.items() if name != key})
+        DriveModel.from_parameters(values)
 
 
 def test_motion_comes_from_positions_of_the_drive_alone() -> None:
     time, _, q_dot, q_ddot = sweep(20.0, 1)
-    found = reconstruct(build_model(VALUES), bench(1))
+    found = reconstruct(DriveModel.from_parameters(VALUES), bench(1))
     np.testing.assert_allclose(found.velocity[:, 0], q_dot[found.index], atol=2e-5)
     np.testing.assert_allclose(found.acceleration[:, 0], q_ddot[found.index], atol=2e-3)
     np.testing.assert_array_equal(found.time, time[found.index])
@@ -159,12 +147,15 @@ def test_a_recording_of_other_drives_is_refused_by_name() -> None:
     time = np.arange(0.0, 5.0, 0.01)
     other = Recording.from_arrays('x', time, np.sin(time)[:, None], drives=('lift_1',))
     with pytest.raises(MotionError, match='they are lift_1, must be axis'):
-        reconstruct(build_model(VALUES), other)
+        reconstruct(DriveModel.from_parameters(VALUES), other)
 
 
 def test_columns_of_numbers_are_what_the_model_changes_by() -> None:
-    tolerances = {f'tolerances.{key}': 0.1 for key in VALUES}
-    model = build_model({**VALUES, 'axis.gravity': -9.81, 'tolerances.axis.gravity': 0.1,
+    tolerances = {f'tolerances.{key}': 0.1 for key in (
+        'links.mass', 'friction.viscous', 'friction.coulomb', 'friction.offset',
+        'friction.reversal_velocity')}
+    model = DriveModel.from_parameters(
+        {**VALUES, 'robot.gravity': [0.0, 0.0, -9.81], 'tolerances.robot.gravity': 0.1,
                          **tolerances})
     design = Design.of(model, [bench(1)])
     for column in design.base:
@@ -173,7 +164,9 @@ def test_columns_of_numbers_are_what_the_model_changes_by() -> None:
         value, moved = column.number.value, 0.001
         # Away from 0 by a share of one standard deviation.
         after = value + np.sign(value) * moved * column.number.deviation
-        other = Design.of(build_model({**model.values, column.number.key: after}), [bench(1)])
+        values = dict(model.values)
+        set_number(values, column.number.key, column.number.element, float(after))
+        other = Design.of(DriveModel.from_parameters(values), [bench(1)])
         change = (other.residuals.model - design.residuals.model)[:, 0] / moved
         np.testing.assert_allclose(column.rows[0], change, rtol=0,
                                    atol=2e-3 * np.abs(change).max())
@@ -200,7 +193,7 @@ def test_a_number_below_zero_of_a_robot_moves_the_way_it_is_told_to() -> None:
 
 
 def test_an_offset_that_is_known_roughly_is_found_within_its_tolerance() -> None:
-    model = build_model({**VALUES, 'tolerances.axis.offset': 1.0})
+    model = DriveModel.from_parameters({**VALUES, 'tolerances.friction.offset': 1.0})
     design = Design.of(model, [bench(3, hidden=False, offset=-0.5)])
     found = FittedSets(design, DECISIONS).evaluate(())
     place, number = next((k, column.number) for k, column in enumerate(design.base)
@@ -211,7 +204,7 @@ def test_an_offset_that_is_known_roughly_is_found_within_its_tolerance() -> None
 
 def test_effects_of_a_platform_are_not_offered_to_an_axis() -> None:
     with pytest.raises(EffectRequestError, match='payload_mass does not act in a single axis'):
-        EffectRequest.of('payload_mass').placed(build_model(VALUES))
+        EffectRequest.of('payload_mass').placed(DriveModel.from_parameters(VALUES))
     with pytest.raises(EffectRequestError, match='one of axis'):
         EffectRequest.of('viscous_friction:lift_1', (AXIS,))
 
@@ -241,8 +234,8 @@ def test_diagnose_names_the_hidden_effect_and_writes_a_model_that_has_it(folder:
     values = found['effects'][0]['parameters']
     stiffness = values['axis.stiffness']
     assert abs(stiffness['value'] - SPRING) < 4 * stiffness['std'] + 0.01 * SPRING
-    better = load_model(folder / 'better.yaml')
-    assert better.kind == 'axis'
+    better = DriveModel.load(folder / 'better.yaml')
+    assert better.kind == 'slide'
     assert better.values['effects.active'] == ('drive_spring',) or better.values[
         'effects.active'] == ['drive_spring']
     after = pprs('compare', 'other.mcap', '--model', 'better.yaml', '--json', 'after.json',
@@ -257,7 +250,7 @@ def test_diagnose_names_the_hidden_effect_and_writes_a_model_that_has_it(folder:
             ] == ['drive_spring']
     undone = pprs('history', 'better.yaml', '--undo', '--output', 'undone.yaml', cwd=folder)
     assert undone.returncode == 0, undone.stderr
-    assert {key: load_model(folder / 'undone.yaml').values[key] for key in VALUES} == VALUES
+    assert {key: DriveModel.load(folder / 'undone.yaml').values[key] for key in VALUES} == VALUES
 
 
 def test_nothing_is_missing_where_nothing_is(folder: Path) -> None:
@@ -267,14 +260,3 @@ def test_nothing_is_missing_where_nothing_is(folder: Path) -> None:
     assert done.returncode == 0, done.stderr
     found = json.loads((folder / 'right.json').read_text())
     assert (found['verdict'], found['effects']) == ('adequate', [])
-
-
-@pytest.mark.parametrize('node', ['feedforward', 'monitor', 'simulated_robot'])
-def test_a_node_refuses_an_axis_in_one_sentence(node: str, ros_domain: int) -> None:
-    done = subprocess.run(
-        [executable(node), '--ros-args', '--params-file', str(FILE)],
-        env=environment(ros_domain), capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2
-    assert next(line for line in done.stderr.splitlines() if 'axis.' in line).count(
-        'needs a 3-PPRS') == 1
-    assert 'Traceback' not in done.stderr

@@ -11,7 +11,7 @@ import made_up_arm
 import numpy as np
 import pytest
 
-from pprs_dynamics import DriveModel, JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.skeleton import DRIVE, LINK, Skeleton
 
@@ -22,7 +22,7 @@ def lengths(drawn: Skeleton, kind: str) -> dict[str, np.ndarray]:
                                       axis=1) for line in drawn.lines if line.kind == kind}
 
 
-def about_home(model: MechanismModel) -> JointMotion:
+def about_home(model: DriveModel) -> JointMotion:
     """Return random states about home, at rest."""
     middle, room = model.robot.structure.room(1.0)
     q = middle + 0.3 * room * np.random.default_rng(1).uniform(-1, 1, (7, len(middle)))
@@ -30,7 +30,7 @@ def about_home(model: MechanismModel) -> JointMotion:
 
 
 def test_a_hexapods_legs_are_as_long_as_its_drives_say() -> None:
-    model = MechanismModel.load('config/hexapod.yaml')
+    model = DriveModel.load('config/hexapod.yaml')
     motion = about_home(model)
     drawn = Skeleton.of(model, motion)
     legs = [line for line in drawn.lines if line.drive >= 0]
@@ -48,8 +48,8 @@ def test_a_hexapods_legs_are_as_long_as_its_drives_say() -> None:
 
 @pytest.mark.parametrize('name', ['delta', 'arm'])
 def test_links_keep_their_lengths(name: str, tmp_path: Path) -> None:
-    model = (MechanismModel.load('config/delta.yaml') if name == 'delta' else
-             MechanismModel.load(made_up_arm.write_arm(tmp_path)))
+    model = (DriveModel.load('config/delta.yaml') if name == 'delta' else
+             DriveModel.load(made_up_arm.write_arm(tmp_path)))
     drawn = Skeleton.of(model, about_home(model))
     # Joints of the arm that stand in one point have one line between them.
     assert {line.drive for line in drawn.lines} >= ({0, 1, 2} if name == 'delta' else {0, 2})

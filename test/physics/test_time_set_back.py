@@ -15,8 +15,7 @@ from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.physics.model.force_model import ModelState
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.forces import ModelState
 
 PAPER = DriveModel.load()
 STEPS = 0.01 * np.arange(40)
@@ -34,9 +33,8 @@ def with_effect(name: str) -> DriveModel:
             each.lower, each.upper)) for each in effect.parameters}
     place = f'effects.{name}.{DRIVES[0]}' if issubclass(effect, DriveEffect) or name == (
         'measured_curve') else f'effects.{name}'
-    model = build_model({**PAPER.values, 'effects.active': [name],
+    model = DriveModel.from_parameters({**PAPER.values, 'effects.active': [name],
                          **{f'{place}.{key}': value for key, value in own.items()}})
-    assert isinstance(model, DriveModel)
     return model
 
 

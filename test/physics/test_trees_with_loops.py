@@ -18,15 +18,14 @@ from oracles.mujoco_loops import MujocoLoops
 from random_states import random_motion
 from scipy.spatial.transform import Rotation
 
-from pprs_dynamics import DriveModel, JointMotion, MechanismModel, PlatformMotion, load_model
+from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import ModelError, PprsError, SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism import tree_evaluation
 from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.mechanism.tree_equations import DETERMINANT, Data
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.mechanism.tree_tables import DETERMINANT, Data
 
 SAMPLES = 30
 ROBOTS = {'hexapod': robots.hexapod, 'delta': robots.delta, 'five_bar': robots.five_bar,
@@ -35,7 +34,7 @@ SIZES = {'hexapod': (0.03, 0.4, 4.0), 'delta': (0.3, 3.0, 30.0), 'five_bar': (0.
          'three_rrr': (0.2, 3.0, 30.0)}
 
 
-def states(model: MechanismModel, size: tuple[float, float, float], samples: int = SAMPLES,
+def states(model: DriveModel, size: tuple[float, float, float], samples: int = SAMPLES,
            seed: int = 0) -> JointMotion:
     """Return independent random states about home."""
     home = model.robot.structure.home[model.robot.structure.tables.drives]
@@ -46,7 +45,7 @@ def states(model: MechanismModel, size: tuple[float, float, float], samples: int
 @pytest.mark.parametrize('name', ROBOTS)
 def test_efforts_are_those_of_mujoco(tmp_path: Path, name: str) -> None:
     text = ROBOTS[name]()
-    model = MechanismModel.load(text.write(tmp_path))
+    model = DriveModel.load(text.write(tmp_path))
     motion = states(model, SIZES[name])
     found = model.drive_forces(motion).total
     moved = model.mechanism(motion).links
@@ -60,7 +59,7 @@ def test_efforts_are_those_of_mujoco(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize('name', ROBOTS)
 def test_efforts_are_linear_in_the_regressor(tmp_path: Path, name: str) -> None:
-    model = MechanismModel.load(ROBOTS[name]().write(tmp_path))
+    model = DriveModel.load(ROBOTS[name]().write(tmp_path))
     motion = states(model, SIZES[name])
     rows = model.robot.regressor(motion.position, motion.velocity, motion.acceleration)
     total = model.drive_forces(motion).total
@@ -72,8 +71,8 @@ def test_efforts_are_linear_in_the_regressor(tmp_path: Path, name: str) -> None:
 def test_numpy_without_a_compiler_is_the_same(tmp_path: Path, name: str,
                                               monkeypatch: pytest.MonkeyPatch) -> None:
     joints = {one: {'viscous': 0.1, 'coulomb': 0.1, 'radius': 0.01} for one in friction_rows(
-        MechanismModel.load(ROBOTS[name]().write(tmp_path)).robot.structure)}
-    model = MechanismModel.load(ROBOTS[name]().write(tmp_path, {'joints': joints}))
+        DriveModel.load(ROBOTS[name]().write(tmp_path)).robot.structure)}
+    model = DriveModel.load(ROBOTS[name]().write(tmp_path, {'joints': joints}))
     motion = states(model, SIZES[name])
     compiled = model.drive_forces(motion).parts
     monkeypatch.setattr(tree_evaluation, 'compiled_or_none', lambda function, samples: None)
@@ -88,10 +87,10 @@ def test_numpy_without_a_compiler_is_the_same(tmp_path: Path, name: str,
 @pytest.mark.parametrize('name', ROBOTS)
 def test_efforts_of_one_pass_are_those_of_the_links_that_are_kept(tmp_path: Path, name: str,
                                                                   ) -> None:
-    model = MechanismModel.load(ROBOTS[name]().write(tmp_path, {'joints': {
+    model = DriveModel.load(ROBOTS[name]().write(tmp_path, {'joints': {
         one: {'viscous': 0.1, 'torque': 0.1, 'coulomb': 0.2, 'radius': 0.02}
         for one in friction_rows(
-            MechanismModel.load(ROBOTS[name]().write(tmp_path)).robot.structure)}}))
+            DriveModel.load(ROBOTS[name]().write(tmp_path)).robot.structure)}}))
     motion = states(model, SIZES[name])
     quick, kept = model.mechanism(motion), model.mechanism(motion)
     kept = kept.with_smoothing(kept.reversal)
@@ -117,7 +116,7 @@ def test_efforts_do_not_depend_on_where_the_robot_was(tmp_path: Path, name: str,
                                                       ) -> None:
     """Poses anywhere and a little apart: with a state as without, wherever there is an answer."""
     random = np.random.default_rng(seed)
-    model = MechanismModel.load(ROBOTS[name]().write(tmp_path))
+    model = DriveModel.load(ROBOTS[name]().write(tmp_path))
     home = model.robot.structure.home[model.robot.structure.tables.drives]
     state, q, answered = model.initial_state(), home, 0
     for _ in range(STEPS):
@@ -141,7 +140,7 @@ def test_efforts_do_not_depend_on_where_the_robot_was(tmp_path: Path, name: str,
 
 def test_a_state_of_the_other_assembly_is_not_gone_on_from(tmp_path: Path) -> None:
     """A five-bar whose tip was put on the other side of its elbows: the answer is home's."""
-    model = MechanismModel.load(robots.five_bar().write(tmp_path))
+    model = DriveModel.load(robots.five_bar().write(tmp_path))
     structure = model.robot.structure
     home, evaluation = structure.home, structure.evaluation
     rest = np.zeros((1, len(structure.drives)))
@@ -169,7 +168,7 @@ def test_a_state_of_the_other_assembly_is_not_gone_on_from(tmp_path: Path) -> No
 PAPER_FRICTION = ('friction.revolute', 'friction.spherical')
 
 
-def three_pprs(tmp_path: Path, drives: bool = False) -> tuple[DriveModel, MechanismModel]:
+def three_pprs(tmp_path: Path, drives: bool = False) -> tuple[DriveModel, DriveModel]:
     """Return the paper's robot in closed form, and as a tree with loops.
 
     Friction of the drives follows their guides' loads where it is among that of the joints.
@@ -189,7 +188,7 @@ def three_pprs(tmp_path: Path, drives: bool = False) -> tuple[DriveModel, Mechan
     for d, name in enumerate(paper.drives if drives else ()):
         joints[name] = {key: float(values[f'friction.drives.{key}'][d])
                         for key in ('viscous', 'coulomb')}
-    model = MechanismModel.load(text.write(tmp_path, {
+    model = DriveModel.load(text.write(tmp_path, {
         'joints': joints, 'reversal_rate': float(values['friction.reversal_rate']),
         'reversal_velocity': float(values['friction.reversal_velocity'])}))
     return paper, model
@@ -234,7 +233,7 @@ def test_a_wrench_on_the_platform_loads_every_joint_as_in_the_closed_form(tmp_pa
     for added in ({}, {'effects.active': ['external_wrench'], **wrench}):
         paper, model = three_pprs(tmp_path, drives=True)
         paper = DriveModel.from_parameters({**paper.values, **added})
-        model = MechanismModel.from_parameters({**model.values, **added}, model.source)
+        model = DriveModel.from_parameters({**model.values, **added}, model.source)
         forces = paper.drive_forces(random_motion(np.random.default_rng(4), 100))
         s = forces.mechanism
         expected.append(forces.parts['active_friction'] + forces.parts['passive_friction'])
@@ -270,7 +269,7 @@ def test_an_effect_is_the_same_in_both_kernels(tmp_path: Path, name: str) -> Non
     motion = random_motion(np.random.default_rng(4), 100)
     parts = []
     for one, values in zip((paper, model), OF_BOTH[name], strict=True):
-        changed = build_model({**one.values, 'effects.active': [name], **{
+        changed = DriveModel.from_parameters({**one.values, 'effects.active': [name], **{
             f'effects.{name}.{key}': value for key, value in values.items()}}, one.source)
         s = paper.drive_forces(motion).mechanism
         parts.append(changed.drive_forces(motion if one is paper else JointMotion(
@@ -283,7 +282,7 @@ def test_an_effect_is_the_same_in_both_kernels(tmp_path: Path, name: str) -> Non
 
 
 def test_a_state_with_a_load_is_sliced_with_it(tmp_path: Path) -> None:
-    model = MechanismModel.load(robots.hexapod().write(tmp_path))
+    model = DriveModel.load(robots.hexapod().write(tmp_path))
     state = model.mechanism(states(model, SIZES['hexapod'], 8))
     wrench = np.random.default_rng(0).normal(size=(8, 6))
     loaded = state.with_load(model.robot, StructureLoad(wrench))
@@ -293,9 +292,9 @@ def test_a_state_with_a_load_is_sliced_with_it(tmp_path: Path) -> None:
 
 def test_a_gear_does_not_carry_its_rotor(tmp_path: Path) -> None:
     """The motor accelerates the rotor on its own side: only its effort grows, not the load."""
-    model = MechanismModel.load(robots.five_bar().write(tmp_path))
+    model = DriveModel.load(robots.five_bar().write(tmp_path))
     motion = states(model, SIZES['five_bar'])
-    with_rotor = MechanismModel.from_parameters(
+    with_rotor = DriveModel.from_parameters(
         {**model.values, 'robot.armature': (0.5, 0.8)}, model.source)
     before, after = model.mechanism(motion), with_rotor.mechanism(motion)
     assert after.friction_load == pytest.approx(before.friction_load, abs=1e-12)
@@ -322,14 +321,14 @@ def four_bar(coupler: float) -> robots.RobotText:
 
 def test_a_loop_that_opens_in_motion_is_refused_although_it_closed_at_home(tmp_path: Path) -> None:
     """With all links in line a joint seems free, a row seems implied; neither is, elsewhere."""
-    model = MechanismModel.load(four_bar(0.4).write(tmp_path))
+    model = DriveModel.load(four_bar(0.4).write(tmp_path))
     turn = np.linspace(0.0, 0.5, 50)[:, None]
     rest = np.zeros_like(turn)
     with pytest.raises(WorkspaceError, match=r'tip is open by .* mm.*robot\.home') as error:
         model.drive_forces(JointMotion(turn, rest, rest))
     assert 0 < error.value.sample < 50
     # A coupler that leaves the links out of line closes all the way, redundant rows and all.
-    model = MechanismModel.load(four_bar(0.3).write(tmp_path))
+    model = DriveModel.load(four_bar(0.3).write(tmp_path))
     moved = model.mechanism(JointMotion(turn, rest, rest)).links
     ends = [moved.frame_of(link) for link in ('rod', 'rocker')]
     tips = [end.p + end.R @ np.array([x, 0, 0])
@@ -337,7 +336,7 @@ def test_a_loop_that_opens_in_motion_is_refused_although_it_closed_at_home(tmp_p
     assert tips[0] == pytest.approx(tips[1], abs=1e-9)
 
 
-def energy(model: MechanismModel, moved: Data) -> np.ndarray:
+def energy(model: DriveModel, moved: Data) -> np.ndarray:
     """Return kinetic and potential energy from masses, centres and inertia alone, (N,) [J]."""
     robot, total = model.robot, 0.0
     for row, one in zip(robot.bodies, robot.inertial, strict=True):
@@ -358,9 +357,9 @@ def energy(model: MechanismModel, moved: Data) -> np.ndarray:
 def test_power_of_the_drives_is_energy_and_what_joints_rub(tmp_path: Path, name: str) -> None:
     """The drives' power against friction is that of every joint at its own rate."""
     text = ROBOTS[name]()
-    plain = MechanismModel.load(text.write(tmp_path))
+    plain = DriveModel.load(text.write(tmp_path))
     rubbing = {one: {'viscous': 0.2} for one in friction_rows(plain.robot.structure)}
-    model = MechanismModel.load(text.write(tmp_path, {'joints': rubbing}))
+    model = DriveModel.load(text.write(tmp_path, {'joints': rubbing}))
     home = plain.robot.structure.home[plain.robot.structure.tables.drives]
     h = 1e-3
     time = np.arange(-4, 5) * h
@@ -391,7 +390,7 @@ def broken(name: str, change: Callable[[robots.RobotText], None], tmp_path: Path
     text = ROBOTS[name]()
     change(text)
     with pytest.raises(PprsError) as error:
-        load_model(text.write(tmp_path))
+        DriveModel.load(text.write(tmp_path))
     assert '\n' not in str(error.value)
     return str(error.value)
 
@@ -437,23 +436,23 @@ def test_a_rod_that_spins_between_two_balls_is_held(tmp_path: Path) -> None:
             text.parts[k] = part.replace('child link="rod_1l"', 'child link="yoke_1l"')
     text.link('yoke_1l')
     text.joint('spin_1l', 'continuous', 'yoke_1l', 'rod_1l')
-    model = MechanismModel.load(text.write(tmp_path))
+    model = DriveModel.load(text.write(tmp_path))
     assert model.robot.structure.held == ('spin_1l',)
     assert model.robot.structure.mobility.freedoms == 4
-    plain = MechanismModel.load(robots.delta().write(tmp_path))
+    plain = DriveModel.load(robots.delta().write(tmp_path))
     motion = states(plain, SIZES['delta'])
     assert model.drive_forces(motion).total == pytest.approx(
         plain.drive_forces(motion).total, abs=1e-6)
 
 
 def test_out_of_reach_and_singular_are_told_at_once(tmp_path: Path) -> None:
-    legs = MechanismModel.load(robots.hexapod().write(tmp_path))
+    legs = DriveModel.load(robots.hexapod().write(tmp_path))
     home = legs.robot.structure.home[legs.robot.structure.tables.drives]
     rest = np.zeros((2, 6))
     with pytest.raises(WorkspaceError) as error:
         legs.drive_forces(JointMotion(home + np.outer([0, 1.2], np.eye(6)[0]), rest, rest))
     assert error.value.sample == 1
-    model = MechanismModel.load(robots.five_bar().write(tmp_path))
+    model = DriveModel.load(robots.five_bar().write(tmp_path))
     home = model.robot.structure.home[model.robot.structure.tables.drives]
     # Towards the pose at which both rods are in line.
     q = home + np.linspace(0, 1, 200)[:, None] * (np.array([3.1, 0.04]) - home)
@@ -464,7 +463,7 @@ def test_out_of_reach_and_singular_are_told_at_once(tmp_path: Path) -> None:
 
 def test_a_tools_poses_give_the_legs_that_geometry_gives(tmp_path: Path) -> None:
     """Of a 6-UPS leg_i = |x_i|, x_i from its universal joint to its ball."""
-    model = MechanismModel.load(robots.hexapod().write(tmp_path))
+    model = DriveModel.load(robots.hexapod().write(tmp_path))
     s, rng, samples = model.robot.structure, np.random.default_rng(2), 20
     home = model.robot.at(*(np.tile(each, (1, 1)) for each in (
         s.home[s.tables.drives], np.zeros(6), np.zeros(6))))
@@ -496,8 +495,8 @@ def test_a_tools_poses_give_the_legs_that_geometry_gives(tmp_path: Path) -> None
 @pytest.mark.parametrize('samples', [1, 8])
 def test_a_pose_past_a_singularity_is_not_answered_with_another_pose_of_the_same_legs(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch, samples: int, compiled: bool) -> None:
-    model = MechanismModel.load(robots.hexapod().write(tmp_path))
-    home = model.tool_pose.home
+    model = DriveModel.load(robots.hexapod().write(tmp_path))
+    home = model.robot.tool_pose.home
     turned = (Rotation.from_matrix(home.R) * Rotation.from_rotvec([0.0, 0.0, 1.7])).as_quat()
     if not compiled:
         monkeypatch.setattr(tree_evaluation, 'compiled_or_none', lambda function, samples: None)
@@ -508,7 +507,7 @@ def test_a_pose_past_a_singularity_is_not_answered_with_another_pose_of_the_same
 
 def test_friction_of_joints_leaves_loads_as_they_are_that_others_read(tmp_path: Path) -> None:
     """Columns of several threads share one state."""
-    model = MechanismModel.load(robots.hexapod().write(tmp_path))
+    model = DriveModel.load(robots.hexapod().write(tmp_path))
     state = model.mechanism(states(model, SIZES['hexapod']))
     loads = {name: each.copy() for name, each in state.reactions._asdict().items()}
     joints = np.arange(3)
@@ -520,8 +519,8 @@ def test_friction_of_joints_leaves_loads_as_they_are_that_others_read(tmp_path: 
 
 
 def test_a_delta_follows_places_and_refuses_what_it_cannot_turn(tmp_path: Path) -> None:
-    model = MechanismModel.load(robots.delta().write(tmp_path))
-    assert model.tool_pose.chosen.tolist() == [0, 1, 2]
+    model = DriveModel.load(robots.delta().write(tmp_path))
+    assert model.robot.tool_pose.chosen.tolist() == [0, 1, 2]
     motion = states(model, SIZES['delta'])
     links = model.mechanism(motion).links
     row, _ = model.robot.structure.links['platform']
@@ -546,7 +545,7 @@ def test_a_mimic_joint_is_a_coupling(tmp_path: Path) -> None:
     text.joint('slide', 'prismatic', 'base', 'weight', axis=(0, 0, 1),
                more='\n    <mimic joint="turn" multiplier="-0.2" offset="0.5"/>')
     text.drives = ['turn']
-    model = MechanismModel.load(text.write(tmp_path))
+    model = DriveModel.load(text.write(tmp_path))
     q, v, a = np.random.default_rng(0).normal(size=(3, 5, 1))
     expected = 0.1 * a + 0.2 ** 2 * 3.0 * a - 0.2 * 3.0 * 9.81
     assert model.drive_forces(JointMotion(q, v, a)).total == pytest.approx(expected, abs=1e-12)
@@ -564,7 +563,7 @@ def test_what_follows_a_joint_weighs_on_it(tmp_path: Path) -> None:
     text.joint('hinge', 'revolute', 'upper', 'rod', axis=(0, 1, 0),
                more='\n    <mimic joint="shoulder" multiplier="1" offset="0"/>')
     text.drives = ['shoulder']
-    model = MechanismModel.load(text.write(tmp_path))
+    model = DriveModel.load(text.write(tmp_path))
     q, v, a = np.random.default_rng(0).normal(size=(3, 6, 1))
     expected = 0.1 * a + 4 * (0.01 + 0.1 ** 2) * a - 2 * 0.1 * 9.81 * np.cos(2 * q)
     assert model.drive_forces(JointMotion(q, v, a)).total == pytest.approx(expected, abs=1e-12)
@@ -586,8 +585,7 @@ def test_a_robot_from_mjcf_is_that_of_mujoco(tmp_path: Path) -> None:
     (tmp_path / 'bar.yaml').write_text(
         '/**:\n  ros__parameters:\n    robot: {mjcf: bar.xml, base: world, tool: left_rod, '
         'drives: [a, b], gravity: [0.0, -9.81, 0.0]}\n')
-    model = load_model(tmp_path / 'bar.yaml')
-    assert isinstance(model, MechanismModel)
+    model = DriveModel.load(tmp_path / 'bar.yaml')
     assert model.robot.structure.mobility.freedoms == 2
     import mujoco
     engine = mujoco.MjModel.from_xml_path(str(tmp_path / 'bar.xml'))
@@ -613,10 +611,10 @@ def test_a_robot_from_mjcf_is_that_of_mujoco(tmp_path: Path) -> None:
 
 def test_it_is_told_as_a_robot_with_loops(tmp_path: Path) -> None:
     file = robots.five_bar().write(tmp_path)
-    assert load_model(file).title == 'a robot with loops'
-    values = {**load_model(file).values, 'effects.payload_offset.x': 0.1}
+    assert DriveModel.load(file).title == 'a robot with loops'
+    values = {**DriveModel.load(file).values, 'effects.payload_offset.x': 0.1}
     with pytest.raises(ModelError, match='acts in a robot with loops'):
-        MechanismModel.from_parameters(values, str(file))
+        DriveModel.from_parameters(values, str(file))
 
 
 def test_the_file_refuses_two_descriptions_and_none(tmp_path: Path) -> None:
@@ -624,10 +622,10 @@ def test_the_file_refuses_two_descriptions_and_none(tmp_path: Path) -> None:
     text = path.read_text()
     path.write_text(text.replace('urdf: five_bar.urdf', 'gravity: [0.0, 0.0, 0.0]'))
     with pytest.raises(ModelError, match=r'robot\.urdf'):
-        load_model(path)
+        DriveModel.load(path)
     path.write_text(text.replace('base: base', 'base: base\n      mjcf: bar.xml'))
     with pytest.raises(ModelError, match='not stand beside'):
-        load_model(path)
+        DriveModel.load(path)
 
 
 def test_friction_of_passive_hinges_and_slides_turns_over_in_widths_of_their_own(
@@ -649,7 +647,7 @@ def test_friction_of_passive_hinges_and_slides_turns_over_in_widths_of_their_own
     path = text.write(tmp_path, {
         'reversal_rate': 0.02, 'reversal_slide': 0.002,
         'joints': {'pin': {'torque': 3.0}, 'guide': {'torque': 5.0}}})
-    model = MechanismModel.load(path)
+    model = DriveModel.load(path)
     q, v = np.array([[0.8]]), np.array([[0.02]])
     found = model.drive_forces(JointMotion(q, v, 0 * v)).parts['passive_friction'][0, 0]
     # The block does not turn: the pin turns back as fast as the crank; x = 0.1 cos q.

@@ -14,13 +14,12 @@ import numpy as np
 import pytest
 import robots_with_loops as robots
 
-from pprs_dynamics import JointMotion, MechanismModel, load_model
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.description import Description
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
-from pprs_dynamics.physics.model.mechanism_model import inertial_values
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.robot_block import inertial_values
 
 INERTIA = '<inertia ixx="{}" iyy="{}" izz="{}" ixy="0" ixz="0" iyz="0"/>'
 
@@ -52,10 +51,11 @@ def test_info_tells_what_is_wrong_with_a_description(
     text = arm.urdf().replace('ixx="0.02"', 'ixx="20000"')
     assert main(['info', '--model', str(arm.write_arm(tmp_path, text))]) == 0
     assert 'beam is no body' in ' '.join(capsys.readouterr().out.split())
-    model = load_model(tmp_path / 'arm.yaml')
+    model = DriveModel.load(tmp_path / 'arm.yaml')
     assert 'beam is no body' in model.faults[0]
     # A fit puts other numbers in their place.
-    fitted = build_model({**model.values, **inertial_values(model.robot.inertial)}, model.source)
+    fitted = DriveModel.from_parameters(
+        {**model.values, **inertial_values(model.robot.inertial)}, model.source)
     assert fitted.faults == ()
 
 
@@ -75,14 +75,14 @@ def as_constraints(text: robots.RobotText, folder: Path) -> Path:
 @pytest.mark.parametrize('kind', ['five_bar', 'hexapod'])
 def test_loops_are_read_from_constraints(tmp_path: Path, kind: str) -> None:
     make = getattr(robots, kind)
-    expected = MechanismModel.load(make().write(tmp_path))
+    expected = DriveModel.load(make().write(tmp_path))
     s = expected.robot.structure
     home = s.home[s.tables.drives]
     q, v, a = np.random.default_rng(0).uniform(-0.02, 0.02, size=(3, 5, len(home)))
     motion = JointMotion(home + q, v, a)
     forces = expected.drive_forces(motion).total
     (tmp_path / 'other').mkdir()
-    found = load_model(as_constraints(make(), tmp_path / 'other'))
+    found = DriveModel.load(as_constraints(make(), tmp_path / 'other'))
     assert found.drive_forces(motion).total == pytest.approx(forces, abs=1e-9)
 
 
@@ -123,7 +123,7 @@ def test_constraints_that_cannot_be_are_refused_by_name(
         head, tail = urdf.read_text().split('<constraint')
         urdf.write_text(f'{head}<constraint{tail.replace("left_rod", "nowhere")}')
     with pytest.raises(PprsError, match=words) as error:
-        load_model(path)
+        DriveModel.load(path)
     assert '\n' not in str(error.value)
 
 
@@ -177,17 +177,17 @@ def test_reductions_are_gear_ratios_unless_the_model_file_has_some(
     tmp_path: Path, tag: str, kind: str, side: str,
 ) -> None:
     text = arm.urdf(more=gear(tag, kind, side, '-50'))
-    model = load_model(arm.write_arm(tmp_path, text))
+    model = DriveModel.load(arm.write_arm(tmp_path, text))
     assert model.gear_ratios[model.drives.index('swing')] == 50
     assert sorted(model.gear_ratios) == [1, 1, 50]
     path = arm.write_arm(tmp_path, text)
     path.write_text(path.read_text() + '      gear_ratio: [2.0, 3.0, 4.0]\n')
-    assert load_model(path).gear_ratios == (2.0, 3.0, 4.0)
+    assert DriveModel.load(path).gear_ratios == (2.0, 3.0, 4.0)
 
 
 def test_gears_that_are_none_are_told(tmp_path: Path) -> None:
     with pytest.raises(PprsError, match='reduction of transmission t is "fifty"'):
-        load_model(arm.write_arm(tmp_path, arm.urdf(
+        DriveModel.load(arm.write_arm(tmp_path, arm.urdf(
             more=gear('mechanicalReduction', 'type', 'actuator', 'fifty'))))
     other = gear('mechanicalReduction', 'type', 'actuator', '50').replace('Simple', 'FourBarish')
     (remark,) = one_link(tmp_path, (0.01, 0.08, 0.08), other).remarks
@@ -214,19 +214,19 @@ def test_a_description_is_found_in_its_package(
     path = arm.write_arm(tmp_path)
     path.write_text(path.read_text().replace('made_up.urdf', 'package://my_arm/urdf/arm.urdf'))
     with pytest.raises(PprsError, match=r'package my_arm is in none of AMENT_PREFIX_PATH'):
-        load_model(path)
+        DriveModel.load(path)
     install = tmp_path / 'ws' / 'install'
     place(install / 'share' / 'my_arm')
     (install / 'share/ament_index/resource_index/packages').mkdir(parents=True)
     (install / 'share/ament_index/resource_index/packages/my_arm').touch()
     monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{install}')
-    assert load_model(path).values['robot.urdf'] == str(install / 'share/my_arm/urdf/arm.urdf')
+    assert DriveModel.load(path).values['robot.urdf'] == str(install / 'share/my_arm/urdf/arm.urdf')
     monkeypatch.delenv('AMENT_PREFIX_PATH')
     source = tmp_path / 'src' / 'arms' / 'another_name'
     place(source)
     (source / 'package.xml').write_text('<package><name>my_arm</name></package>')
     monkeypatch.setenv('ROS_PACKAGE_PATH', str(source))
-    assert load_model(path).values['robot.urdf'] == str(source / 'urdf/arm.urdf')
+    assert DriveModel.load(path).values['robot.urdf'] == str(source / 'urdf/arm.urdf')
     monkeypatch.delenv('ROS_PACKAGE_PATH')
     place(tmp_path / 'my_arm')
-    assert load_model(path).values['robot.urdf'] == str(tmp_path / 'my_arm/urdf/arm.urdf')
+    assert DriveModel.load(path).values['robot.urdf'] == str(tmp_path / 'my_arm/urdf/arm.urdf')

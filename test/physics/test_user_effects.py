@@ -198,9 +198,8 @@ from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.physics.model.model_file import build_model
 given = DriveModel.load(sys.argv[1])
-true = build_model({**given.values, 'effects.active': ['sensor_dead_band'],
+true = DriveModel.from_parameters({**given.values, 'effects.active': ['sensor_dead_band'],
                     **{f'effects.sensor_dead_band.{d}.width': 0.5 for d in DRIVES}})
 time = np.arange(1600) * 0.005
 forces = true.drive_forces(Excitation().motion(time).with_time(time))

@@ -5,9 +5,9 @@
 
 from __future__ import annotations
 
+import json
 import signal
-import struct
-import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,18 +17,17 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Duration
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench
-from node_bench import Bench, bench, overrides
+from node_bench import LATCHED, Bench, bench, overrides
 from rclpy.parameter import Parameter
-from rclpy.serialization import serialize_message
-from ros_processes import environment, executable, node_process
+from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.physics.model.parameter_file import read_parameters
+from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.incoming_bytes import is_whole
 from pprs_dynamics.ros.monitor import MonitorNode
 
 pytestmark = pytest.mark.nodes
@@ -46,8 +45,8 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope='module')
-def model(file: Path) -> MechanismModel:
-    return MechanismModel.load(file)
+def model(file: Path) -> DriveModel:
+    return DriveModel.load(file)
 
 
 def parameters(file: Path, **more: Any) -> dict[str, Any]:
@@ -81,7 +80,7 @@ def node(file: Path) -> Iterator[FeedforwardBench]:
 
 
 def test_efforts_are_the_models_on_every_topic(
-    node: FeedforwardBench, model: MechanismModel,
+    node: FeedforwardBench, model: DriveModel,
 ) -> None:
     moved = motion()
     forces = model.drive_forces(moved)
@@ -106,14 +105,6 @@ def test_efforts_are_the_models_on_every_topic(
     assert status['taken_from_paper'] == []
 
 
-def broken(**change: Any) -> JointTrajectory:
-    """Return a message in which one thing is wrong."""
-    message = message_of(motion())
-    for name, value in change.items():
-        setattr(message if hasattr(message, name) else message.points[1], name, value)
-    return message
-
-
 RULES: list[tuple[str, dict[str, Any], str]] = [
     ('EMPTY', {'points': []}, 'at least 1'),
     ('NAMES', {'joint_names': ['turn', 'swing']}, 'reach'),
@@ -129,35 +120,8 @@ RULES: list[tuple[str, dict[str, Any], str]] = [
 ]
 
 
-def test_a_message_that_breaks_a_rule_is_rejected_whole_and_survived(
-    node: FeedforwardBench, model: MechanismModel,
-) -> None:
-    moved = motion(seed=5)
-    for code, change, said in RULES:
-        before, counted = len(node.commands), node.counters[code]
-        node.send(broken(**change))
-        assert node.counters[code] == counted + 1, node.bench.status[-1]
-        assert said in node.wait_for_status(code=code)['message']
-        np.testing.assert_allclose(node.answer(message_of(moved)),
-                                   model.drive_forces(moved).total[0], rtol=0, atol=EQUAL)
-        assert len(node.commands) == before + 1
-        assert node.wait_for_status(code='OK')
-
-
-def test_a_message_that_arrives_cut_off_is_rejected(node: FeedforwardBench) -> None:
-    data = bytes(serialize_message(message_of(motion())))
-    whole = [length for length in range(len(data) + 1)
-             if is_whole(data[:length], JointTrajectory)]
-    # The last point's time ends it; a serialiser may add what it likes behind.
-    assert whole == list(range(whole[0], len(data) + 1))
-    assert struct.unpack('<iI', data[whole[0] - 8:whole[0]]) == (0, 2 * STEP)
-    counted = node.counters['SIZE']
-    node.send(data[:-60])
-    assert node.counters['SIZE'] == counted + 1
-
-
 def test_parameters_change_between_messages_and_what_is_no_arm_is_refused(
-    node: FeedforwardBench, model: MechanismModel,
+    node: FeedforwardBench, model: DriveModel,
 ) -> None:
     moved = motion(1, 7)
     before = np.array(node.answer(message_of(moved)))
@@ -165,8 +129,7 @@ def test_parameters_change_between_messages_and_what_is_no_arm_is_refused(
     for name, value in steps:
         result, = node.node.set_parameters([Parameter(name, value=value)])
         assert result.successful, result.reason
-    from pprs_dynamics.physics.model.model_file import build_model
-    loaded = build_model({**model.values, **dict(steps)}, model.source)
+    loaded = DriveModel.from_parameters({**model.values, **dict(steps)}, model.source)
     np.testing.assert_allclose(node.answer(message_of(moved)),
                                loaded.drive_forces(moved).total[0], rtol=0, atol=EQUAL)
     for name, value, said in (('friction.viscous', [1.0, 2.0], 'friction.viscous'),
@@ -182,36 +145,8 @@ def test_parameters_change_between_messages_and_what_is_no_arm_is_refused(
     np.testing.assert_allclose(node.answer(message_of(moved)), before, rtol=0, atol=EQUAL)
 
 
-def test_the_nodes_own_limits_hold_and_clamp(file: Path, model: MechanismModel) -> None:
-    moved = motion(2, 3)
-    peak = np.abs(model.drive_forces(moved).total).max(axis=0)
-    limits = peak * [0.5, 2, 0.5]
-    with feedforward_bench(JointTrajectory, **parameters(
-            file, effort_limits=limits.tolist(), limit_policy='clamp')) as node:
-        np.testing.assert_allclose(
-            node.answer(message_of(moved)),
-            np.clip(model.drive_forces(moved).total[0], -limits, limits), rtol=0, atol=EQUAL)
-        assert node.wait_for_status(code='CLAMPED')['level'] == 'WARN'
-        result, = node.node.set_parameters([Parameter('limit_policy', value='reject')])
-        assert result.successful
-        node.send(message_of(moved))
-        assert node.counters['LIMIT'] == 1
-
-
-def test_a_stale_command_holds_the_last_position(file: Path, model: MechanismModel) -> None:
-    moved = motion()
-    with feedforward_bench(JointTrajectory, **parameters(file, command_timeout=TIMEOUT)) as node:
-        node.answer(message_of(moved))
-        node.wait_for_status(code='STALE', level='STALE')
-        assert len(node.commands) == 2
-        rest = np.zeros((1, 3))
-        held = model.drive_forces(JointMotion(moved.position[-1:], rest, rest, np.zeros(1)))
-        np.testing.assert_allclose(node.commands[-1].data, held.total[0], rtol=0, atol=EQUAL)
-        assert np.abs(held.total).max() > 1
-
-
 def test_currents_have_a_topic_of_their_own_and_efforts_stay_efforts(
-    file: Path, model: MechanismModel,
+    file: Path, model: DriveModel,
 ) -> None:
     gain, moved = np.array([10.0, 5.0, 40.0]), motion(2, 4)
     effort = model.drive_forces(moved).total
@@ -238,24 +173,6 @@ def test_currents_have_a_topic_of_their_own_and_efforts_stay_efforts(
         assert '/feedforward/current' not in topics
 
 
-def test_missing_derivatives_come_from_a_spline(file: Path, model: MechanismModel) -> None:
-    time = np.arange(40) * 0.01
-    phase = 2 * time[:, None] + np.array([0.1, 0.7, 1.5])
-    exact = JointMotion(np.sin(phase), 2 * np.cos(phase), -4 * np.sin(phase), time)
-    message = message_of(exact)
-    for point in message.points:
-        point.velocities, point.accelerations = [], []
-    with feedforward_bench(
-            JointTrajectory, **parameters(file, missing_derivatives='spline')) as node:
-        # A quintic spline at 100 Hz of a motion at 2 rad/s: its ends are good to 1e-4 of a N m.
-        np.testing.assert_allclose(node.answer(message), model.drive_forces(exact).total[0],
-                                   rtol=0, atol=1e-3)
-        short = message_of(exact[:3])
-        short.points[1].velocities = []
-        node.send(short)
-        assert 'a spline needs at least 4' in node.wait_for_status(code='SIZE')['message']
-
-
 @pytest.fixture
 def running() -> Iterator[Bench]:
     with bench() as probe:
@@ -263,7 +180,7 @@ def running() -> Iterator[Bench]:
 
 
 def test_the_executable_takes_an_arms_file_and_finds_the_urdf_beside_it(
-    running: Bench, ros_domain: int, file: Path, model: MechanismModel, tmp_path: Path,
+    running: Bench, ros_domain: int, file: Path, model: DriveModel, tmp_path: Path,
 ) -> None:
     commands = running.listen(Float64MultiArray, '/feedforward/commands', 1000)
     running.follow_status('/feedforward/status')
@@ -284,24 +201,27 @@ def test_the_executable_takes_an_arms_file_and_finds_the_urdf_beside_it(
                                rtol=0, atol=EQUAL)
 
 
-@pytest.mark.parametrize(('parameter', 'said'), [
-    ('robot.tool:=flansch', "robot.tool is 'flansch', must be a link of the URDF"),
-    ('effort_limits:=[1.0,2.0]', 'effort_limits is [1.0, 2.0], must be empty, or be a list of 3'),
-    ('robot.urdf:=missing.urdf', 'missing.urdf'),
-])
-def test_a_mistake_is_one_sentence_and_status_2(
-    ros_domain: int, file: Path, parameter: str, said: str,
-) -> None:
-    done = subprocess.run(
-        [executable('feedforward'), '--ros-args', '--params-file', str(file), '-p', parameter],
-        env=environment(ros_domain), capture_output=True, text=True, timeout=30)
-    assert done.returncode == 2
-    assert said in done.stderr
-    assert 'Traceback' not in done.stderr
+def test_two_nodes_in_one_process_each_have_their_own_files(tmp_path: Path) -> None:
+    """A relative URDF counts from the file of its node, not from that of the other."""
+    interval = sys.getswitchinterval()
+    with bench() as running:
+        for name in ('left', 'right'):
+            (tmp_path / name).mkdir()
+            given = arm.write_arm(tmp_path / name, **FRICTION)
+            node: Any = running.add(FeedforwardNode, namespace=name, cli_args=[
+                '--ros-args', '--params-file', str(given)])
+            assert node.get_parameter('robot.urdf').value == str(given.with_name('made_up.urdf'))
+            status: list[Any] = []
+            running.probe.create_subscription(
+                String, f'/{name}/feedforward/status',
+                lambda message, status=status: status.append(json.loads(message.data)), LATCHED)
+            assert running.spin_until(lambda status=status: status)
+            assert status[-1]['model']['files'][0]['file'] == str(given)
+    assert sys.getswitchinterval() == interval
 
 
 def test_the_monitor_tells_what_the_model_of_an_arm_lacks(
-    running: Bench, file: Path, model: MechanismModel,
+    running: Bench, file: Path, model: DriveModel,
 ) -> None:
     gain = np.array([10.0, 5.0, 40.0])
     values = parameters(file, robot__gain=gain.tolist(), robot__effort_unit='A', error_span=1.0)

@@ -25,7 +25,6 @@ from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.ros import play_trajectory
 from pprs_dynamics.ros.force_command import Feedforward
 from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.messages.command_writer import CommandWriter
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.measured_states import MeasuredStates
 from pprs_dynamics.ros.messages.status_codes import Rejection
@@ -60,10 +59,7 @@ def forwarded(
     request = reader_for(model).read(serialize_message(message), NOW, 'reject')
     feedforward = Feedforward(model, OWN)
     drives = feedforward.ending_at_rest(feedforward.answer(request), stop_time)
-    found = CommandWriter(conversions.PAPER).joint_trajectory(
-        request.start, drives.offsets, drives, drives.effort)
-    assert isinstance(found, JointTrajectory)
-    return found
+    return drives.message(request.start, conversions.PAPER)
 
 
 @pytest.mark.parametrize(('points', 'ahead', 'said'), [
@@ -153,49 +149,28 @@ class TestTrajectoryProxy:
             assert objection(taken[0], settings(), NOW) == ''
             assert list(taken[0].joint_names) == list(DRIVES)
 
-    @pytest.mark.nodes
-    def test_points_without_derivatives_get_them_from_a_spline(self, action: Any) -> None:
-        with controller(action) as (bench, client, taken):
-            times = np.arange(0, 40) / 20.0
-            expected = DriveModel.load().drive_forces(HelicalPath().motion(times))
-            goal = action.Goal()
-            goal.trajectory.joint_names = list(DRIVES)
-            for time, position in zip(times, expected.drive_motion[0], strict=True):
-                goal.trajectory.points.append(point(time, position, np.zeros(0), np.zeros(0)))
-            result = answered(bench, client, goal)
-            assert result.result.error_code == 0, result.result.error_string
-            efforts = np.array([one.effort for one in taken[0].points])
-            # A spline's ends know nothing of what came before.
-            np.testing.assert_allclose(efforts[8:-9], expected.total[8:-8], atol=0.05)
 
     @pytest.mark.nodes
-    def test_what_cannot_be_reached_never_reaches_the_controller(self, action: Any) -> None:
+    def test_a_goal_that_breaks_a_rule_is_refused_when_it_is_asked(self, action: Any) -> None:
         with controller(action) as (bench, client, taken):
-            goal = action.Goal()
-            goal.trajectory.joint_names = list(DRIVES)
-            goal.trajectory.points.append(point(0.0, np.full(6, 5.0), np.zeros(6), np.zeros(6)))
-            result = answered(bench, client, goal)
-            assert result.result.error_code == action.Result.INVALID_GOAL
-            assert 'WORKSPACE' in result.result.error_string
-            assert taken == []
-
-    @pytest.mark.nodes
-    def test_what_is_wrong_with_a_goal_has_the_code_that_fits(self, action: Any) -> None:
-        with controller(action) as (bench, client, taken):
+            bench.follow_status('/trajectory_proxy/status')
             found = DriveModel.load().drive_forces(HelicalPath().motion([1.0, 1.1])).drive_motion
-            for joints, stamp, moving, code, said in (
-                    (['a', *DRIVES[1:]], 0, False, action.Result.INVALID_JOINTS, 'NAMES'),
-                    (list(DRIVES), 5, False, action.Result.OLD_HEADER_TIMESTAMP, 'ended'),
-                    (list(DRIVES), 0, True, action.Result.INVALID_GOAL, 'in motion')):
+            for joints, stamp, moving, far, code, said in (
+                    (['a', *DRIVES[1:]], 0, False, 0.0, 'NAMES', 'must hold each'),
+                    (list(DRIVES), 5, False, 0.0, 'TIME', 'ended'),
+                    (list(DRIVES), 0, False, 5.0, 'WORKSPACE', ''),
+                    (list(DRIVES), 0, True, 0.0, 'LIMIT', 'in motion')):
                 goal = action.Goal()
                 goal.trajectory.joint_names = joints
                 goal.trajectory.header.stamp.sec = stamp
                 goal.trajectory.points = [
-                    point(0.1 * (k + 1), found[0][k], found[1][k] * moving, found[2][k])
+                    point(0.1 * (k + 1), found[0][k] + far, found[1][k] * moving, found[2][k])
                     for k in range(2)]
-                result = answered(bench, client, goal).result
-                assert result.error_code == code, result.error_string
-                assert said in result.error_string
+                sent = client.send_goal_async(goal)
+                assert bench.spin_until(sent.done)
+                assert not sent.result().accepted
+                assert bench.spin_until(lambda code=code: bench.status[-1]['code'] == code)
+                assert said in bench.status[-1]['message']
             assert taken == []
 
     @pytest.mark.nodes
@@ -244,7 +219,7 @@ class TestTrajectoryProxy:
             publisher = bench.probe.create_publisher(JointTrajectory, '/arm/joint_trajectory', 1)
             result = answered(bench, client, resting_goal(action, 2.0)).result
             assert result.error_code == action.Result.PATH_TOLERANCE_VIOLATED
-            assert result.error_string.startswith('CONTROLLER: the controller says that the goal')
+            assert result.error_string.startswith('CONTROLLER: the controller reports the goal')
             assert '/probe, /trajectory_proxy' in result.error_string
             bench.probe.destroy_publisher(publisher)
 
@@ -420,7 +395,7 @@ def test_a_robot_has_the_names_of_the_machine_and_its_own_frame() -> None:
             continue
         request = read(serialize_message(message), NOW, 'reject')
     answer = Feedforward(model, OWN).answer(request)
-    state = CommandWriter(names).joint_state(NOW, answer.effort[0])
+    state = conversions.joint_state(NOW, answer.effort[0], names=names)
     assert list(state.name) == ['left_slide_1', 'left_slide_2', 'left_slide_3', 'left_lift_1',
                                 'left_lift_2', 'z_axis']
     assert state.header.frame_id == 'left_base'

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -16,18 +15,13 @@ import pytest
 from failing_effects import FAULTS, fail, install, model_file, parameters
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
 from monitor_bench import MonitorBench
-from node_bench import Bench, bench, overrides
+from node_bench import bench
 from rclpy.parameter import Parameter
 from ros_processes import environment, executable, node_process
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
-from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.errors import EffectError
-from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
 
 MOTION = random_motion(np.random.default_rng(11), 3)
 ONE = MOTION[:1]
@@ -70,32 +64,6 @@ def test_feedforward_rejects_counts_tells_and_goes_on(package: ModuleType, fault
 
 
 @pytest.mark.nodes
-@pytest.mark.parametrize('action', ['zero', 'silent'])
-def test_the_timeouts_action_is_that_of_stale_commands(package: ModuleType, action: str) -> None:
-    with feedforward_bench(**parameters('hose'), timeout_action=action) as node:
-        node.answer(message_of(MOTION))
-        fail(package, 'load')
-        node.send(message_of(MOTION))
-        assert node.counters['EFFECT'] == 1
-        node.bench.spin_for(0.2)
-        assert len(node.commands) == (2 if action == 'zero' else 1)
-        if action == 'zero':
-            assert list(node.commands[-1].data) == [0.0] * 6
-        wanted = 'efforts are zero' if action == 'zero' else 'the last command stays in force'
-        assert node.bench.spin_until(lambda: wanted in node.bench.status[-1]['message'])
-
-
-@pytest.mark.nodes
-def test_nothing_goes_out_where_no_command_was_in_force(package: ModuleType) -> None:
-    fail(package, 'columns')
-    with feedforward_bench(**parameters('worn_brake')) as node:
-        node.send(message_of(ONE))
-        assert node.counters['EFFECT'] == 1
-        node.bench.spin_for(0.2)
-        assert not node.commands
-
-
-@pytest.mark.nodes
 def test_stale_commands_are_held_without_an_effect_that_fails_at_rest(package: Any) -> None:
     def columns(cls: type, drive: Any, **_: float) -> tuple[Any]:
         return (np.array([1.0 / v for v in drive.velocity.tolist()]),)
@@ -113,24 +81,6 @@ def test_stale_commands_are_held_without_an_effect_that_fails_at_rest(package: A
 
 
 @pytest.mark.nodes
-def test_a_rejected_message_leaves_no_trace_in_the_memory(package: ModuleType) -> None:
-    with feedforward_bench(**parameters('worn_brake')) as node:
-        def samples() -> int:
-            return int(node.node._feedforward._memory.memories['worn_brake']['slide_2']['samples'])
-
-        node.answer(message_of(MOTION))
-        assert samples() == 1
-        # The whole trajectory passes, and the step of the memory to its first point fails.
-        fail(package, 'columns_2')
-        node.send(message_of(MOTION))
-        assert node.counters['EFFECT'] == 1
-        assert samples() == 1
-        fail(package, 'nowhere')
-        node.answer(message_of(MOTION))
-        assert samples() == 2
-
-
-@pytest.mark.nodes
 @pytest.mark.parametrize('place', ['__init__', 'drive_memory'])
 def test_a_parameter_that_an_effect_fails_at_is_refused_with_the_reason(
     package: ModuleType, place: str,
@@ -144,26 +94,6 @@ def test_a_parameter_that_an_effect_fails_at_is_refused_with_the_reason(
         assert result.reason.startswith(f'effect worn_brake: {place} raised ZeroDivisionError')
         fail(package, 'nowhere')
         assert node.answer(message_of(ONE)) == answer
-
-
-@pytest.mark.nodes
-def test_an_effect_that_fails_to_begin_after_it_was_accepted_costs_messages_only(
-    package: Any,
-) -> None:
-    with feedforward_bench(**parameters('worn_brake')) as node:
-        answer = node.answer(message_of(ONE))
-        result, = node.node.set_parameters(
-            [Parameter('effects.worn_brake.slide_2.coefficient', value=4.0)])
-        assert result.successful
-        fail(package, 'drive_memory')
-        node.send(message_of(ONE))
-        assert node.counters['EFFECT'] == 1
-        assert node.bench.spin_until(lambda: len(node.commands) == 2)
-        fail(package, 'nowhere')
-        # The velocity of slide_2 times 3 or 4 N s/m.
-        change = np.subtract(node.answer(message_of(ONE)), answer)
-        velocity = DriveModel.load().drive_forces(ONE).mechanism.velocity[0]
-        np.testing.assert_allclose(change, [0, velocity[1], 0, 0, 0, 0], rtol=0, atol=1e-9)
 
 
 @pytest.mark.nodes
@@ -224,73 +154,3 @@ def test_the_monitor_counts_tells_and_goes_on(package: ModuleType) -> None:
             return bool(monitor.bench.status[-1]['code'] == 'OK')
 
         assert monitor.bench.spin_until(goes_on)
-
-
-@pytest.mark.nodes
-def test_the_simulated_robot_asks_no_effect_and_refuses_one_that_cannot_be_built(
-    package: ModuleType,
-) -> None:
-    values = overrides(**parameters('worn_brake', 'hose'))
-    fail(package, 'columns')
-
-    def cycles(running: Bench) -> int:
-        return int(running.status[-1]['counters']['cycles']) if running.status else 0
-
-    with bench() as running:
-        running.follow_status('/simulated_robot/status')
-        running.add(SimulatedRobotNode, parameter_overrides=values)
-        assert running.spin_until(lambda: cycles(running) > 100)
-        fail(package, '__init__')
-        with pytest.raises(EffectError, match='effect worn_brake: __init__ raised'):
-            SimulatedRobotNode(context=running.context, parameter_overrides=values)
-
-
-@pytest.mark.nodes
-@pytest.mark.parametrize('node', ['feedforward', 'monitor', 'simulated_robot'])
-def test_a_node_whose_effect_cannot_be_built_ends_with_one_sentence(
-    ros_domain: int, tmp_path: Path, node: str,
-) -> None:
-    file = model_file(install(tmp_path), 'worn_brake')
-    done = run(tmp_path, '__init__ raises', executable(node), '--ros-args', '--params-file', file)
-    assert done.returncode == 2
-    assert 'Traceback' not in done.stderr
-    last = done.stderr.splitlines()[-1]
-    assert last.startswith('effect worn_brake: __init__ raised ZeroDivisionError')
-
-
-def run(folder: Path, fault: str, *command: object) -> subprocess.CompletedProcess[str]:
-    path = os.pathsep.join(filter(None, (str(folder), os.environ.get('PYTHONPATH'))))
-    return subprocess.run([str(word) for word in command], capture_output=True, text=True,
-                          timeout=120, cwd=folder,
-                          env={**os.environ, 'PYTHONPATH': path, 'WORN_BRAKE': fault})
-
-
-@pytest.fixture(scope='module')
-def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A robot that the paper's model explains."""
-    forces = DriveModel.load().drive_forces(
-        Excitation(6.0, seed=3).motion(np.arange(0, 6.0, 0.002)))
-    noise = np.random.default_rng(0).normal(scale=0.05, size=forces.total.shape)
-    file = tmp_path_factory.mktemp('recording') / 'run.csv'
-    write_recording(file, Recording.from_arrays(
-        'run', np.arange(len(noise)) * 0.002, forces.mechanism.position, None,
-        forces.total + noise, DRIVES))
-    return file
-
-
-@pytest.mark.parametrize(('command', 'fault'), [
-    ('compare', 'columns raises'), ('diagnose', 'columns longer'), ('adopt', 'columns raises')])
-def test_a_command_ends_with_one_sentence(
-    tmp_path: Path, recording: Path, command: str, fault: str,
-) -> None:
-    install(tmp_path)
-    words = {'compare': [recording, '--model', model_file(tmp_path, 'worn_brake')],
-             'diagnose': [recording],
-             'adopt': ['worn_brake', recording, '--output', tmp_path / 'better.yaml']}[command]
-    done = run(tmp_path, fault, executable('pprs'), command, *words)
-    assert done.returncode == 2, done.stderr
-    assert 'Traceback' not in done.stderr
-    place = fault.split()[0]
-    assert done.stderr.splitlines()[-1].startswith(
-        f'pprs {command}: effect worn_brake: {place} ')
-    assert not (tmp_path / 'better.yaml').exists()

@@ -11,7 +11,7 @@ from feedforward_bench import EQUAL, feedforward_bench, message_of, random_motio
 from rosgraph_msgs.msg import Clock
 
 from pprs_dynamics import DriveModel, PlatformMotion
-from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
+from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.ros.messages import conversions
 
 pytestmark = pytest.mark.nodes
@@ -53,18 +53,6 @@ def test_the_end_of_a_path_does_the_timeouts_action(action: str) -> None:
         assert node.wait_for_status(code='STALE')['level'] == 'STALE'
 
 
-@pytest.mark.parametrize('path', [HelicalPath(), Excitation(duration=1.0, seed=0)])
-def test_a_streams_last_pose_is_done_and_one_on_the_way_is_stale(
-    path: HelicalPath | Excitation,
-) -> None:
-    motion = path.motion(np.array([0.0, 0.3 * path.duration, path.duration + 0.01]))
-    with feedforward_bench(command_timeout=TIMEOUT) as node:
-        node.answer(message_of(motion[1:2]))
-        assert node.wait_for_status(code='STALE')['level'] == 'STALE'
-        node.answer(message_of(motion[2:]))
-        assert node.wait_for_status(code='DONE')['level'] == 'OK'
-
-
 @pytest.mark.parametrize('stamped', [False, True], ids=['no stamp', 'stamp of this day'])
 def test_without_the_clock_of_a_simulation_commands_go_stale_and_the_status_warns(
     stamped: bool,
@@ -80,16 +68,6 @@ def test_without_the_clock_of_a_simulation_commands_go_stale_and_the_status_warn
         assert node.bench.spin_until(lambda: len(node.commands) == 2)
         # No time has passed: whoever follows is where the trajectory begins.
         np.testing.assert_allclose(node.commands[-1].data, held(moving[:1]), rtol=0, atol=1e-8)
-
-
-def test_the_warning_goes_when_the_clock_comes() -> None:
-    with feedforward_bench(use_sim_time=True) as node:
-        node.wait_for_status(code='CLOCK')
-        clock = node.bench.probe.create_publisher(Clock, '/clock', 10)
-        timer = node.bench.probe.create_timer(
-            0.05, lambda: clock.publish(Clock(clock=conversions.time(5_000_000_000))))
-        assert node.wait_for_status(code='WAITING')['level'] == 'OK'
-        timer.cancel()
 
 
 @pytest.mark.parametrize('effect', [{}, {

@@ -15,9 +15,7 @@ import numpy as np
 import pytest
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
 from lifecycle_msgs.msg import Transition
-from lifecycle_msgs.srv import ChangeState
 from node_bench import bench, overrides
-from rclpy.parameter import Parameter
 from ros_processes import executable, node_process
 from std_msgs.msg import Float64MultiArray
 from supervisor import Supervisor
@@ -75,52 +73,10 @@ def test_a_supervisor_leads_it_through_its_states(
     assert node.wait_for_status(code='FINALIZED')
 
 
-def test_a_transition_that_rclpy_raises_at_is_refused(
-    supervised: tuple[FeedforwardBench, Supervisor],
-) -> None:
-    node, supervisor = supervised
-    service, = (each for each in node.node.services if each.srv_name.endswith('/change_state'))
-
-    def raises(request: ChangeState.Request, response: ChangeState.Response) -> None:
-        raise RuntimeError('Transition is not registered.')
-
-    # As rclpy of Jazzy does at an activation before the configuration.
-    allowed, service.callback = service.callback, node.node._refusing(raises)
-    assert not supervisor.change(Transition.TRANSITION_ACTIVATE)
-    service.callback = allowed
-    assert supervisor.change(Transition.TRANSITION_CONFIGURE)
-
-
 def held(motion: PlatformMotion) -> np.ndarray:
     """Return the forces that hold the last pose."""
     rest = PlatformMotion.at_rest(motion.position[-1:], motion.orientation[-1:])
     return DriveModel.load().drive_forces(rest).parts['rigid_body'][0]
-
-
-def test_parameters_set_while_inactive_are_in_force_when_active(
-    supervised: tuple[FeedforwardBench, Supervisor],
-) -> None:
-    node, supervisor = supervised
-    assert node.node.set_parameters([Parameter('masses.payload', value=2.0)])[0].successful
-    assert supervisor.change(Transition.TRANSITION_CONFIGURE)
-    assert node.node.set_parameters([Parameter('feedforward_scale', value=0.5)])[0].successful
-    assert supervisor.change(Transition.TRANSITION_ACTIVATE)
-    node.connect()
-    light, heavy = np.abs(held(MOTION)).sum(), np.abs(node.answer(MESSAGE)).sum()
-    # Half of the force for half as much mass again, roughly: neither change alone gives that.
-    assert 0.5 * light < heavy < light
-
-
-def test_a_node_that_is_active_by_itself_can_still_be_managed() -> None:
-    with feedforward_bench() as node:
-        supervisor = Supervisor(node.bench, 'feedforward')
-        assert supervisor.state() == 'active'
-        assert supervisor.change(Transition.TRANSITION_DEACTIVATE)
-        # No command was in force, so that there is nothing to hold.
-        node.bench.spin_for(0.1)
-        assert not node.commands
-        assert supervisor.change(Transition.TRANSITION_ACTIVATE)
-        node.answer(MESSAGE)
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
@@ -156,30 +112,6 @@ def test_a_signal_during_the_start_ends_it_too(ros_domain: int, tmp_path: Path) 
         assert 'Traceback' not in (tmp_path / 'log').read_text()
 
 
-def test_killed_and_started_again_it_answers_from_the_first_message_it_gets(
-    ros_domain: int, tmp_path: Path,
-) -> None:
-    command = [*DEMO, '-p', 'max_age:=0.0']  # however busy this machine is
-    with bench() as running:
-        commands = running.listen(Float64MultiArray, '/feedforward/commands', 1000)
-        running.follow_status('/feedforward/status')
-        publisher = running.probe.create_publisher(
-            MultiDOFJointTrajectory, '/feedforward/trajectory', 1000)
-        timer = running.probe.create_timer(0.01, lambda: publisher.publish(MESSAGE))
-        for _ in range(2):
-            commands.clear()
-            with node_process(command, ros_domain, tmp_path / 'log') as process:
-                assert running.spin_until(lambda: len(commands) > 50, 20)
-                running.status.clear()
-                assert running.spin_until(
-                    lambda: running.status and running.status[-1]['counters']['accepted'] > 20)
-                counters = running.status[-1]['counters']
-                assert counters['received'] == counters['accepted']
-                process.kill()
-                process.wait(5)
-        timer.cancel()
-
-
 def test_two_namespaces_do_not_disturb_each_other() -> None:
     with bench() as running:
         nodes = [running.add(
@@ -205,18 +137,6 @@ def test_two_namespaces_do_not_disturb_each_other() -> None:
         assert nodes[1]._counters['NAMES'] == 10
         sums = [np.abs(answer[-1].data).sum() for answer in answers]
         assert sums[0] < sums[1]
-
-
-def test_a_publisher_that_disappears_and_returns_is_stale_and_then_recovered() -> None:
-    with feedforward_bench(command_timeout=0.15) as node:
-        answer = node.answer(MESSAGE)
-        node.bench.probe.destroy_publisher(node.publisher)
-        node.wait_for_status(code='STALE')
-        node.publisher = node.bench.probe.create_publisher(
-            MultiDOFJointTrajectory, '/feedforward/trajectory', 100)
-        node.connect()
-        assert node.answer(MESSAGE) == answer
-        node.wait_for_status(code='OK')
 
 
 def test_a_destroyed_node_leaves_the_graph_also_where_nothing_is_collected() -> None:

@@ -22,10 +22,8 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from pprs_dynamics import DriveModel, PlatformMotion
+from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.status_codes import REJECTIONS
 
 pytestmark = pytest.mark.nodes
@@ -206,28 +204,6 @@ def test_damaged_messages_are_counted_explained_silent_and_survived(
     assert {code for code in REJECTIONS if not feedforward.counters[code]} == {'EFFECT'}
 
 
-def test_independent_chains_refuse_near_a_right_angle_and_never_publish_its_force() -> None:
-    upright = np.array([[0.05, 0.0, 0.5]])  # cos u_1 = (0.15 - 0.05 - 0.1) / 0.3 = 0
-    twist = np.array([[0.1, 0.2, 0.3]])
-    with feedforward_bench(friction__approach='independent_chains') as node:
-        motion = PlatformMotion(upright, [[0, 0, 0, 1.0]], twist, twist, twist, twist)
-        node.send(message_of(motion))
-        assert node.node._counters['SINGULAR'] == 1
-        away = PlatformMotion(upright - [[0.1, 0, 0]], [[0, 0, 0, 1.0]], twist, twist, twist, twist)
-        assert np.abs(node.answer(message_of(away))).max() < 100.0
-        assert len(node.commands) == 1
-
-
-def test_old_messages_are_rejected_where_max_age_says_so() -> None:
-    with feedforward_bench(max_age=0.5) as node:
-        motion = random_motion(np.random.default_rng(4), 1)
-        now = node.node.get_clock().now().nanoseconds
-        node.send(message_of(motion, conversions.time(now - 2_000_000_000)))
-        assert node.node._counters['TIME'] == 1
-        node.answer(message_of(motion, conversions.time(now)))
-        node.answer(message_of(motion))
-
-
 def test_a_parameter_change_acts_on_the_next_message_and_a_bad_one_on_none(
     feedforward: FeedforwardBench,
 ) -> None:
@@ -245,26 +221,9 @@ def test_a_parameter_change_acts_on_the_next_message_and_a_bad_one_on_none(
     after = np.array(feedforward.answer(message_of(motion)))
     heavier = DriveModel.load().values | {'masses.payload': 3.0}
     np.testing.assert_allclose(
-        after, build_model(heavier).drive_forces(motion).total[0], rtol=0, atol=EQUAL)
+        after, DriveModel.from_parameters(
+            heavier).drive_forces(motion).total[0], rtol=0, atol=EQUAL)
     assert np.abs(after - before).max() > 1.0
-
-
-def test_an_effect_added_while_running_appears_in_the_command_and_on_its_own_topic(
-    feedforward: FeedforwardBench,
-) -> None:
-    motion = random_motion(np.random.default_rng(7), 1)
-    before = np.array(feedforward.answer(message_of(motion)))
-    for name, value in (('effects.effort_offset.lift_2.force', 1.5),
-                        ('effects.active', ['effort_offset'])):
-        result, = feedforward.node.set_parameters([Parameter(name, value=value)])
-        assert result.successful, result.reason
-    part = feedforward.bench.listen(JointState, '/feedforward/effort/effort_offset')
-    assert feedforward.bench.spin_until(
-        lambda: feedforward.node.count_subscribers('/feedforward/effort/effort_offset'))
-    after = np.array(feedforward.answer(message_of(motion)))
-    np.testing.assert_allclose(after - before, [0, 0, 0, 0, 1.5, 0], atol=EQUAL)
-    assert feedforward.bench.spin_until(lambda: part)
-    assert list(part[-1].effort) == [0, 0, 0, 0, 1.5, 0]
 
 
 def test_memory_advances_with_first_points_only() -> None:

@@ -17,7 +17,6 @@ from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
-    ListParameters,
     SetParameters,
     SetParametersAtomically,
 )
@@ -28,12 +27,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.monitor import MonitorNode
-from pprs_dynamics.ros.play_trajectory import PlayTrajectoryNode
-from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
 
 pytestmark = pytest.mark.nodes
 
@@ -86,7 +81,7 @@ def test_effects_come_and_go_with_their_topics_while_running(caller: Caller) -> 
               'effects.stribeck_friction.lift_1.force': 1.2,
               'effects.stribeck_friction.lift_1.velocity': 0.01,
               'effects.effort_offset.slide_3.force': -0.7}
-    expected = build_model(values).drive_forces(MOTION)
+    expected = DriveModel.from_parameters(values).drive_forces(MOTION)
     topic = '/feedforward/effort/effort_offset'
     part = node.bench.listen(JointState, topic)
     assert node.bench.spin_until(lambda: node.node.count_subscribers(topic))
@@ -100,31 +95,6 @@ def test_effects_come_and_go_with_their_topics_while_running(caller: Caller) -> 
     assert node.bench.spin_until(lambda: not node.bench.probe.count_publishers(topic))
     assert caller.set('effects.active', []).successful
     assert node.answer(MESSAGE) == plain.tolist()
-
-
-def test_an_effect_of_measurement_enters_no_command(caller: Caller) -> None:
-    plain = caller.node.answer(MESSAGE)
-    assert caller.set('effects.effort_gain.lift_1.gain', 0.2).successful
-    result = caller.set('effects.active', ['effort_gain'])
-    assert result.successful, result.reason
-    assert caller.node.answer(MESSAGE) == plain
-    assert not caller.bench.probe.count_publishers('/feedforward/effort/effort_gain')
-
-
-def test_many_parameters_change_at_once_or_not_at_all(caller: Caller) -> None:
-    plain = caller.node.answer(MESSAGE)
-    half = {'masses.payload': 2.0, 'friction.approach': 'a_third_one'}
-    result = caller.set_at_once(half)
-    assert not result.successful
-    assert 'friction.approach' in result.reason
-    assert caller.node.answer(MESSAGE) == plain
-    whole = {'masses.payload': 2.0, 'friction.approach': 'independent_chains', 'max_age': 3.0,
-             'limits.rod_cosine': 0.001}
-    assert caller.set_at_once(whole).successful
-    values = {**DriveModel.load().values, **whole}
-    values.pop('max_age')
-    np.testing.assert_allclose(caller.node.answer(MESSAGE),
-                               build_model(values).drive_forces(MOTION).total[0], atol=EQUAL)
 
 
 REFUSED = [
@@ -149,23 +119,6 @@ def test_what_is_not_allowed_is_refused_with_name_value_and_rule(caller: Caller)
         assert not result.successful, name
         assert told in result.reason
     assert caller.node.answer(MESSAGE) == plain
-
-
-def test_every_parameter_says_what_it_is_and_numbers_say_their_range(caller: Caller) -> None:
-    assert caller.set('effects.effort_offset.lift_1.force', 0.1).successful
-    names = caller.call(ListParameters, 'list_parameters').result.names
-    own = [name for name in names if not name.startswith(('qos_overrides.', 'use_sim_time',
-                                                          'start_type_description_service'))]
-    assert {'command_timeout', 'geometry.rod_length', 'effects.active',
-            'effects.effort_offset.lift_1.force'} <= set(own)
-    described = caller.call(DescribeParameters, 'describe_parameters', names=own).descriptors
-    for descriptor in described:
-        assert descriptor.description, descriptor.name
-        assert descriptor.additional_constraints.startswith('must '), descriptor.name
-    ranges = {each.name: each.floating_point_range for each in described}
-    assert ranges['feedforward_scale'][0].to_value == 1.0
-    assert ranges['masses.payload'][0].from_value == 0.0
-    assert ranges['effects.effort_offset.lift_1.force'][0].to_value > 0
 
 
 def types(caller: Caller, *names: str) -> list[int]:
@@ -195,30 +148,6 @@ def test_whole_numbers_and_empty_lists_keep_the_declared_type(caller: Caller) ->
     assert types(caller, *names) == wanted
 
 
-def test_whole_numbers_at_the_start_are_decimal_ones() -> None:
-    given = {'masses__payload': 2, 'effort_limits': [20] * 6, 'feedforward_scale': 1,
-             'effects__effort_offset__lift_1__force': 1}
-    with feedforward_bench(**given) as node:
-        for name in given:
-            kind = node.node.get_parameter(name.replace('__', '.')).type_
-            assert kind in (Parameter.Type.DOUBLE, Parameter.Type.DOUBLE_ARRAY), name
-
-
-def test_a_list_of_whole_and_decimal_numbers_gets_the_hint(caller: Caller) -> None:
-    # `ros2 param set` sends such a list as the word that it was typed as.
-    for name, word in (('gravity', '[0, 0.0, -9.81]'), ('effort_limits', '[1, 2.0]')):
-        result = caller.set(name, word)
-        assert not result.successful
-        assert 'write 0.0, not 0' in result.reason
-
-
-def test_the_ledger_of_a_model_is_no_parameter() -> None:
-    with feedforward_bench(history__step_01__effect='coulomb_friction',
-                           history__step_01__error_before=1.0) as node:
-        assert not node.node.get_parameters_by_prefix('history')
-        assert node.answer(MESSAGE)
-
-
 def test_topics_have_the_qos_that_is_asked_for() -> None:
     overrides = {'qos_overrides./feedforward/commands.publisher.reliability': 'best_effort',
                  'qos_overrides./feedforward/trajectory.subscription.depth': 7}
@@ -230,32 +159,6 @@ def test_topics_have_the_qos_that_is_asked_for() -> None:
         assert status.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
         others, = node.bench.probe.get_publishers_info_by_topic('/feedforward/joint_command')
         assert others.qos_profile.reliability == ReliabilityPolicy.RELIABLE
-
-
-def test_a_qos_that_is_none_is_one_sentence() -> None:
-    override = {'qos_overrides./feedforward/commands.publisher.reliability': 'hopeful'}
-    with pytest.raises(ModelError, match='hopeful'), feedforward_bench(**override):
-        pass
-
-
-@pytest.mark.parametrize(('factory', 'topic', 'entity'), [
-    (MonitorNode, '/monitor/error', 'publisher'),
-    (MonitorNode, '/joint_states', 'subscription'),
-    (SimulatedRobotNode, '/joint_states', 'publisher'),
-    (SimulatedRobotNode, '/simulated_robot/commands', 'subscription'),
-    (PlayTrajectoryNode, '/feedforward/trajectory', 'publisher'),
-    (FeedforwardNode, '/diagnostics', 'publisher'),
-], ids=lambda value: getattr(value, '__name__', value))
-def test_every_topic_of_every_node_has_the_qos_that_is_asked_for(
-    factory: Any, topic: str, entity: str,
-) -> None:
-    with bench() as running:
-        running.add(factory, parameter_overrides=overrides(
-            **{f'qos_overrides.{topic}.{entity}.reliability': 'best_effort'}))
-        look = getattr(running.probe, f'get_{entity}s_info_by_topic')
-        assert running.spin_until(lambda: look(topic))
-        info, = look(topic)
-        assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
 
 
 def test_a_qos_that_does_not_fit_is_told_with_the_resolved_topic(

@@ -15,7 +15,6 @@ from feedforward_bench import EQUAL, feedforward_bench, message_of, random_motio
 from node_bench import overrides
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
@@ -75,27 +74,6 @@ def test_clamping_never_lets_a_number_through_that_is_none() -> None:
         assert node.counters['OUTPUT'] == 1
         node.answer(message_of(motion))
         assert len(node.commands) == 1
-
-
-def test_the_smaller_of_the_models_and_the_nodes_limit_counts() -> None:
-    with feedforward_bench(limits__effort=[0.5] * 6, effort_limits=[1000.0] * 6) as node:
-        node.send(message_of(MOTION))
-        assert node.counters['LIMIT'] == 1
-
-
-def test_the_scale_multiplies_everything_that_goes_out_and_what_is_compared_with_limits() -> None:
-    limits = (np.abs(FORCES.total).max(axis=0) * 0.5).tolist()
-    with feedforward_bench(feedforward_scale=0.25, effort_limits=limits) as node:
-        part = node.bench.listen(JointState, '/feedforward/effort/rigid_body')
-        assert node.bench.spin_until(
-            lambda: node.node.count_subscribers('/feedforward/effort/rigid_body'))
-        found = node.answer(message_of(MOTION))
-        np.testing.assert_allclose(found, 0.25 * FORCES.total[0], rtol=0, atol=EQUAL)
-        assert node.bench.spin_until(lambda: part and node.joint_trajectory)
-        np.testing.assert_allclose(
-            part[-1].effort, 0.25 * FORCES.parts['rigid_body'][0], rtol=0, atol=EQUAL)
-        np.testing.assert_allclose([p.effort for p in node.joint_trajectory[-1].points],
-                                   0.25 * FORCES.total, rtol=0, atol=EQUAL)
 
 
 @pytest.mark.parametrize('action', ['hold_gravity', 'zero', 'silent'])
@@ -186,15 +164,6 @@ def test_holding_stays_within_limits_and_scale() -> None:
                                    np.clip(0.5 * gravity(MOTION), -4, 4), rtol=0, atol=EQUAL)
 
 
-def test_a_pose_that_can_no_longer_be_held_leaves_the_last_command() -> None:
-    with feedforward_bench(command_timeout=TIMEOUT) as node:
-        node.answer(message_of(MOTION))
-        result, = node.node.set_parameters([Parameter('geometry.rod_length', value=0.05)])
-        assert result.successful
-        assert 'stays in force' in node.wait_for_status(code='STALE')['message']
-        assert len(node.commands) == 1
-
-
 def at(x: float, z: float) -> PlatformMotion:
     zero = np.zeros((1, 3))
     return PlatformMotion([[x, 0.0, z]], [[0, 0, 0, 1.0]], zero, zero, zero, zero)
@@ -217,31 +186,6 @@ def test_warnings_come_before_the_rejection() -> None:
         assert status['singularity_margin'] == pytest.approx(0.1, abs=0.01)
         node.send(message_of(at(sine(-0.1), 0.5)))
         assert node.counters['SINGULAR'] == 1
-
-
-def test_the_end_of_a_stroke_is_announced() -> None:
-    # A lift is at z minus the rod's height, 0.3 sin u with cos u = 1/6; its stroke ends at 0.8 m.
-    height = 0.3 * np.sqrt(1 - 1 / 36)
-    with feedforward_bench() as node:
-        node.answer(message_of(at(0.0, 0.79 + height)))
-        status = node.wait_for_status(code='NEAR_WORKSPACE', level='WARN')
-        assert status['workspace_margin'] == pytest.approx(0.01 / 0.45, abs=1e-3)
-        node.send(message_of(at(0.0, 0.81 + height)))
-        assert node.counters['WORKSPACE'] == 1
-
-
-def test_beyond_the_range_of_a_measured_curve_is_announced() -> None:
-    curve = 'effects__measured_curve__lift_1__'
-    height = 0.3 * np.sqrt(1 - 1 / 36)
-    with feedforward_bench(**{
-            'effects__active': ['measured_curve'], f'{curve}variable': 'position',
-            f'{curve}from': 0.1, f'{curve}to': 0.3,
-            f'{curve}values': [0.0, 1.0, 1.0, 0.0]}) as node:
-        node.answer(message_of(at(0.0, 0.2 + height)))
-        assert node.wait_for_status(code='OK')
-        node.answer(message_of(at(0.0, 0.4 + height)))
-        status = node.wait_for_status(code='CURVE', level='WARN')
-        assert 'lift_1: position 0.4 is outside of 0.1 to 0.3' in status['message']
 
 
 def test_late_messages_are_rejected_and_do_not_keep_alive() -> None:
@@ -270,23 +214,6 @@ def test_of_setpoints_that_wait_the_latest_are_executed_and_the_others_are_told(
         node.wait_for_status(lagging=True)
 
 
-def test_messages_that_queue_up_are_told() -> None:
-    depth = {'qos_overrides./feedforward/trajectory.subscription.depth': 100}
-    with feedforward_bench(lag_warning=0.01, **depth) as node:
-        message = message_of(random_motion(np.random.default_rng(2), 1))
-        # Nobody spins: the messages wait for the node, at the median a quarter second.
-        for _ in range(50):
-            node.publisher.publish(message)
-        end = node.node.get_clock().now().nanoseconds + 250_000_000
-        while node.node.get_clock().now().nanoseconds < end:
-            pass
-        assert node.bench.spin_until(lambda: node.counters['accepted'] == 50)
-        status = node.wait_for_status(lagging=True)
-        assert status['lag']['p50'] > 0.01
-        node.answer(message)
-        assert node.wait_for_status(code='LAG')['level'] == 'WARN'
-
-
 def test_the_status_tells_what_a_supervisor_wants_to_know() -> None:
     with feedforward_bench() as node:
         for _ in range(20):
@@ -306,26 +233,6 @@ def test_the_status_tells_what_a_supervisor_wants_to_know() -> None:
             lambda: node.bench.status[-1]['model']['sha256'] != before)
 
 
-def test_diagnostics_say_the_same_where_their_messages_are_installed() -> None:
-    messages = pytest.importorskip('diagnostic_msgs.msg')
-    with feedforward_bench(command_timeout=TIMEOUT) as node:
-        told = node.bench.listen(messages.DiagnosticArray, '/diagnostics', 10)
-        assert node.bench.connected()
-        bad = message_of(MOTION)
-        bad.points = []
-        node.send(bad)
-        assert node.bench.spin_until(
-            lambda: told and told[-1].status[0].message.startswith('EMPTY'))
-        status = told[-1].status[0]
-        assert (status.name, status.level) == ('/feedforward', b'\x02')
-        assert status.hardware_id == '3-PPRS'
-        assert {value.key: value.value for value in status.values}['EMPTY'] == '1'
-        # STALE is the word of an aggregator that hears nothing of a node.
-        node.answer(message_of(MOTION))
-        assert node.bench.spin_until(lambda: told[-1].status[0].message.startswith('STALE'))
-        assert told[-1].status[0].level == b'\x02'
-
-
 def test_what_was_sent_too_long_ago_is_not_executed_whether_it_is_stamped_or_not() -> None:
     """Messages that lay in the middleware while the node stood still."""
     limit = 0.3
@@ -341,26 +248,6 @@ def test_what_was_sent_too_long_ago_is_not_executed_whether_it_is_stamped_or_not
             assert len(node.commands) == silent
             node.answer(message_of(MOTION, (stamped and conversions.time(
                 node.node.get_clock().now().nanoseconds)) or None))
-
-
-def test_what_is_due_much_later_is_not_executed_at_once() -> None:
-    with feedforward_bench(max_ahead=0.5, command_timeout=TIMEOUT) as node:
-        def due_in(seconds: float, offset: float = 0.0) -> int:
-            message = message_of(MOTION[:1], conversions.time(
-                node.node.get_clock().now().nanoseconds + round(seconds * 1e9)))
-            message.points[0].time_from_start = conversions.duration(round(offset * 1e9))
-            node.send(message)
-            return len(node.commands)
-
-        due_in(3600.0)
-        assert 'max_ahead allows 0.5 s' in node.wait_for_status(code='TIME')['message']
-        due_in(0.0, 1.0)  # stamped now, and due in a second all the same
-        assert node.counters['TIME'] == 2
-        node.bench.spin_for(2 * TIMEOUT)
-        assert not node.commands
-        due_in(0.2)
-        assert node.bench.spin_until(lambda: node.commands)
-        node.wait_for_status(code='STALE')
 
 
 def test_no_time_from_start_switches_the_watchdog_off() -> None:
@@ -447,12 +334,3 @@ def test_a_controller_that_comes_back_is_held_only_where_it_stands(moves: bool) 
             point, = node.joint_trajectory[-1].points
             np.testing.assert_allclose(point.positions, position[0], atol=1e-8)
             assert not any(point.velocities)
-
-
-def test_a_stream_ends_at_rest_by_itself_where_that_is_asked_for() -> None:
-    with feedforward_bench(stop_time=0.1) as node:
-        node.answer(message_of(MOTION))
-        assert node.bench.spin_until(lambda: node.joint_trajectory)
-        assert len(node.joint_trajectory[-1].points) == len(MOTION) + 1
-        assert objection(node.joint_trajectory[-1], ControllerSettings(DRIVES),
-                         node.node.get_clock().now().nanoseconds) == ''

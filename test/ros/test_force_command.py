@@ -12,19 +12,19 @@ import pytest
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.ros.force_command import Feedforward
 from pprs_dynamics.ros.messages.trajectory_request import TrajectoryRequest
 
 OWN = {'feedforward_scale': 1.0, 'effort_limits': (), 'limit_policy': 'reject',
        'missing_derivatives': 'reject', 'ramp_time': 0.0}
 MODEL = DriveModel.load()
-REMEMBERS = build_model({**MODEL.values, 'effects.active': ['hysteresis', 'friction_drift'],
+REMEMBERS = DriveModel.from_parameters(
+    {**MODEL.values, 'effects.active': ['hysteresis', 'friction_drift'],
                          **{f'effects.hysteresis.slide_1.{key}': value for key, value in {
                              'force': 3.0, 'distance': 0.005}.items()},
                          **{f'effects.friction_drift.slide_1.{key}': value for key, value in {
                              'force': 5.0, 'time': 0.1}.items()}})
-HEAVY = build_model({**MODEL.values, 'masses.payload': 3.0})
+HEAVY = DriveModel.from_parameters({**MODEL.values, 'masses.payload': 3.0})
 STEP = 10_000_000  # [ns]
 
 
@@ -83,25 +83,13 @@ def test_a_change_during_a_ramp_goes_on_from_where_that_is() -> None:
     clock.now += 1.0
     half_way = node.answer(asked).effort
     assert np.abs(half_way - HEAVY.drive_forces(asked.motion).total).max() > 1.0
-    node.use(build_model(dict(HEAVY.values)), {**own, 'limit_policy': 'clamp'})
+    node.use(DriveModel.from_parameters(dict(HEAVY.values)), {**own, 'limit_policy': 'clamp'})
     np.testing.assert_allclose(node.answer(asked).effort, half_way, atol=1e-12)  # no other model
     node.use(MODEL, own)
     np.testing.assert_allclose(node.answer(asked).effort, half_way, atol=1e-12)
     clock.now += 2.0
     np.testing.assert_array_equal(
         node.answer(asked).effort, MODEL.drive_forces(asked.motion).total)
-
-
-def test_without_a_ramp_and_before_the_first_command_a_change_is_at_once() -> None:
-    asked = request()
-    expected = HEAVY.drive_forces(asked.motion).total
-    for ramp, has_answered in ((0.0, True), (2.0, False)):
-        own = {**OWN, 'ramp_time': ramp}
-        node = Feedforward(MODEL, own, Clock())
-        if has_answered:
-            node.answer(asked)
-        node.use(HEAVY, own)
-        np.testing.assert_array_equal(node.answer(asked).effort, expected)
 
 
 def test_what_is_gone_over_stays_within_the_limits() -> None:
@@ -147,7 +135,7 @@ def test_a_path_that_ends_at_rest_and_a_time_of_0_get_no_point_more() -> None:
 def test_a_stop_never_leads_beyond_a_stroke() -> None:
     asked = request(1.0, 2)
     lifts = MODEL.drive_forces(asked.motion).mechanism.position[-1, 3:]
-    narrow = build_model({**MODEL.values, 'limits.lift_stroke': [
+    narrow = DriveModel.from_parameters({**MODEL.values, 'limits.lift_stroke': [
         float(lifts.min() - 1e-4), float(lifts.max() + 1e-4)]})
     node = Feedforward(narrow, OWN)
     node.answer(request(1.0, 1))
@@ -167,16 +155,6 @@ def test_of_a_piece_the_first_point_is_remembered_and_what_is_foreseen_is_not() 
                                           STEP * np.arange(count)) for count in (6, 1))
         np.testing.assert_array_equal(pieces.answer(piece).effort[:1],
                                       points.answer(point).effort)
-
-
-def test_what_is_remembered_goes_by_the_time_since_the_first_message() -> None:
-    """The same, whenever the node was started, and as one recording of all of it."""
-    for start in (0, 5_000_000_000):
-        node = Feedforward(REMEMBERS, OWN)
-        found = [node.answer(TrajectoryRequest(request(1.0 + 0.01 * k).motion, start + k * STEP,
-                                               np.array([0]))).effort[0] for k in range(40)]
-        motion = request(1.0, 40).motion.with_time(0.01 * np.arange(40))
-        np.testing.assert_allclose(found, REMEMBERS.drive_forces(motion).total, atol=1e-9)
 
 
 @pytest.mark.parametrize('moment', [0.0, 1.3, 3.0])

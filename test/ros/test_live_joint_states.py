@@ -18,14 +18,12 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.ros.live_joint_states import SHOWN, LiveJointStates
+from pprs_dynamics.ros.live_joint_states import LiveJointStates, LiveNodes
 from pprs_dynamics.ros.messages import conversions
 
 pytestmark = pytest.mark.nodes
 
 MODEL = DriveModel.load()
-STEP = 10_000_000  # [ns]
 
 
 @pytest.fixture
@@ -74,19 +72,18 @@ def test_joint_states_are_heard_whatever_their_publisher_offers(
         assert running.spin_until(lambda: publisher.publish(message) or node.to_dict()['received'])
 
 
-def test_what_is_drawn_stays_bounded_where_a_bag_is_played_in_a_loop(
-    running: tuple[Bench, Any],
-) -> None:
-    _, node = running
-    motion = Excitation(SHOWN + 5.0, seed=3).motion(np.arange(0, SHOWN + 5.0, STEP / 1e9))
-    forces = MODEL.drive_forces(motion)
-    for _ in range(2):
-        for row in range(len(motion)):
-            node.stream._on_state(bytes(serialize_message(conversions.joint_state(
-                row * STEP, forces.total[row], forces.mechanism.position[row],
-                forces.mechanism.velocity[row]))))
-            if row % 50 == 0:
-                node._compare()
-    times = np.array([moment for moment, _ in node._residuals])
-    assert 1000 < len(times) <= SHOWN * 1e9 / STEP + 1
-    assert np.all(np.diff(times) > 0)
+def test_remapping_and_qos_come_from_the_command_line(ros_domain: int) -> None:
+    message = conversions.joint_state(0, np.zeros(6), np.zeros(6), np.zeros(6))
+    with bench() as running:
+        publisher = running.probe.create_publisher(JointState, '/cell/joint_states', 10)
+        nodes = LiveNodes(MODEL, arguments=[
+            '--ros-args', '-r', 'joint_states:=/cell/joint_states', '-p',
+            'qos_overrides./cell/joint_states.subscription.reliability:=reliable'])
+        try:
+            assert running.spin_until(publisher.get_subscription_count)
+            info, = running.probe.get_subscriptions_info_by_topic('/cell/joint_states')
+            assert info.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+            assert running.spin_until(
+                lambda: publisher.publish(message) or nodes.to_dict()['received'])
+        finally:
+            nodes.close()

@@ -23,13 +23,11 @@ from trajectory_msgs.msg import (
     MultiDOFJointTrajectory,
 )
 
-from pprs_dynamics import JointMotion, MechanismModel, PlatformMotion
+from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.monitor import MonitorNode
-from pprs_dynamics.ros.play_trajectory import PlayTrajectoryNode
-from pprs_dynamics.ros.run_node import Finished
 from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
 
 pytestmark = pytest.mark.nodes
@@ -51,7 +49,7 @@ def node() -> Iterator[FeedforwardBench]:
         yield running
 
 
-def drives_message(model: MechanismModel, position: np.ndarray) -> JointTrajectory:
+def drives_message(model: DriveModel, position: np.ndarray) -> JointTrajectory:
     zero = np.zeros(len(position)).tolist()
     return JointTrajectory(joint_names=list(model.drives), points=[JointTrajectoryPoint(
         positions=position.tolist(), velocities=zero, accelerations=zero,
@@ -59,7 +57,7 @@ def drives_message(model: MechanismModel, position: np.ndarray) -> JointTrajecto
 
 
 def test_efforts_are_the_models_and_what_cannot_be_is_refused(node: FeedforwardBench) -> None:
-    model = MechanismModel.load(FILE)
+    model = DriveModel.load(FILE)
     home = model.robot.structure.home[model.robot.structure.tables.drives]
     near = home + 0.01 * np.arange(6)
     rest = np.zeros((1, 6))
@@ -84,7 +82,7 @@ def poses(rng: np.random.Generator, points: int = 1) -> PlatformMotion:
 
 
 def test_poses_of_the_tool_are_answered_or_refused_as_those_of_a_platform() -> None:
-    model, motion = MechanismModel.load(FILE), poses(np.random.default_rng(4), 3)
+    model, motion = DriveModel.load(FILE), poses(np.random.default_rng(4), 3)
     forces = model.drive_forces(motion)
     with feedforward_bench(MultiDOFJointTrajectory, 'pose_trajectory', **parameters()) as node:
         np.testing.assert_allclose(node.answer(message_of(motion)), forces.total[0], rtol=0,
@@ -110,8 +108,9 @@ def test_poses_of_the_tool_are_answered_or_refused_as_those_of_a_platform() -> N
             assert node.counters[code] == counted + 1
             assert len(node.commands) == before
         near = Rotation.from_rotvec([[0.0, 0.0, 1.4]]).as_quat()
-        node.node._settings.node_values['warning_margin'] = 0.99
-        node.node._margins_due = 0.0
+        answer, = node.node.set_parameters([Parameter('warning_margin', value=0.99)])
+        assert answer.successful
+        node.bench.spin_for(0.02)  # margins are computed 100 times a second
         node.send(message_of(PlatformMotion.at_rest(at_home, near)))
         assert node.wait_for_status(code='NEAR_SINGULAR')['singularity_margin'] < 0.99
 
@@ -123,7 +122,7 @@ def given(**own: Any) -> list[Parameter]:
 
 def test_the_simulated_robot_holds_moves_and_refuses() -> None:
     """How it follows a whole path is tested in simulated time."""
-    model = MechanismModel.load(FILE)
+    model = DriveModel.load(FILE)
     home, _ = model.robot.structure.room(np.pi)
     with bench() as running:
         states = running.listen(JointState, '/joint_states', 1000)
@@ -153,31 +152,9 @@ def test_the_simulated_robot_holds_moves_and_refuses() -> None:
         assert 'leg_1' in running.status[-1]['message']
 
 
-def test_the_path_is_an_excitation_of_the_drives_from_rest_to_rest() -> None:
-    model = MechanismModel.load(FILE)
-    home, room = model.robot.structure.room(np.pi)
-    with bench() as running:
-        heard = running.listen(JointTrajectory, '/feedforward/trajectory', 1000)
-        running.add(PlayTrajectoryNode, parameter_overrides=given(
-            duration=1.5, rate=40.0, points=2, seed=1))
-        with pytest.raises(Finished):
-            running.spin_until(lambda: False, 30)
-        assert running.spin_until(lambda: len(heard) == 61)
-    motion = np.array([[each.points[0].positions, each.points[0].velocities,
-                        each.points[0].accelerations] for each in heard])
-    assert tuple(heard[0].joint_names) == model.drives
-    np.testing.assert_allclose(motion[[0, -1]], [[home, 0 * home, 0 * home]] * 2, atol=1e-9)
-    assert np.all(np.ptp(motion[:, 0], axis=0) > 0.005)
-    assert np.all(np.abs(motion[:, 0] - home) < room)
-    # The second point of each message is the first of the next, a period later.
-    assert heard[3].points[1].positions == heard[4].points[0].positions
-    assert heard[3].points[1].time_from_start.nanosec == 25_000_000
-    model.drive_forces(JointMotion(*motion.transpose(1, 0, 2)))
-
-
 def test_the_platform_is_on_tf_while_somebody_draws_the_robot() -> None:
     tf = pytest.importorskip('tf2_msgs.msg', reason='tf2_msgs comes with a ROS 2 installation only')
-    model, motion = MechanismModel.load(FILE), poses(np.random.default_rng(5))
+    model, motion = DriveModel.load(FILE), poses(np.random.default_rng(5))
     position = model.drive_forces(motion).mechanism.position[0]
     with bench() as running:
         running.add(MonitorNode, parameter_overrides=overrides(**parameters()))

@@ -18,7 +18,6 @@ from std_msgs.msg import Float64MultiArray
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.live_joint_states import LiveNodes
 from pprs_dynamics.ros.monitor import MonitorNode
@@ -26,7 +25,7 @@ from pprs_dynamics.ros.monitor import MonitorNode
 pytestmark = pytest.mark.nodes
 
 MODEL = DriveModel.load()
-HEAVIER = build_model({
+HEAVIER = DriveModel.from_parameters({
     **MODEL.values, 'masses.payload': MODEL.values['masses.payload'] + 0.1,
     'effects.active': ['effort_offset'], 'effects.effort_offset.lift_1.force': 0.5})
 GIVEN = (MODEL.values['masses.payload'], [])
@@ -103,7 +102,8 @@ def test_a_model_is_set_followed_and_restored(cell: Cell) -> None:
 
 def test_a_model_is_taken_whole_or_not_at_all(cell: Cell) -> None:
     live = cell.live
-    limits = build_model({**HEAVIER.values, 'effects.effort_offset.lift_1.force': 0.25})
+    limits = DriveModel.from_parameters(
+        {**HEAVIER.values, 'effects.effort_offset.lift_1.force': 0.25})
     cell.feedforward.add_on_set_parameters_callback(lambda changes: _refused())
     answer = live.set_model(limits, live.machine())
     assert answer == {'is_set': False, 'nodes': {'feedforward': 'over the limit'}}

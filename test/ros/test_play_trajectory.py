@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from pprs_dynamics.ros.play_trajectory import LONGEST_CATCH_UP, Beats
 
 PERIOD = 10_000_000  # [ns]
@@ -24,13 +22,6 @@ def played(ticks: list[int]) -> list[list[int]]:
 def test_what_a_timer_leaves_out_is_caught_up_with() -> None:
     assert played([0, PERIOD, 4 * PERIOD, 5 * PERIOD]) == [
         [0], [PERIOD], [2 * PERIOD, 3 * PERIOD, 4 * PERIOD], [5 * PERIOD]]
-
-
-def test_a_timer_that_shakes_leaves_the_moments_evenly_spaced() -> None:
-    rng = np.random.default_rng(1)
-    ticks = (np.arange(1000) * PERIOD + rng.uniform(0, 0.4 * PERIOD, 1000)).astype(int)
-    assert [moment for due in played(ticks.tolist()) for moment in due] == [
-        k * PERIOD for k in range(1000)]
 
 
 def test_after_a_standstill_it_goes_on_from_now() -> None:

@@ -6,8 +6,6 @@
 from __future__ import annotations
 
 import os
-import sys
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -23,39 +21,9 @@ from trajectory_msgs.msg import (
     MultiDOFJointTrajectory,
 )
 
-from pprs_dynamics import DriveModel, JointMotion, MechanismModel
-from pprs_dynamics.physics.mechanism import evaluation
-from pprs_dynamics.physics.mechanism.evaluation import compiling_here
+from pprs_dynamics import DriveModel, JointMotion
 
 MOTION = random_motion(np.random.default_rng(8), 1)
-
-
-def test_other_threads_do_not_wait_for_a_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(evaluation, '_loops', {})
-    monkeypatch.setattr(evaluation, '_decided', True)
-    begun, go_on = threading.Event(), threading.Event()
-
-    def slow_compiler(kernel: object, named: object) -> object:
-        begun.set()
-        assert go_on.wait(30)
-        return lambda row, *tables: -1
-
-    monkeypatch.setattr(evaluation, '_compile', slow_compiler)
-
-    def compile_one() -> None:
-        with compiling_here():
-            DriveModel.load().drive_forces(MOTION)
-
-    thread = threading.Thread(target=compile_one, daemon=True)
-    thread.start()
-    assert begun.wait(30)
-    meanwhile = DriveModel.load().drive_forces(MOTION).total
-    assert not evaluation._loops
-    go_on.set()
-    thread.join(30)
-    monkeypatch.undo()
-    np.testing.assert_allclose(
-        meanwhile, DriveModel.load().drive_forces(MOTION).total, rtol=0, atol=EQUAL)
 
 
 @pytest.mark.nodes
@@ -95,7 +63,7 @@ def test_a_robot_with_loops_is_answered_at_once_and_compiled_beside(
     ros_domain: int, tmp_path: Path,
 ) -> None:
     pytest.importorskip('numba')
-    log, model = tmp_path / 'log', MechanismModel.load('config/hexapod.yaml')
+    log, model = tmp_path / 'log', DriveModel.load('config/hexapod.yaml')
     cold = {**environment(ros_domain), 'NUMBA_CACHE_DIR': str(tmp_path / 'cache'),
             'PPRS_DYNAMICS_PLAIN': '0'}
     command = [executable('feedforward'), '--ros-args', '--params-file', model.source, '-p',
@@ -116,41 +84,6 @@ def test_a_robot_with_loops_is_answered_at_once_and_compiled_beside(
         assert running.spin_until(lambda: commands and running.status, 20), log.read_text()
         assert running.status[-1]['preparing'] is True
         np.testing.assert_allclose(commands[0].data, expected, rtol=0, atol=1e-9)
-        process.terminate()
-        assert process.wait(10) == 0
-    assert 'Traceback' not in log.read_text()
-
-
-# What Numba does to this registry, without pause.
-COMPILING = """
-import weakref
-from pprs_dynamics.ros import executables
-from pprs_dynamics.ros.node import preparation
-
-class Compiled:
-    pass
-
-def compile_for_ever(model):
-    kept = [Compiled() for _ in range(100_000)]
-    finalizers = [weakref.finalize(one, len, ()) for one in kept]
-    while True:
-        weakref.finalize(kept[0], len, ()).detach()
-
-preparation.prepare = compile_for_ever
-raise SystemExit(executables.{node}())
-"""
-
-
-@pytest.mark.nodes
-@pytest.mark.parametrize('node', ['feedforward', 'monitor'])
-def test_a_node_that_ends_while_it_compiles_ends_without_a_word(
-    ros_domain: int, tmp_path: Path, node: str,
-) -> None:
-    log = tmp_path / 'log'
-    command = [sys.executable, '-c', COMPILING.format(node=node), '--ros-args', '-p', 'demo:=true']
-    with bench() as running, node_process(command, ros_domain, log) as process:
-        running.follow_status(f'/{node}/status')
-        assert running.spin_until(lambda: running.status, 20), log.read_text()
         process.terminate()
         assert process.wait(10) == 0
     assert 'Traceback' not in log.read_text()

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import pytest
-
-from pprs_dynamics.ros.node.senders import MOST, TURNS, Senders, namesakes
+from pprs_dynamics.ros.node.senders import TURNS, Senders, namesakes
 
 
 class Clock:
@@ -42,20 +40,6 @@ def test_a_publisher_that_is_started_again_does_not_take_turns_with_the_old_one(
     assert senders.take_turns
     clock.now += TURNS
     assert not senders.take_turns
-
-
-@pytest.mark.parametrize('silent', [{}, {'publisher_gid': None}, info(b'', None)])
-def test_a_middleware_that_tells_nothing_is_believed(silent: dict[str, Any]) -> None:
-    senders = Senders(Clock())
-    assert [senders.passed_over(silent) for _ in range(3)] == [0, 0, 0]
-    assert not senders.take_turns
-
-
-def test_what_is_remembered_of_publishers_is_bounded() -> None:
-    senders = Senders(Clock())
-    for k in range(10 * MOST):
-        senders.passed_over(info(str(k).encode(), 1))
-    assert len(senders._sequence) <= MOST
 
 
 def test_others_of_its_name_are_counted_also_before_the_graph_knows_it() -> None:

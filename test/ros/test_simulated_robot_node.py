@@ -6,18 +6,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
-from closed_loop import CASES, RATE, Case, Tracking, commands_for, execute, run_case
-from commands_over_topics import assert_are_the_models
 from node_bench import Bench, bench, overrides
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
-from rclpy.serialization import serialize_message
-from ros_processes import executable, node_process
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -25,7 +20,6 @@ from std_msgs.msg import Float64MultiArray
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
 
@@ -34,9 +28,6 @@ pytestmark = pytest.mark.nodes
 HOME = DriveModel.load().drive_forces(PlatformMotion.at_rest((0.0, 0.0, 0.5)))
 REST = HOME.mechanism.position[0]
 WEIGHT = HOME.parts['rigid_body'][0]
-DURATION = 3.0  # [s]
-SEED = 2
-PATH = ['source:=excitation', f'duration:={DURATION}', f'seed:={SEED}']
 
 
 class RobotBench:
@@ -145,38 +136,6 @@ def test_efforts_beyond_the_limits_saturate_and_are_told(robot: RobotBench) -> N
     assert np.abs([state.effort for state in robot.states]).max() < 101.0
 
 
-def test_wrong_efforts_are_refused(robot: RobotBench) -> None:
-    for data in ([1.0] * 5, [float('inf')] * 6, []):
-        robot.efforts.publish(Float64MultiArray(data=data))
-    assert robot.bench.spin_until(lambda: robot.node._counters['refused'] == 3)
-
-
-def test_commands_that_arrive_cut_off_are_refused(robot: RobotBench) -> None:
-    for message, publisher in ((robot.command(REST), robot.setpoint),
-                               (Float64MultiArray(data=WEIGHT.tolist()), robot.efforts)):
-        before = dict(robot.node._counters)
-        publisher.publish(bytes(serialize_message(message))[:-9])
-        assert robot.bench.spin_until(robot.says('REFUSED'))
-        assert robot.bench.spin_until(
-            lambda before=before: robot.node._counters['refused'] > before['refused'])
-        assert 'no whole' in robot.bench.status[-1]['message']
-    robot.bench.spin_for(0.1)
-    np.testing.assert_allclose(robot.position, REST, atol=1e-4)
-
-
-def test_without_a_timeout_the_last_setpoint_stays_in_force() -> None:
-    goal = REST + np.array([0, 0, 0, 0.01, 0.01, 0.01])
-    with bench() as running:
-        robot = RobotBench(running, command_timeout=0.0)
-        robot.setpoint.publish(robot.command(goal))
-        assert running.spin_until(robot.says('OK'))
-        assert running.spin_until(lambda: np.allclose(robot.position, goal, rtol=0, atol=5e-4), 20)
-        running.spin_for(0.5)
-        codes = [status['code'] for status in running.status]
-        assert 'HOLD' not in codes[codes.index('OK'):]
-        np.testing.assert_allclose(robot.position, goal, atol=5e-4)
-
-
 def test_a_hidden_effect_acts() -> None:
     with bench() as running:
         robot = RobotBench(running, hidden_effects=['effort_offset'], seed=4, effort_noise=0.0,
@@ -185,7 +144,7 @@ def test_a_hidden_effect_acts() -> None:
         assert running.spin_until(lambda: len(robot.states) > 500, 60)
         # Encoder steps keep the loop busy: a mean over two seconds.
         change = np.mean([state.effort for state in robot.states[-200:]], axis=0) - WEIGHT
-        truth = robot.node._robot.plant.effects[0].truth()
+        (truth,) = robot.node._robot.plant.injected
         for k, drive in enumerate(DRIVES):
             expected = truth['parameters'].get(drive, {}).get('force', 0.0)
             assert change[k] == pytest.approx(expected, abs=0.05), drive
@@ -205,85 +164,36 @@ def test_what_is_hidden_changes_while_it_runs(robot: RobotBench) -> None:
     assert robot.bench.spin_until(lambda: len(robot.states) > 100)
     place, stamp = robot.position, robot.states[-1].header.stamp
     assert change('hidden_effects', ['effort_offset:lift_2']).successful
-    assert change('hidden_effects', ['effort_offset:lift_2', 'homing_error:slide_1']).successful
-    offset, zero = robot.node._robot.plant.effects
-    expected = WEIGHT + [offset.parameters.get(drive, {}).get('force', 0.0) for drive in DRIVES]
+    assert change('hidden_effects', ['effort_offset:lift_2', 'effort_offset:slide_1']).successful
+    first, second = robot.node._robot.plant.injected
+    offsets = {**first['parameters'], **second['parameters']}
+    expected = WEIGHT + [offsets.get(drive, {}).get('force', 0.0) for drive in DRIVES]
     robot.states.clear()
     # Friction creeps until the loop carries all; then the mean of half a second.
     assert robot.bench.spin_until(lambda: len(robot.states) > 1250, 60)
     effort = np.mean([state.effort for state in robot.states[-250:]], axis=0)
     np.testing.assert_allclose(effort[4:], expected[4:], atol=0.1)
-    assert np.abs(robot.states[0].velocity).max() < 1.0  # a moved zero is no jump of the drive
-    assert change('hidden_effects', ['homing_error:slide_1']).successful
-    assert robot.node._robot.plant.effects == (zero,)
+    assert change('hidden_effects', ['effort_offset:slide_1']).successful
+    assert robot.node._robot.plant.injected == [second]
     assert conversions.nanoseconds(robot.states[-1].header.stamp) > conversions.nanoseconds(stamp)
     np.testing.assert_allclose(robot.position, place, atol=1e-3)
     for name, value, words in (
-        ('hidden_effects', ['friction'], 'no hidden effect is called'),
-        ('hidden_effects', ['payload_mass:lift_1'], 'acts in no drive'),
+        ('hidden_effects', ['friction'], 'cannot be injected'),
+        ('hidden_effects', ['payload_mass:lift_1'], "does not act in 'lift_1'"),
         ('hidden_effects', ['effort_offset:lift_9'], 'lift_9'),
         ('hidden_effects', 'effort_offset', 'a list of words'),
         ('hidden_scale', -1.0, 'at least 0'),
-        ('stiffness', 100.0, 'stay as it was at the start'),
+        ('bandwidth', 10.0, 'stay as it was at the start'),
         ('masses.payload', 2.0, 'stay as it was at the start'),
     ):
         answer = change(name, value)
         assert not answer.successful
         assert words in answer.reason
         assert len(answer.reason.splitlines()) == 1
-    assert robot.node._robot.plant.effects == (zero,)
-    assert change('stiffness', 4000.0).successful  # a dump of the parameters loads
+    assert robot.node._robot.plant.injected == [second]
+    assert change('bandwidth', 7.0).successful  # a dump of the parameters loads
     assert change('hidden_effects', []).successful
-    assert robot.node._robot.plant.effects == ()
-
-
-def test_it_restarts_where_it_was_killed(ros_domain: int, tmp_path: Path) -> None:
-    command = [executable('simulated_robot')]
-    with bench() as running:
-        states = running.listen(JointState, '/joint_states', 1000)
-        for _ in range(2):
-            with node_process(command, ros_domain, tmp_path / 'log') as process:
-                states.clear()
-                assert running.spin_until(lambda: len(states) > 50, 20)
-                process.kill()
-        np.testing.assert_allclose(states[-1].position, REST, atol=1e-5)
-
-
-@pytest.fixture(scope='module')
-def tracking(ros_domain: int, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Tracking]:
-    """Run both kinds of feedforward as processes over DDS, and execute what they command.
-
-    How late a busy machine's commands come, and how many of them it loses, is no property of a
-    feedforward: those that came are what the model says, in their order, and all that it says
-    is executed in simulated time. It does not depend on the robot: one with a hidden
-    effect, and one that takes positions alone, execute what is commanded to the paper's.
-    """
-    folder = tmp_path_factory.mktemp('logs')
-    path = Excitation(duration=DURATION, seed=SEED)
-    commands = {case.feedforward: commands_for(case, path) for case in CASES[1:]}
-    for case in CASES[1:]:
-        came = run_case(case, PATH, DURATION, ros_domain, folder).commands
-        assert_are_the_models(came, commands[case.feedforward], DURATION * RATE)
-    cases = (*CASES, Case('hidden', 'friction', ('coulomb_friction',)))
-    return {case.name: execute(case, commands.get(case.feedforward, commands['friction']))
-            for case in cases}
-
-
-@pytest.mark.slow
-def test_each_step_of_feedforward_lowers_the_tracking_error(
-    tracking: dict[str, Tracking],
-) -> None:
-    alone, rigid, friction = (tracking[case.name].position_rms for case in CASES)
-    assert rigid < alone
-    assert 3 * friction < rigid
-    # 1 N of friction on 4 000 N/m: a quarter of a millimetre.
-    assert 1e-4 < rigid < 1e-3
-
-
-@pytest.mark.slow
-def test_a_hidden_effect_costs_what_feedforward_gained(tracking: dict[str, Tracking]) -> None:
-    friction = tracking[CASES[2].name].position_rms
-    assert tracking['hidden'].position_rms > 1.5 * friction
+    assert robot.node._robot.plant.injected == []
 
 
 def test_a_clock_that_is_set_back_does_not_stop_the_robot() -> None:

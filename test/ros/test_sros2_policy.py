@@ -114,18 +114,6 @@ def elsewhere(node: str) -> set[str]:
     return found
 
 
-@pytest.mark.usefixtures('ros_domain')
-def test_a_robot_with_loops_and_known_currents_has_no_name_beyond_it() -> None:
-    with bench() as running:
-        values = hexapod()
-        node = running.add(FeedforwardNode, parameter_overrides=values)
-        running.spin_for(1.0)
-        rights, has = allowed('feedforward'), present(running, node)
-        assert '/feedforward/pose_trajectory' in has['subscriber']
-        for kind, names in has.items():
-            assert all(any(fnmatch(name, each) for each in rights[kind]) for name in names), kind
-
-
 def test_every_node_has_an_enclave_of_its_own() -> None:
     enclaves = [each.get('path') for each in ElementTree.parse(POLICY).iter('enclave')]
     nodes = [each.get('node') for each in ElementTree.parse(POLICY).iter('profile')]

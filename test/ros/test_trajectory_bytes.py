@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import (
     JointTrajectory,
     JointTrajectoryPoint,
@@ -233,14 +233,6 @@ def test_a_message_cut_off_within_padding_is_noticed() -> None:
             poses().read(data[:length], 1)
 
 
-@settings(max_examples=100)
-@given(POINTS, SEEDS)
-def test_every_whole_message_is_taken_for_one(points: int, seed: int) -> None:
-    message = random_message(points, seed)
-    alter(message, np.random.default_rng(seed))
-    assert is_whole(serialize_message(message))
-
-
 def joint_state(frame: str, names: list[str], values: list[float]) -> JointState:
     message = JointState(name=names, position=values, effort=values)
     message.header.frame_id = frame
@@ -261,12 +253,3 @@ def test_other_messages_are_taken_whole_or_not_at_all(message: object) -> None:
     for length in range(whole):
         with pytest.raises(Rejection, match=r'^SIZE: .* no whole (sensor|std)_msgs/'):
             message_in(data[:length], type(message))
-
-
-def test_an_array_with_dimensions_is_whole() -> None:
-    message = Float64MultiArray(data=[1.0, 2.0])
-    message.layout.dim = [MultiArrayDimension(label=label, size=2, stride=2)
-                          for label in ('drive', 'x', 'four')]
-    data = bytes(serialize_message(message))
-    assert message_in(data, Float64MultiArray) == message
-    assert not is_whole(data[:-9], Float64MultiArray)

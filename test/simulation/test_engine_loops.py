@@ -11,19 +11,19 @@ import numpy as np
 import pytest
 import robots_with_loops as robots
 
-from pprs_dynamics import JointMotion, MechanismModel, WorkspaceError
+from pprs_dynamics import DriveModel, JointMotion, WorkspaceError
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
-from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
-from pprs_dynamics.simulation.mechanism_run import draw_motion
+from pprs_dynamics.simulation.engine import MechanismEngine
+from pprs_dynamics.simulation.injection import draw_motion
 
 ROBOTS = {'hexapod': robots.hexapod, 'delta': robots.delta, 'five_bar': robots.five_bar,
           'three_rrr': robots.three_rrr}
 
 
-def rubbing(name: str, folder: Path) -> MechanismModel:
+def rubbing(name: str, folder: Path) -> DriveModel:
     """Return a robot all of whose passive joints rub, with their loads and without."""
-    names = friction_rows(MechanismModel.load(ROBOTS[name]().write(folder)).robot.structure)
-    return MechanismModel.load(ROBOTS[name]().write(folder, {'joints': {
+    names = friction_rows(DriveModel.load(ROBOTS[name]().write(folder)).robot.structure)
+    return DriveModel.load(ROBOTS[name]().write(folder, {'joints': {
         one: {'viscous': 0.1, 'torque': 0.1, 'coulomb': 0.2, 'radius': 0.02} for one in names}}))
 
 
@@ -43,17 +43,12 @@ def test_motion_reactions_and_friction_are_those_of_the_model(tmp_path: Path, na
 
 
 @pytest.mark.parametrize('name', ['hexapod', 'delta'])
-def test_loops_are_closed_without_the_model(tmp_path: Path, name: str,
-                                            monkeypatch: pytest.MonkeyPatch) -> None:
-    """From home on, nothing of the model's kinematics is asked for."""
+def test_the_engine_closes_loops_as_the_model_does(tmp_path: Path, name: str) -> None:
     model = rubbing(name, tmp_path)
     motion = draw_motion(model, 1.0, 3)
     expected = model.mechanism(motion).links.motion
     engine = MechanismEngine(model)
     engine.home()
-    for one in ('forward_kinematics', 'forces', 'inverse_dynamics', 'friction',
-                'link_jacobians'):
-        monkeypatch.delattr(type(model.robot.structure.evaluation), one)
     closed = engine.loops.follow(motion)
     t = model.robot.structure.tables
     for joint, row in model.robot.structure.rows.items():

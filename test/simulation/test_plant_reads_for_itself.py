@@ -5,19 +5,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 import robots_with_loops as robots
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism import structure
-from pprs_dynamics.physics.model import robot_block
-from pprs_dynamics.simulation import mechanism_engine
-from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
+from pprs_dynamics.simulation.engine import MechanismEngine
 
 BODY = ('<inertial><origin xyz="0.2 0.02 0.1"/><mass value="{}"/><inertia ixx="0.03" iyy="0.04" '
         'izz="0.02" ixy="0.001" ixz="0.002" iyz="-0.001"/></inertial>')
@@ -58,55 +53,25 @@ def described(folder: Path) -> Path:
 
 
 def test_plant_and_model_agree(tmp_path: Path) -> None:
-    MechanismEngine(MechanismModel.load(described(tmp_path)))
+    MechanismEngine(DriveModel.load(described(tmp_path)))
     for robot in (robots.hexapod, robots.delta, robots.five_bar):
-        MechanismEngine(MechanismModel.load(robot().write(tmp_path)))
+        MechanismEngine(DriveModel.load(robot().write(tmp_path)))
     (tmp_path / 'robot.xml').write_text(MJCF)
     path = tmp_path / 'mjcf.yaml'
     path.write_text('/**:\n  ros__parameters:\n    robot: {mjcf: robot.xml, base: plate, tool: l2, '
                     'drives: [j1, j2]}\n')
-    engine = MechanismEngine(MechanismModel.load(path))
-    engine.add_payload(1.0, np.array([0.0, 0.1, 0.2]))
-    engine.add_to_link(0, 0.5)
-    engine._require_agreement(_loaded(path, engine))
+    MechanismEngine(DriveModel.load(path))
 
 
-def _loaded(path: Path, engine: MechanismEngine) -> MechanismModel:
-    return replace(MechanismModel.load(path), robot=engine.robot)
-
-
-def locked_at_zero(self: object, joint: object) -> float:
-    return 0.0
-
-
-@pytest.mark.parametrize('fault', ['massless_rotors_are_dropped', 'locked_joints_are_at_zero',
-                                   'a_follower_ignores_its_offset', 'gravity_is_in_the_base'])
-def test_faults_of_the_model_are_seen(tmp_path: Path, fault: str,
-                                      monkeypatch: pytest.MonkeyPatch) -> None:
-    if fault == 'massless_rotors_are_dropped':
-        own = structure.Structure.__dict__['inertial'].func
-
-        def with_mass(self: structure.Structure) -> np.ndarray:
-            inertial: np.ndarray = own(self)
-            return np.where(inertial[:, :1] > 0, inertial, 0.0)
-
-        monkeypatch.setattr(structure.Structure, 'inertial', property(with_mass))
-    elif fault == 'locked_joints_are_at_zero':
-        monkeypatch.setattr(structure._Builder, '_locked_position', locked_at_zero)
-    elif fault == 'a_follower_ignores_its_offset':
-        whole = structure._Builder._locked_position
-
-        def without_offset(self: structure._Builder, joint: structure.Joint) -> float:
-            return 0.0 if joint.mimic is not None else whole(self, joint)
-
-        monkeypatch.setattr(structure._Builder, '_locked_position', without_offset)
-    else:
-        def as_standard(of: structure.Structure) -> tuple[float, ...]:
-            return (0.0, 0.0, -9.81)
-
-        monkeypatch.setattr(robot_block, 'described_gravity', as_standard)
-        monkeypatch.setattr(mechanism_engine, 'described_gravity', as_standard)
-    robot_block._structure.cache_clear()
+@pytest.mark.parametrize(('read', 'stands'), [
+    ('mass value="2"', 'mass value="2.5"'), ('offset="1.5"', 'offset="0"'),
+    ('rpy="3 0.2 0"', 'rpy="0 0.2 0"')], ids=['mass', 'follower', 'gravity'])
+def test_another_reading_of_the_description_is_refused(
+    tmp_path: Path, read: str, stands: str,
+) -> None:
+    path = described(tmp_path)
+    model, urdf = DriveModel.load(path), tmp_path / 'robot.urdf'
+    assert read in urdf.read_text()
+    urdf.write_text(urdf.read_text().replace(read, stands))
     with pytest.raises(ModelError, match='in MuJoCo'):
-        MechanismEngine(MechanismModel.load(described(tmp_path)))
-    robot_block._structure.cache_clear()
+        MechanismEngine(model)

@@ -39,7 +39,7 @@ class FeedforwardBench:
         self.node = bench.add(FeedforwardNode, **options)
         if self.node._preparation is not None:
             # Tests that count milliseconds have the machine to themselves.
-            self.node._preparation.join()
+            self.node._preparation.join(120)
         self.commands = bench.listen(Float64MultiArray, '/feedforward/commands')
         self.joint_command = bench.listen(JointState, '/feedforward/joint_command')
         self.joint_trajectory = bench.listen(JointTrajectory, '/feedforward/joint_trajectory')

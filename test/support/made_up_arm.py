@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.hidden.motions import joint_motion
-from pprs_dynamics import JointMotion, MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.model_file import build_model
 
 JOINTS = ('turn', 'swing', 'reach')
 BODIES = {  # mass, centre, moments and products of inertia about it
@@ -61,15 +60,14 @@ def write_arm(folder: Path, text: str = '', joints: tuple[str, ...] = JOINTS,
     return path
 
 
-def real_arm(folder: Path, **changes: Any) -> MechanismModel:
+def real_arm(folder: Path, **changes: Any) -> DriveModel:
     """Return the arm with friction, and with other values."""
-    model = MechanismModel.load(write_arm(folder))
-    real = build_model({**model.values, **FRICTION, **changes}, model.source)
-    assert isinstance(real, MechanismModel)
+    model = DriveModel.load(write_arm(folder))
+    real = DriveModel.from_parameters({**model.values, **FRICTION, **changes}, model.source)
     return real
 
 
-def record(model: MechanismModel, moved: JointMotion, noise: float = 0.2, seed: int = 0,
+def record(model: DriveModel, moved: JointMotion, noise: float = 0.2, seed: int = 0,
            ) -> Recording:
     """Return what a recording of the arm would hold, with white noise of the efforts."""
     forces = model.measured(model.drive_forces(moved))

@@ -21,7 +21,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import (
 from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.cost_terms import CostTerms
+from pprs_dynamics.inference.search.candidates import CostTerms
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 

@@ -13,7 +13,6 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.experiments.fourier_path import FourierPath
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.model_file import build_model
 
 TIME = np.arange(6000) * 0.002
 EXCITATION = Excitation()
@@ -37,5 +36,6 @@ def with_effects(model: DriveModel, effects: dict[str, dict[str, float]],
     def flat(block: str, values: dict[str, dict[str, float]]) -> dict[str, Any]:
         return {f'{block}.{name}.{key}': value for name, of_effect in values.items()
                 for key, value in of_effect.items()}
-    return build_model({**model.values, 'effects.active': list(effects), **flat('effects', effects),
+    return DriveModel.from_parameters(
+        {**model.values, 'effects.active': list(effects), **flat('effects', effects),
                         **flat('uncertainties', uncertainties or {})})

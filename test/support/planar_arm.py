@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 LINK = '''<link name="{name}"><inertial><origin xyz="0 0 -0.25"/><mass value="0.6"/>
 <inertia ixx="0.01" iyy="0.01" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
@@ -17,7 +16,7 @@ LINK = '''<link name="{name}"><inertial><origin xyz="0 0 -0.25"/><mass value="0.
 velocity="30"/></joint>'''
 
 
-def planar_arm(folder: Path, joints: int) -> ForceModel:
+def planar_arm(folder: Path, joints: int) -> DriveModel:
     """Return an arm whose axes are all parallel; its tool frame is on the last of them."""
     names = ['base', *(f'rod_{k}' for k in range(1, joints + 1))]
     links = ''.join(LINK.format(name=names[k], number=k, parent=names[k - 1],
@@ -32,4 +31,4 @@ def planar_arm(folder: Path, joints: int) -> ForceModel:
       coulomb: [{", ".join(["0.3"] * joints)}]
       reversal_velocity: 0.01
 ''')
-    return load_model(folder / 'arm.yaml')
+    return DriveModel.load(folder / 'arm.yaml')

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel, PlatformMotion
-from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.physics.three_pprs.robot import Geometry, Masses, Robot
+from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
+from pprs_dynamics.physics.three_pprs.robot import ThreePprs
 
 ELBOWS = ('up', 'down')
 REACH, TURN = 0.1, 0.2  # of the sampled workspace around home [m, rad]
@@ -29,7 +29,7 @@ def home_position(elbow: str = 'up') -> np.ndarray:
 
 def random_robot(
     rng: np.random.Generator, elbow: str = 'up', gravity: Any = (0.0, 0.0, -9.81),
-) -> Robot:
+) -> ThreePprs:
     """Return a robot like the paper's in which no two chains are equal.
 
     Masses differ per chain, the centre of mass lies off o, the inertia tensor is full, and the
@@ -39,7 +39,7 @@ def random_robot(
     geometry = Geometry(
         0.15 * rng.uniform(0.9, 1.1), 0.10 * rng.uniform(0.9, 1.1), 0.30 * rng.uniform(0.95, 1.1),
         tuple(third + rng.uniform(-0.1, 0.1, 3)), tuple(third + rng.uniform(-0.1, 0.1, 3)), elbow)
-    return Robot(geometry, random_masses(rng), tuple(np.asarray(gravity, dtype=float)))
+    return ThreePprs(geometry, random_masses(rng), tuple(np.asarray(gravity, dtype=float)))
 
 
 def random_masses(rng: np.random.Generator) -> Masses:
@@ -103,7 +103,7 @@ def smooth_motion(t: Any, elbow: str = 'up') -> PlatformMotion:
                           t)
 
 
-def robot_keys(robot: Robot) -> dict[str, Any]:
+def robot_keys(robot: ThreePprs) -> dict[str, Any]:
     """Return the keys of a model file that describe `robot`."""
     keys: dict[str, Any] = {'gravity': robot.gravity}
     for group in ('geometry', 'masses'):
@@ -114,13 +114,13 @@ def robot_keys(robot: Robot) -> dict[str, Any]:
 
 def paper_model(changes: Mapping[str, Any] | None = None) -> DriveModel:
     """Return the paper's model with some keys changed, e.g. {'equations': 'printed'}."""
-    return build_model({**DriveModel.load().values, **(changes or {})})
+    return DriveModel.from_parameters({**DriveModel.load().values, **(changes or {})})
 
 
 # Random states lie nearer to singular poses than a robot would be allowed to go.
 OPEN_LIMITS = {'limits.condition_number': 1e9, 'limits.rod_sine': 1e-6}
 
 
-def model_of(robot: Robot, changes: Mapping[str, Any] | None = None) -> DriveModel:
+def model_of(robot: ThreePprs, changes: Mapping[str, Any] | None = None) -> DriveModel:
     """Return the paper's friction on another robot, without limits on conditioning."""
     return paper_model({**robot_keys(robot), **OPEN_LIMITS, **(changes or {})})

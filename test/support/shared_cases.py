@@ -9,14 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from pprs_dynamics import Recording, build_model, read_recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics import DriveModel, Recording, read_recording
 from pprs_dynamics.physics.model.parameter_file import read_parameters
 
 CASES = Path(__file__).resolve().parents[3] / 'shared' / 'cases'
 
 
-def shared_case(folder: str, model: str, recording: str) -> tuple[ForceModel, Recording]:
+def shared_case(folder: str, model: str, recording: str) -> tuple[DriveModel, Recording]:
     """Return a model and a recording of it; the test is skipped where there are none."""
     if not CASES.is_dir():
         pytest.skip('no recordings in ../shared/cases')
@@ -27,5 +26,5 @@ def shared_case(folder: str, model: str, recording: str) -> tuple[ForceModel, Re
         if key.startswith('columns.') and key.endswith('.scale'):
             key = key.replace('.scale', '.effort_scale')
         values[key.replace('arm.joints', 'robot.drives').replace('arm.', 'robot.')] = value
-    read = build_model(values, str(path))
+    read = DriveModel.from_parameters(values, str(path))
     return read, read_recording(CASES / folder / recording, read.recorded)

@@ -15,7 +15,6 @@ from scipy.signal import lfilter
 from pprs_dynamics import DriveModel
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 
 STEP = 0.002  # [s]
@@ -27,8 +26,7 @@ HIDDEN = {'effects.active': ['coulomb_friction', 'payload_mass'],
 def write_hidden(path: Path, seed: int, duration: float = 16.0,
                  hidden: Mapping[str, Any] = HIDDEN) -> Path:
     """Write a recording of the paper's robot with effects, and return its path."""
-    robot = build_model({**default_parameters(), **hidden})
-    assert isinstance(robot, DriveModel)
+    robot = DriveModel.from_parameters({**default_parameters(), **hidden})
     motion = Excitation(duration=duration, seed=seed).motion(np.arange(0.0, duration, STEP))
     forces = robot.drive_forces(motion)
     rng = np.random.default_rng(seed)

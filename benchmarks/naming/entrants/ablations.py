@@ -26,15 +26,15 @@ from pprs_dynamics.inference.search.candidates import (
     DURING,
     SINCE,
     CandidateSet,
+    CostTerms,
     Course,
     PriorCosts,
 )
-from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.table import Row
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 COLOURED = 1e-9  # share of the noise's power that is left to each of its slower shapes
 
@@ -62,7 +62,7 @@ class BayesianInformation(PriorCosts):
 
     @classmethod
     def of(cls, regression: Regression, decisions: Decisions,
-           model: ForceModel | None = None) -> BayesianInformation:
+           model: DriveModel | None = None) -> BayesianInformation:
         """Return them for the drives and samples of a regression."""
         even = replace(decisions, zero_odds=1.0, gain_odds=1.0)
         return cls(0, len(regression.drives), regression.samples, even)

@@ -23,7 +23,7 @@ from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.inference.fit.base_fit import Refit, refit_base, require_open_numbers
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class AdoptionResult(Result):
         return self.adoption.reason
 
     @cached_property
-    def model(self) -> ForceModel:
+    def model(self) -> DriveModel:
         """The model with the effect and its entry in the ledger; as given, where it is refused."""
         return self.inputs.ledger.entered(self.adoption) if self.adopted else self.inputs.model
 
@@ -86,7 +86,7 @@ class AdoptionResult(Result):
         """Return what the terminal shows."""
         from pprs_dynamics.app.report.adoption_report import adoption_view
 
-        return adoption_view(self.adoption, details)
+        return adoption_view(self.adoption)
 
     def page(self, saved_as: str = 'better.yaml') -> Page:
         """Return the page of `pprs adopt --report`; its next command names the file of `save`."""
@@ -99,8 +99,8 @@ class AdoptionResult(Result):
     def table(self) -> DataFrame:
         """Return a row per parameter: its value, std and unit."""
         found = self.adoption.parameters
-        return data_frame([{'value': one.value, 'std': one.std, 'unit': one.unit}
-                           for one in found.values()], list(found), 'parameter')
+        return data_frame([{'value': entry.value, 'std': entry.std, 'unit': entry.unit}
+                           for entry in found.values()], list(found), 'parameter')
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, after, and the noise."""
@@ -118,7 +118,7 @@ class AdoptionRunResult(Result):
     run : AdoptionRun
         What was adopted and refused, one after the other.
     refit : Refit, optional
-        Of the base model beside it.
+        Of the base model with the adopted effects.
     """
 
     inputs: Inputs
@@ -126,7 +126,7 @@ class AdoptionRunResult(Result):
     refit: Refit | None = None
 
     @property
-    def model(self) -> ForceModel:
+    def model(self) -> DriveModel:
         """The model with all that was adopted, and its ledger."""
         if self.refit is not None and self.refit.taken:
             return self.refit.fit.model
@@ -134,7 +134,7 @@ class AdoptionRunResult(Result):
 
     @property
     def refused(self) -> bool:
-        """Whether it ended because what is left was refused."""
+        """Whether it ended because the remaining effects were refused."""
         return self.run.ended == REFUSED
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -174,10 +174,10 @@ class AdoptionRunResult(Result):
     def table(self) -> DataFrame:
         """Return a row per step: the effect, whether it was adopted, errors [N], the reason."""
         return data_frame([
-            {'effect': one.effect, 'adopted': one.adopted, 'error_before': one.error_before,
-             'error_after': one.error_after, 'held_out_before': one.held_out_before,
-             'held_out_after': one.held_out_after, 'reason': one.reason}
-            for one in self.run.steps])
+            {'effect': step.effect, 'adopted': step.adopted, 'error_before': step.error_before,
+             'error_after': step.error_after, 'held_out_before': step.held_out_before,
+             'held_out_after': step.held_out_after, 'reason': step.reason}
+            for step in self.run.steps])
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before all, after all, and the noise.
@@ -200,7 +200,7 @@ def adopt(model: Model, effect: str, recordings: Recordings, validate: Recording
 
     Parameters
     ----------
-    model : ForceModel or path
+    model : DriveModel or path
     effect : str
         Its name, on the drives that the recordings call for; or 'EFFECT:drive,drive'; or
         'measured_curve:DRIVE@VARIABLE'.
@@ -213,8 +213,7 @@ def adopt(model: Model, effect: str, recordings: Recordings, validate: Recording
     topic, progress, as_it_is : optional
         As in `compare`.
     reference : path, Recording, or a sequence of them, optional
-        As in `diagnose`: the effect is a change since then, fitted and judged beside what was
-        there already.
+        As in `diagnose`: the effect is a change since then. Errors of the reference are subtracted.
 
     Returns
     -------
@@ -241,15 +240,15 @@ def adopt_all(model: Model, recordings: Recordings, validate: Recordings = (), *
               refit: Recordings | None = None, diagnosis: DiagnosisResult | None = None,
               topic: str | None = None, progress: Progress | None = None,
               reference: Given | None = None) -> AdoptionRunResult:
-    """Diagnose and adopt until nothing more can be told.
+    """Diagnose and adopt until no effect is missing.
 
     Parameters
     ----------
     model, recordings, validate, diagnosis, topic, progress, reference
         As in `adopt`.
     refit : path, Recording, or a sequence of them, optional
-        To which the base model is then fitted again, as `fit` does, beside what was adopted; it
-        is taken where the error on other data falls. An empty sequence means `recordings`.
+        To which the base model is then fitted again, as `fit` does, with the adopted effects. It is
+        taken if the error on other data falls. An empty sequence means `recordings`.
 
     Returns
     -------

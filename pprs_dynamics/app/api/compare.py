@@ -24,8 +24,7 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.inference.search.noise_floors import measure_columns, noise_floors
-from pprs_dynamics.physics.model.model_file import load_model
-from pprs_dynamics.system.output_files import write_text
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
@@ -75,7 +74,7 @@ class ComparisonResult(Result):
         """Return what `pprs compare --json` writes."""
         content = {**self.comparison.to_dict(), 'verdict': self.verdict,
                    'effort_looks_like': effort_looks_like(
-                       one.findings for one in self.inputs.fitted)}
+                       recording.findings for recording in self.inputs.fitted)}
         return content if self.beside is None else {**content, 'beside': self.beside.to_dict()}
 
     def view(self, details: bool = False) -> Any:
@@ -91,55 +90,35 @@ class ComparisonResult(Result):
         return comparison_page(self.inputs.model, self.inputs.fitted, self.residuals,
                                self.comparison, self.notes, self._next, self.beside)
 
-    def write_bag(self, path: str | PathLike[str], progress: Progress | None = None) -> list[Path]:
-        """Write measured effort, model, parts and residual as a bag, and layouts that open it.
-
-        Parameters
-        ----------
-        path : path
-            .mcap or .db3.
-        progress : callable, optional
-
-        Returns
-        -------
-        list of Path
-            The bag, and beside it the layouts of PlotJuggler (.plotjuggler.xml) and Foxglove
-            (.foxglove.json).
+    def write_bag(self, path: str | PathLike[str], progress: Progress | None = None) -> None:
+        """Write measured effort, model, parts and residual as a bag, .mcap or .db3.
 
         Raises
         ------
         PprsError
             Where it cannot be written.
         """
-        from pprs_dynamics.app.report.layouts import foxglove_layout, plotjuggler_layout
-
-        bag = Path(path)
-        write_comparison(bag, self.inputs.model, self.inputs.fitted,
+        write_comparison(Path(path), self.inputs.model, self.inputs.fitted,
                          [self.verdict, *(statement.text for statement in self.where)],
                          stage(progress, 'bag'))
-        written = [bag]
-        for suffix, layout in (('.plotjuggler.xml', plotjuggler_layout),
-                               ('.foxglove.json', foxglove_layout)):
-            written.append(bag.with_suffix(suffix))
-            write_text(written[-1], layout(self.residuals.drives))
-        return written
 
     def table(self) -> DataFrame:
         """Return a row per drive: rms, bias, peak, noise [N], relative error and grade."""
         drives = self.comparison.drives
-        return data_frame([{'rms': one.rms, 'relative': one.relative, 'bias': one.bias,
-                            'peak': one.peak, 'noise': one.noise_floor, 'grade': one.grade,
-                            'unit': one.unit} for one in drives.values()], list(drives), 'drive')
+        return data_frame([{'rms': drive.rms, 'relative': drive.relative, 'bias': drive.bias,
+                            'peak': drive.peak, 'noise': drive.noise_floor, 'grade': drive.grade,
+                            'unit': drive.unit} for drive in drives.values()],
+                          list(drives), 'drive')
 
     def plot(self) -> Figure:
-        """Return a picture: the error of every drive beside its noise, and the worst over time."""
+        """Return a picture: error and noise of every drive, and the worst drive over time."""
         from pprs_dynamics.app.report.pictures import plot_errors, plot_series
 
         drives = self.comparison.drives
         figure = plot_errors(
-            {'error': {name: one.rms for name, one in drives.items()},
-             'noise': {name: one.noise_floor for name, one in drives.items()
-                       if one.noise_floor is not None}},
+            {'error': {name: drive.rms for name, drive in drives.items()},
+             'noise': {name: drive.noise_floor for name, drive in drives.items()
+                       if drive.noise_floor is not None}},
             self.comparison.unit, rows=2)
         worst = max(drives, key=lambda name: drives[name].unexplained)
         d, residuals = self.residuals.drives.index(worst), self.residuals
@@ -151,7 +130,7 @@ class ComparisonResult(Result):
 
     @property
     def _next(self) -> tuple[str, str]:
-        other = no_measurements(one.findings for one in self.inputs.fitted)
+        other = no_measurements(recording.findings for recording in self.inputs.fitted)
         if other and not self.inputs.as_it_is:
             return measure_first(other, self.inputs.files)
         if self.comparison.little:
@@ -167,9 +146,9 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
 
     Parameters
     ----------
-    model : ForceModel or path
+    model : DriveModel or path
     recordings : path, Recording, or a sequence of them
-        A path is read, and its units and signs are checked; a Recording is taken as it is.
+        A path is read, and its units and signs are checked; a Recording is not checked.
     topic : str, optional
         Of sensor_msgs/JointState, where a bag holds several.
     beside : path, optional
@@ -201,7 +180,7 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
     where = localise(residuals, progress=stage(progress, 'where it fails'))
     comparison = compare_residuals(
         residuals, where,
-        noise_floors(columns, where.patterns, period=residuals.period) if columns else {},
+        noise_floors(columns, residuals.period) if columns else {},
         little_explained(inputs.model, residuals))
     return ComparisonResult(
         inputs, residuals, comparison, tuple(notes),
@@ -210,7 +189,7 @@ def compare(model: Model, recordings: Recordings, *, topic: str | None = None,
 
 def _beside(inputs: Inputs, path: Path) -> Beside:
     """Return the errors of another model on the same recordings."""
-    other = load_model(path)
+    other = DriveModel.load(path)
     if other.drives != inputs.model.drives:
         raise ModelError('--beside', displayed(path), 'have the drives of the model: '
                          f'{", ".join(inputs.model.drives)}')

@@ -26,7 +26,7 @@ from pprs_dynamics.inference.diagnosis.quantities import listed
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure, Page
@@ -58,7 +58,7 @@ class DiagnosisResult(Result):
         return self.diagnosis.effects
 
     @property
-    def fitted(self) -> ForceModel:
+    def fitted(self) -> DriveModel:
         """The model with what is missing, not checked as `adopt` does."""
         return self.diagnosis.adopted
 
@@ -78,15 +78,16 @@ class DiagnosisResult(Result):
 
         after, _ = measure_residuals(self.fitted, self.inputs.fitted)
         return diagnosis_page(
-            self.diagnosis, self._words, after, [one.name for one in self.inputs.fitted],
-            [one.name for one in self.inputs.held_out], self._rivals)
+            self.diagnosis, self._words, after,
+            [recording.name for recording in self.inputs.fitted],
+            [recording.name for recording in self.inputs.held_out], self._rivals)
 
     def table(self) -> DataFrame:
         """Return a row per parameter of each missing effect: its value, std, unit, evidence."""
         return data_frame([
-            {'effect': found.name, 'parameter': key, 'value': one.value, 'std': one.std,
-             'unit': one.unit, 'evidence': found.evidence}
-            for found in self.effects for key, one in found.parameters.items()])
+            {'effect': found.name, 'parameter': key, 'value': each.value, 'std': each.std,
+             'unit': each.unit, 'evidence': found.evidence}
+            for found in self.effects for key, each in found.parameters.items()])
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, with the effects, and the noise."""
@@ -110,11 +111,11 @@ class DiagnosisResult(Result):
 def diagnose(model: Model, recordings: Recordings, validate: Recordings = (), *,
              topic: str | None = None, progress: Progress | None = None, as_it_is: bool = False,
              reference: Given | None = None) -> DiagnosisResult:
-    """Find the physical effect that a model lacks, as far as recordings can tell.
+    """Find the physical effect that a model lacks, from recordings.
 
     Parameters
     ----------
-    model : ForceModel or path
+    model : DriveModel or path
     recordings : path, Recording, or a sequence of them
         To fit to.
     validate : path, Recording, or a sequence of them, optional

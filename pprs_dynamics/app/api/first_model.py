@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from pathlib import Path
@@ -51,13 +51,12 @@ from pprs_dynamics.physics.mechanism.description import (
     Description,
 )
 from pprs_dynamics.physics.mechanism.urdf import expanded, read_urdf
-from pprs_dynamics.physics.model.model_file import Model, build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import parse_parameters
 from pprs_dynamics.physics.model.recorded_names import EFFORT_KINDS, EXTERNAL, MEASURED
 from pprs_dynamics.physics.model.robot_block import coupled
 from pprs_dynamics.system.plain_yaml import scalar
 
-Ask = Callable[[str, Sequence[str]], int]
 FILE_TIME = 'time'
 SETTLED = ('position', 'velocity', 'effort', 'current')
 SCALE_KEYS = {POSITION: 'position_scale', VELOCITY: 'velocity_scale', EFFORT: 'effort_scale',
@@ -70,7 +69,7 @@ SURE_KINDS = {'position_unit', 'effort_unit', 'effort_sign', 'effort_sign_bit', 
 
 
 class FirstModelError(PprsError, ValueError):
-    """What a first model file would need is not there, or cannot be told."""
+    """A first model file cannot be written from the given files."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ class FirstModel:
         Where it will stand, from which the description's path counts.
     text : str
         Its content, with comments.
-    model : Model
+    model : DriveModel
         The same, built.
     notes : tuple of str
         What was guessed, and what could not be known.
@@ -112,7 +111,7 @@ class FirstModel:
 
     path: Path
     text: str
-    model: Model
+    model: DriveModel
     notes: tuple[str, ...]
     recordings: tuple[Path, ...]
     has_efforts: bool
@@ -122,7 +121,7 @@ class FirstModel:
 def first_model(
     robot: str | os.PathLike[str], recordings: Sequence[str | os.PathLike[str]] = (),
     output: str | os.PathLike[str] = 'robot.yaml', *, base: str = '', tool: str = '',
-    drives: Sequence[str] = (), rate: float | None = None, ask: Ask | None = None,
+    drives: Sequence[str] = (), rate: float | None = None,
 ) -> FirstModel:
     """Return a first model file of a robot.
 
@@ -141,31 +140,29 @@ def first_model(
         Driven joints; without, those of the recording, or all up to the tool.
     rate : float, optional
         Samples per second of tables without times [Hz].
-    ask : callable, optional
-        Given a question and its answers, returns which; without, the first is taken.
 
     Raises
     ------
     PprsError
-        Where a file cannot be read, or joints and columns cannot be told.
+        Where a file cannot be read, or joints and columns cannot be matched.
     """
     path = Path(robot)
     is_mjcf = _root_tag(path) == 'mujoco'
     description = _description(path, is_mjcf)
-    given, files = _grouped([Path(one) for one in recordings])
+    given, files = _grouped([Path(recording) for recording in recordings])
     contents = look_into(files.get(POSITION, given[0])) if given else None
     movable = [joint.name for joint in description.joints.values()
                if joint.kind not in (FIXED, FLOATING) and joint.mimic is None]
     names = _names(contents, movable) if contents is not None and not files else Names()
     recorded = set(names.joints) | (_mentioned(contents, movable) if contents else set())
-    branch, notes = _branch(description, tool, recorded, ask)
+    branch, notes = _branch(description, tool, recorded)
     notes += description.remarks
     chosen = _drives(description, path, is_mjcf, branch, drives, recorded)
     shared = [name for each in coupled(description) for name in each.joints if name in chosen]
     if shared and not drives:
         chosen = tuple(name for name in chosen if name not in shared)
-        notes.append(f'{" and ".join(shared)} share a transmission: they are left out, and '
-                     'taken to stand; to drive them list them, with friction: {motors: …}')
+        notes.append(f'{" and ".join(shared)} share a transmission: they are not driven; '
+                     'to drive them, list them with friction: {motors: …}')
     if contents is not None and contents.joints and not names.joints:
         names = _by_numbers(contents, chosen)
         notes.append('joints are matched by the numbers in their names')
@@ -182,11 +179,11 @@ def first_model(
             questions += error.lines
         notes += guessed
 
-    def written() -> tuple[str, Model]:
+    def written() -> tuple[str, DriveModel]:
         text = _text(path, Path(output), is_mjcf, description, base or root_of(description),
-                     branch, chosen, names, columns, guessed, [one.name for one in given],
+                     branch, chosen, names, columns, guessed, [path.name for path in given],
                      CURRENT in found, EXTERNAL in found, questions)
-        return text, build_model(parse_parameters(text, output), source=str(output))
+        return text, DriveModel.from_parameters(parse_parameters(text, output), source=str(output))
 
     has_efforts = bool({EFFORT, CURRENT} & {*found}) and EXTERNAL not in found
     text, model = written()
@@ -210,7 +207,7 @@ def first_model(
 # ---------------------------------------------------------------------------------- readings
 
 
-def _corrections(model: Model, path: Path, corrected: set[str],
+def _corrections(model: DriveModel, path: Path, corrected: set[str],
                  ) -> tuple[Scales, list[str], list[str]]:
     """Return factors with which a recording is read surely, why, and what is not sure.
 
@@ -266,7 +263,7 @@ def _description(path: Path, is_mjcf: bool) -> Description:
     return read_mjcf(str(path))
 
 
-def _branch(description: Description, tool: str, recorded: Collection[str], ask: Ask | None,
+def _branch(description: Description, tool: str, recorded: Collection[str],
             ) -> tuple[Branch, list[str]]:
     """Return what is between base and tool, and what was not clear about it."""
     if tool:
@@ -278,10 +275,7 @@ def _branch(description: Description, tool: str, recorded: Collection[str], ask:
         raise FirstModelError(f'{description.path}: no joint of it moves, must have one that does')
     if len(likely) == 1:
         return likely[0], []
-    answers = [f'{one.tool} (after {", ".join(one.names)})' for one in likely]
-    if ask is not None:
-        return likely[ask('Which link carries the load?', answers)], []
-    return likely[0], [f'the load may be on {" or ".join(one.tool for one in likely)}: '
+    return likely[0], [f'the load may be on {" or ".join(branch.tool for branch in likely)}: '
                        f'{likely[0].tool} was taken, --tool LINK takes another']
 
 
@@ -296,7 +290,7 @@ def _drives(description: Description, path: Path, is_mjcf: bool, branch: Branch,
         return tuple(name for name in branch.names if name in recorded) or branch.names
     # What loops determine is not driven.
     driven = recorded or (_actuated(path) if is_mjcf else {
-        joint for one in description.transmissions for joint in one.joints})
+        joint for transmission in description.transmissions for joint in transmission.joints})
     found = tuple(name for name in description.joints if name in driven)
     if not found:
         raise FirstModelError(
@@ -322,15 +316,15 @@ def _grouped(recordings: Sequence[Path]) -> tuple[list[Path], dict[str, Path]]:
     folder = recordings[0] if len(recordings) == 1 else None
     if folder is not None and folder.is_dir() and not is_lerobot(folder) and not (
             folder / 'metadata.yaml').is_file():
-        inside = sorted(one for one in folder.iterdir() if one.is_file())
-        if not any(is_storage(one) for one in inside):
+        inside = sorted(file for file in folder.iterdir() if file.is_file())
+        if not any(is_storage(file) for file in inside):
             files = _by_quantity(inside)
             if POSITION not in files:
                 raise FirstModelError(
-                    f'{folder}: its files ({", ".join(one.name for one in inside[:12])}) are no '
+                    f'{folder}: its files ({", ".join(file.name for file in inside[:12])}) are no '
                     'bag, and none is called as positions are (position.csv, q.csv)')
             return [folder], files
-    if len(recordings) > 1 and not any(is_storage(one) for one in recordings):
+    if len(recordings) > 1 and not any(is_storage(recording) for recording in recordings):
         files = _by_quantity(recordings)
         if len(files) == len(recordings) and POSITION in files:
             return [files[POSITION]], files
@@ -338,7 +332,7 @@ def _grouped(recordings: Sequence[Path]) -> tuple[list[Path], dict[str, Path]]:
 
 
 def _by_quantity(files: Sequence[Path]) -> dict[str, Path]:
-    """Return files whose names tell a quantity, and time; of two alike the first."""
+    """Return files by the quantity in their names, also time; the first of each."""
     found: dict[str, Path] = {}
     for file in files:
         words = {*words_of(file.name.split('.')[0])}
@@ -355,7 +349,7 @@ def _names(contents: Contents, joints: Sequence[str]) -> Names:
     known = dict.fromkeys(name for of in contents.joints.values() for name in of)
     known.update(dict.fromkeys(
         name.rpartition('/')[0].rpartition('/')[2] for name in (
-            one.title for one in contents.series) if name.endswith(f'/{POSITION}')))
+            column.title for column in contents.series) if name.endswith(f'/{POSITION}')))
     same = [joint for joint in joints if joint in known]
     if same:
         return Names({joint: joint for joint in same})
@@ -398,7 +392,7 @@ def _by_numbers(contents: Contents, drives: Sequence[str]) -> Names:
 
 def _mentioned(contents: Contents, joints: Sequence[str]) -> set[str]:
     """Return the joints whose names are in the titles of columns."""
-    titles = [words_of(one.title) for one in contents.series]
+    titles = [words_of(column.title) for column in contents.series]
     found = set()
     for joint in joints:
         words = words_of(joint)
@@ -431,7 +425,7 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: N
     if guess.time is not None and guess.time not in TIME_COLUMNS:
         lines.append(f'time: {scalar(guess.time)}')
     is_bag = bool(contents.series) and all(
-        str(one.column).startswith('/') for one in contents.series)
+        str(each.column).startswith('/') for each in contents.series)
     if guess.time is None and not is_bag:
         lines.append(_rate(path, guess.rate))
     return ([*lines, *_drive_lines(guess, drives, contents.decimal)], guess.notes,
@@ -451,15 +445,15 @@ def _file_columns(path: Path, files: Mapping[str, Path], drives: Sequence[str],
     """Return the same of files of one quantity each."""
     inside = {kind: look_into(file) for kind, file in files.items()}
     inside.update(_in_turn(files, inside, len(drives)))
-    guesses = {kind: guess_columns(one.series, drives, kind, movable, rate)
-               for kind, one in inside.items() if kind != FILE_TIME}
+    guesses = {kind: guess_columns(file.series, drives, kind, movable, rate)
+               for kind, file in inside.items() if kind != FILE_TIME}
     merged = Guess(
-        guesses[POSITION].time, {key: column for one in guesses.values()
-                                 for key, column in one.columns.items()},
-        {key: scale for one in guesses.values() for key, scale in one.scales.items()},
-        guesses[POSITION].time_scale, [note for kind, one in guesses.items()
+        guesses[POSITION].time, {key: column for guess in guesses.values()
+                                 for key, column in guess.columns.items()},
+        {key: scale for guess in guesses.values() for key, scale in guess.scales.items()},
+        guesses[POSITION].time_scale, [note for kind, guess in guesses.items()
                                        for note in (f'{files[kind].name}: {note}'
-                                                    for note in one.notes)])
+                                                    for note in guess.notes)])
     lines = []
     if FILE_TIME in inside:
         series = inside[FILE_TIME].series
@@ -504,11 +498,11 @@ def _in_turn(files: Mapping[str, Path], inside: Mapping[str, Contents], count: i
     if FILE_TIME not in files or count < 2:
         return
     times = len(read_column(files[FILE_TIME]))
-    for kind, one in inside.items():
-        if kind != FILE_TIME and len(one.series) == 1 and not one.has_header:
+    for kind, file in inside.items():
+        if kind != FILE_TIME and len(file.series) == 1 and not file.has_header:
             values = read_column(files[kind])
             if len(values) == count * times:
-                yield kind, replace(one, series=tuple(
+                yield kind, replace(file, series=tuple(
                     Series(f'1[{k}]', f'{kind} {k}', values[k::count]) for k in range(count)))
 
 
@@ -538,13 +532,13 @@ def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, ba
     gain = ', '.join(['1.0'] * len(drives))
     lines = [
         f'# Model of {robot.name}'
-        + (f', read beside {", ".join(recordings[:3])}' if recordings else '')
+        + (f', read with {", ".join(recordings[:3])}' if recordings else '')
         + '. Lines with "guessed" or "not known" are to be checked.',
         '/**:',
         '  ros__parameters:',
         '    robot:',
         f'      {"mjcf" if is_mjcf else "urdf"}: {scalar(place)}  # from the folder of this file',
-        f'      base: {scalar(base)}  # the link that stands',
+        f'      base: {scalar(base)}  # the link that does not move',
         f'      tool: {scalar(branch.tool)}  # the link that carries the load',
         f'      drives: [{", ".join(scalar(name) for name in drives)}]  # driven, in the order '
         'of all results',

@@ -15,7 +15,7 @@ from pprs_dynamics.app.api.result import Result, data_frame
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.inference.fit.base_fit import BaseFit, fit_base
 from pprs_dynamics.inference.fit.reference_runs import with_own_reference
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.model_writer import write_model
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class FitResult(Result):
     fit: BaseFit
 
     @property
-    def model(self) -> ForceModel:
+    def model(self) -> DriveModel:
         """The fitted model."""
         return self.fit.model
 
@@ -66,12 +66,13 @@ class FitResult(Result):
         """Return the page of `pprs fit --report`."""
         from pprs_dynamics.app.report.fit_report import fit_page
 
-        return fit_page(self.inputs.model, self.fit, [one.name for one in self.inputs.fitted],
-                        [one.name for one in self.inputs.held_out])
+        return fit_page(self.inputs.model, self.fit,
+                        [recording.name for recording in self.inputs.fitted],
+                        [recording.name for recording in self.inputs.held_out])
 
     def table(self) -> DataFrame:
         """Return a row per fitted number: before, after, std, unit."""
-        return data_frame([one.to_dict() for one in self.fit.numbers])
+        return data_frame([number.to_dict() for number in self.fit.numbers])
 
     def plot(self) -> Figure:
         """Return a picture: the error of every drive before, after and held out."""
@@ -84,16 +85,13 @@ class FitResult(Result):
 
 def fit(model: Model, recordings: Recordings, validate: Recordings = (), *,
         topic: str | None = None, progress: Progress | None = None, as_it_is: bool = False,
-        keep_residual: bool = False) -> FitResult:
+        ) -> FitResult:
     """Fit a base model: an arm's inertia and friction, or what `tolerances` leave open.
 
     Parameters
     ----------
     model, recordings, validate, topic, progress, as_it_is
         As in `diagnose`; recordings of free motion.
-    keep_residual : bool
-        Whether the model keeps, beside the names of its recordings, what it leaves of them, as a
-        reference that needs no files.
 
     Returns
     -------
@@ -111,6 +109,5 @@ def fit(model: Model, recordings: Recordings, validate: Recordings = (), *,
     found = fit_base(inputs.model, inputs.fitted, inputs.held_out, stage(progress, 'fitting'))
     if set(inputs.recordings) <= inputs.paths:
         found = replace(found, model=with_own_reference(
-            found.model, inputs.fitted, [Path(name) for name in inputs.recordings],
-            keep_residual))
+            found.model, inputs.fitted, [Path(name) for name in inputs.recordings]))
     return FitResult(inputs, found)

@@ -18,8 +18,7 @@ from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_me
 from pprs_dynamics.measurement.files.fingerprint import fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file
 from pprs_dynamics.physics.model.reference_keys import reference_files
 from pprs_dynamics.system.plain_text import displayed
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
     from pprs_dynamics.inference.fit.reference import Reference
 
 File = str | PathLike[str]
-Model = ForceModel | File
+Model = DriveModel | File
 Progress = Callable[[str, float], None]  # what is being done, and the share of it that is done
 # Every recording is evidence once.
 ONCE = 'every recording may be given once'
@@ -52,7 +51,7 @@ class Inputs:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings, validation : mapping of str to Recording
         To fit to, and never fitted; by path, or by name where they came from no file.
     paths : frozenset of str
@@ -71,7 +70,7 @@ class Inputs:
         Its files; none of them: those that the model file names.
     """
 
-    model: ForceModel
+    model: DriveModel
     recordings: Mapping[str, Recording]
     validation: Mapping[str, Recording]
     paths: frozenset[str] = frozenset()
@@ -86,7 +85,7 @@ class Inputs:
     def of(cls, model: Model, recordings: Recordings, validate: Recordings = (),
            topic: str | None = None, progress: Progress | None = None,
            whole: bool = False, as_it_is: bool = False) -> Inputs:
-        """Read what is given as a path and check it, and take what is in memory as it is.
+        """Read and check paths; recordings in memory are not checked.
 
         Of recordings that are too long for a fit excerpts are taken, but where the `whole` is
         asked for.
@@ -114,19 +113,16 @@ class Inputs:
              topic: str | None = None, progress: Progress | None = None) -> Inputs:
         """Read as `of`, but units and signs are not looked at yet."""
         _require_kinds(recordings, validate)
-        found = model if isinstance(model, ForceModel) else load_model(find_file(model))
+        found = model if isinstance(model, DriveModel) else DriveModel.load(find_file(model))
         base = Path(found.source) if found.source and Path(found.source).is_file() else None
         shipped = base is not None and base == find_file(DEFAULT_MODEL)
-        given = base or '' if isinstance(model, ForceModel) else model
+        given = base or '' if isinstance(model, DriveModel) else model
         name = '' if shipped else str(given)
-        # Before anything is read, which may take minutes.
-        _refuse_same_paths(listed_recordings(recordings), [], ONCE)
-        _refuse_same_paths(listed_recordings(validate), listed_recordings(recordings), OTHER)
         fitted, held_out = (_read_all(found, listed, topic, progress)
                             for listed in (recordings, validate))
         _refuse_repeats(fitted, [], ONCE)
         _refuse_repeats(held_out, fitted, OTHER)
-        paths = frozenset(one.name for one in (*fitted, *held_out) if one.is_path)
+        paths = frozenset(entry.name for entry in (*fitted, *held_out) if entry.is_path)
         return cls(found, _named(fitted), _named(held_out), paths, base, name, topic or '')
 
     def checked(self) -> Inputs:
@@ -139,8 +135,8 @@ class Inputs:
             with `as_it_is`.
         """
         def each(recordings: Mapping[str, Recording]) -> dict[str, Recording]:
-            return {name: with_mistakes(self.model, one, refuse=not self.as_it_is)
-                    if name in self.paths else one for name, one in recordings.items()}
+            return {name: with_mistakes(self.model, recording, refuse=not self.as_it_is)
+                    if name in self.paths else recording for name, recording in recordings.items()}
         return replace(self, recordings=each(self.recordings), validation=each(self.validation))
 
     def within_memory(self) -> Inputs:
@@ -159,15 +155,15 @@ class Inputs:
                 raise
             # Of several that it may hold.
             more = Inputs.of(self.model, path, topic=self.topic, as_it_is=self.as_it_is)
-        _refuse_repeats([_Read(str(path), one, True) for one in more.fitted],
-                        [_Read(name, one, True) for name, one in
+        _refuse_repeats([_Read(str(path), recording, True) for recording in more.fitted],
+                        [_Read(name, entry, True) for name, entry in
                          {**self.recordings, **self.validation}.items()], ONCE)
         if self.reference is not None:
             from pprs_dynamics.inference.fit.reference_runs import OTHER as OTHER_RUN
 
-            _refuse_repeats([_Read(str(path), one, True) for one in more.fitted],
-                            [_Read(one.name, one, True) for one in self.reference.recordings],
-                            OTHER_RUN)
+            _refuse_repeats([_Read(str(path), recording, True) for recording in more.fitted],
+                            [_Read(recording.name, recording, True)
+                             for recording in self.reference.recordings], OTHER_RUN)
         if is_held_out:
             return replace(self, validation={**self.validation, **more.recordings},
                            paths=self.paths | more.paths)
@@ -185,13 +181,13 @@ class Inputs:
         if name not in {**self.recordings, **self.validation}:
             raise InputError(f'no recording {displayed(name)}, must be one of '
                              f'{", ".join(map(displayed, (*self.recordings, *self.validation)))}')
-        fewer, held_out = ({key: one for key, one in given.items() if key != name}
+        fewer, held_out = ({key: recording for key, recording in given.items() if key != name}
                            for given in (self.recordings, self.validation))
         return replace(self, recordings=fewer, validation=held_out,
                        paths=self.paths - {name}).require_recordings()
 
-    def since(self, reference: Given | None, model: ForceModel | None = None) -> Inputs:
-        """Return this with reference runs, () for the model's own; as it is for None.
+    def since(self, reference: Given | None, model: DriveModel | None = None) -> Inputs:
+        """Return this with reference runs, () for the model's own; unchanged for None.
 
         They are fitted to the model, or to another one that is given.
 
@@ -208,12 +204,12 @@ class Inputs:
         return replace(
             self, reference=read_reference(model or self.model, runs,
                                            [*self.fitted, *self.held_out], self.as_it_is),
-            reference_paths=tuple(str(one) for one in runs if not isinstance(one, Recording)))
+            reference_paths=tuple(str(run) for run in runs if not isinstance(run, Recording)))
 
     @property
     def fitted_to(self) -> tuple[str, ...]:
         """Those of the recordings that the model was fitted to, by what its file says."""
-        hashes = {one.sha256 for one in reference_files(self.model.values, self.model.source)}
+        hashes = {file.sha256 for file in reference_files(self.model.values, self.model.source)}
         return tuple(displayed(name) for name in self.recordings
                      if hashes and name in self.paths and fingerprint(name) in hashes)
 
@@ -231,8 +227,8 @@ class Inputs:
         for name in () if self.as_it_is else self.recordings:
             found = no_measurements([self.recordings[name].findings])
             if found:
-                raise MisreadError(displayed(name), [one.what for one in found],
-                                   [one.line for one in found])
+                raise MisreadError(displayed(name), [entry.what for entry in found],
+                                   [entry.line for entry in found])
         return self.require_recordings()
 
     @property
@@ -262,8 +258,8 @@ class Inputs:
         from pprs_dynamics.inference.adoption.ledger_entry import LedgerBook, RecordingEntry
 
         def entries(recordings: Mapping[str, Recording]) -> tuple[RecordingEntry, ...]:
-            return tuple(RecordingEntry.of(one, name if name in self.paths else None)
-                         for name, one in recordings.items())
+            return tuple(RecordingEntry.of(recording, name if name in self.paths else None)
+                         for name, recording in recordings.items())
         return LedgerBook(entries(self.recordings), entries(self.validation))
 
 
@@ -271,13 +267,13 @@ Given = File | Recording | Sequence[File | Recording]
 Recordings = Given | Inputs
 
 
-def read_checked(model: ForceModel, path: File, topic: str | None = None,
+def read_checked(model: DriveModel, path: File, topic: str | None = None,
                  progress: Progress | None = None) -> Recording:
     """Read a recording of a model's drives; what its numbers rather mean is in its findings."""
     return with_mistakes(model, _read(model, path, topic, progress))
 
 
-def _read(model: ForceModel, path: File, topic: str | None, progress: Progress | None,
+def _read(model: DriveModel, path: File, topic: str | None, progress: Progress | None,
           ) -> Recording:
     report = stage(progress, f'reading {displayed(path)}')
     return read_recording(path, model.recorded, topic,
@@ -290,11 +286,11 @@ class _Read(NamedTuple):
     is_path: bool
 
 
-def _read_all(model: ForceModel, given: Given, topic: str | None, progress: Progress | None,
+def _read_all(model: DriveModel, given: Given, topic: str | None, progress: Progress | None,
               ) -> list[_Read]:
-    return [_Read(one.name, one, False) if isinstance(one, Recording)
-            else _Read(str(one), _read(model, one, topic, progress), True)
-            for one in listed_recordings(given)]
+    return [_Read(entry.name, entry, False) if isinstance(entry, Recording)
+            else _Read(str(entry), _read(model, entry, topic, progress), True)
+            for entry in listed_recordings(given)]
 
 
 def listed_recordings(given: Given) -> Sequence[File | Recording]:
@@ -302,38 +298,29 @@ def listed_recordings(given: Given) -> Sequence[File | Recording]:
     return [given] if isinstance(given, (str, PathLike, Recording)) else given
 
 
-def _refuse_same_paths(given: Sequence[File | Recording], earlier: Sequence[File | Recording],
-                       rule: str) -> None:
-    seen = {str(one) for one in earlier if not isinstance(one, Recording)}
-    for one in given:
-        if not isinstance(one, Recording):
-            if str(one) in seen:
-                raise UnreadableFileError(str(one), f'it is given twice, but {rule}')
-            seen.add(str(one))
-
-
 def _require_kinds(recordings: Given, validate: Given) -> None:
     """Raise InputError for recordings that are neither a path nor a Recording."""
     for name, given in (('recordings', recordings), ('validate', validate)):
         listed = (listed_recordings(given) if isinstance(
             given, (str, PathLike, Recording, Sequence)) else [given])
-        for one in listed:
-            if not isinstance(one, (Recording, str, PathLike)):
-                raise InputError(f'{name}: one is of type {type(one).__name__}, must be a path or '
-                                 'a Recording (Recording.from_arrays makes one of arrays)')
+        for entry in listed:
+            if not isinstance(entry, (Recording, str, PathLike)):
+                kind = type(entry).__name__
+                raise InputError(f'{name}: one is of type {kind}, must be a path or a Recording '
+                                 '(Recording.from_arrays makes one of arrays)')
 
 
 def _named(found: Sequence[_Read]) -> dict[str, Recording]:
     """Return recordings by name; of those from memory two may have the same."""
     named: dict[str, Recording] = {}
-    for one in found:
-        same = sum(other.name == one.name for other in found[:len(named)])
-        named[f'{one.name} ({same + 1})' if same else one.name] = one.recording
+    for entry in found:
+        same = sum(other.name == entry.name for other in found[:len(named)])
+        named[f'{entry.name} ({same + 1})' if same else entry.name] = entry.recording
     return named
 
 
 def _refuse_repeats(found: Sequence[_Read], earlier: Sequence[_Read], rule: str) -> None:
-    repeat = find_repeat([one.recording for one in found], [one.recording for one in earlier])
+    repeat = find_repeat([entry.recording for entry in found], [each.recording for each in earlier])
     if repeat is not None:
         index, clause = repeat
         raise UnreadableFileError(found[index].name, f'{clause}, but {rule}')

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The motion that tells most about what recordings leave open."""
+"""Design of the motion that best separates the remaining candidates."""
 
 from __future__ import annotations
 
@@ -20,14 +20,13 @@ from pprs_dynamics.app.api.inputs import (
     stage,
 )
 from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.inference.experiments.arm_motions import ArmExcitation, ArmLimits, excite_arm
-from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
+from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation, excite_arm
+from pprs_dynamics.inference.experiments.motion_limits import ArmLimits, MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import Experiment, check_purpose
 from pprs_dynamics.inference.experiments.next_experiment import next_experiment as design
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import write_motion
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure, Page
@@ -85,7 +84,7 @@ class ExperimentResult(Result):
         return experiment_view(self.design)
 
     def page(self) -> Page:
-        """Return a page: what the motion would tell, its curves and its use of the limits."""
+        """Return a page: expected evidence, curves, and use of the limits."""
         from pprs_dynamics.app.report.experiment_report import excitation_page, experiment_page
 
         if isinstance(self.design, ArmExcitation):
@@ -97,7 +96,7 @@ class ExperimentResult(Result):
         if isinstance(self.design, ArmExcitation):
             return data_frame([{'limit': name, 'use': share}
                                for name, share in self.design.limits.items()])
-        return data_frame([one.to_dict() for one in self.design.contests])
+        return data_frame([contest.to_dict() for contest in self.design.contests])
 
     def plot(self) -> Figure:
         """Return a picture: where the platform or every joint goes."""
@@ -119,16 +118,16 @@ def next_experiment(
     noise: float = 0.05, rate: float = RATE, topic: str | None = None,
     progress: Progress | None = None,
 ) -> ExperimentResult:
-    """Design the motion that tells most about what recordings leave open.
+    """Design the motion that best separates the remaining candidates.
 
     Parameters
     ----------
-    model : ForceModel or path
+    model : DriveModel or path
     recordings : path, Recording, or a sequence of them
     purpose : {'separate', 'commission'}
         What the recordings leave open; or a first motion of a new robot, without recordings.
     limits : MotionLimits or ArmLimits, optional
-        Beside those of the model file or the URDF.
+        In addition to those of the model file or the URDF.
     duration : float
         [s]
     seed : int
@@ -163,7 +162,7 @@ def next_experiment(
     if limits is not None and not isinstance(limits, kind):
         raise InputError(f'limits are {type(limits).__name__}, must be {kind.__name__} for '
                          f'{found.title}')
-    if isinstance(found, MechanismModel) and purpose == 'commission':
+    if found.moves_joints and purpose == 'commission':
         designed = excite_arm(found, limits if isinstance(limits, ArmLimits) else ArmLimits(),
                               duration, seed, share_done)
     else:

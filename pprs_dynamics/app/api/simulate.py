@@ -14,24 +14,17 @@ import numpy as np
 
 from pprs_dynamics.app.api.inputs import Model, Progress, stage
 from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.errors import MotionError
 from pprs_dynamics.measurement.files.recording import Recording, describe, write_recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.parameter_file import find_file
-from pprs_dynamics.simulation.drive_control import ControlSettings, Note
 
 if TYPE_CHECKING:
     from pprs_dynamics.app.api.result import DataFrame, Figure, Page
 
 RATE = 500.0  # [Hz], of the 3-PPRS
-NOISE = 0.08  # [N], of its efforts
-FEEDFORWARDS = ('friction', 'rigid_body', 'none')
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -40,13 +33,11 @@ class SimulationResult(Result):
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recording : Recording
         What the sensors said.
     effects : tuple of dict
         What was hidden: name, drives, parameters and form of each effect.
-    notes : tuple of Note
-        What happened on the way.
     motion : PlatformMotion or JointMotion
         Where the robot was meant to go.
     rate : float
@@ -54,10 +45,9 @@ class SimulationResult(Result):
     seed : int
     """
 
-    model: ForceModel
+    model: DriveModel
     recording: Recording
     effects: tuple[dict[str, Any], ...]
-    notes: tuple[Note, ...]
     motion: PlatformMotion | JointMotion
     rate: float
     seed: int
@@ -75,15 +65,13 @@ class SimulationResult(Result):
     def to_dict(self) -> dict[str, Any]:
         """Return what `pprs simulate --json` writes, but for the file's name."""
         return {'samples': len(self.recording.time), 'rate': self.rate, 'seed': self.seed,
-                'effects': list(self.effects),
-                'notes': [{'time': note.time, 'code': note.code, 'message': note.message}
-                          for note in self.notes]}
+                'effects': list(self.effects)}
 
     def view(self, details: bool = False) -> Any:
-        """Return what the terminal shows; what was hidden is not told."""
+        """Return what the terminal shows; the injected effects are not shown."""
         from pprs_dynamics.app.report.tables import simulation_view
 
-        return simulation_view(len(self.recording.time), self.rate, len(self.effects), self.notes)
+        return simulation_view(len(self.recording.time), self.rate, len(self.effects))
 
     def page(self) -> Page:
         """Return a page: positions and efforts of every drive over time."""
@@ -94,11 +82,11 @@ class SimulationResult(Result):
     def table(self) -> DataFrame:
         """Return a row per drive: range of position, velocity and effort."""
         drives = describe(self.recording).drives
-        return data_frame([{'lowest_position': one.position[0],
-                            'highest_position': one.position[1],
-                            'lowest_effort': (one.effort or (np.nan, np.nan))[0],
-                            'highest_effort': (one.effort or (np.nan, np.nan))[1]}
-                           for one in drives.values()], list(drives), 'drive')
+        return data_frame([{'lowest_position': drive.position[0],
+                            'highest_position': drive.position[1],
+                            'lowest_effort': (drive.effort or (np.nan, np.nan))[0],
+                            'highest_effort': (drive.effort or (np.nan, np.nan))[1]}
+                           for drive in drives.values()], list(drives), 'drive')
 
     def plot(self) -> Figure:
         """Return a picture: positions and efforts over time."""
@@ -112,14 +100,13 @@ class SimulationResult(Result):
 
 def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
              scale: float = 1.0, motion: PlatformMotion | None = None, duration: float = 40.0,
-             path_seed: int = 0, noise: float | None = None, feedforward: str = 'friction',
-             thermometers: bool = False, link_encoders: bool = False,
-             progress: Progress | None = None) -> SimulationResult:
+             path_seed: int = 0, noise: float | None = None, thermometers: bool = False,
+             link_encoders: bool = False, progress: Progress | None = None) -> SimulationResult:
     """Record a robot of a physics engine that has effects which its model does not know of.
 
     Parameters
     ----------
-    model : ForceModel or path
+    model : DriveModel or path
     effects : str or sequence of str
         Names of effects, drawn from the seed; 'random' draws the names, too.
     seed : int
@@ -133,12 +120,9 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     path_seed : int
         Of the random motion.
     noise : float, optional
-        Standard deviation of the efforts [N m, N]: by default 0.08 N of a 3-PPRS, and half a
-        percent of the largest of other robots.
-    feedforward : {'friction', 'rigid_body', 'none'}
-        What the 3-PPRS is driven with.
+        Standard deviation of the efforts [N m, N]: by default half a percent of the largest.
     thermometers, link_encoders : bool
-        Whether those of other robots are recorded where no effect needs them.
+        Whether they are recorded where no effect needs them.
     progress : callable, optional
         Called with what is being done and the share of it that is done.
 
@@ -153,42 +137,38 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     PprsError
         For an unknown effect, a motion beyond the strokes, or a model that cannot be simulated.
     """
-    found = model if isinstance(model, ForceModel) else load_model(find_file(model))
+    from pprs_dynamics.simulation.injection import draw_motion, simulate_mechanism
+    from pprs_dynamics.simulation.platform import as_mechanism
+
+    found = model if isinstance(model, DriveModel) else DriveModel.load(find_file(model))
     names = [effects] if isinstance(effects, str) else list(effects)
-    share_done = stage(progress, 'simulating')
-    if isinstance(found, MechanismModel):
-        from pprs_dynamics.simulation.mechanism_run import RATE as MECHANISM_RATE
-        from pprs_dynamics.simulation.mechanism_run import simulate_mechanism
+    share_done, robot = stage(progress, 'simulating'), as_mechanism(found)
+    # With one seed the effects are the same on every path.
+    drives = nominal = None
+    if found.moves_joints:
+        nominal = draw_motion(robot, duration, 0) if path_seed else None
+    else:
+        if path_seed or motion is not None:
+            nominal = _of_drives(found, _excitation(duration, 0))
+        motion = _excitation(duration, path_seed) if motion is None else motion
+        drives = _of_drives(found, motion)
+    run = simulate_mechanism(robot, names, seed, scale, noise, duration, path_seed, share_done,
+                             thermometers, link_encoders, drives, nominal)
+    time = run.motion.time
+    assert time is not None
+    recording = Recording.from_arrays('simulated', time, run.position, None, run.effort,
+                                      found.drives, run.channels)
+    return SimulationResult(found, recording, run.effects, motion or run.motion,
+                            round(1 / float(np.median(np.diff(time))), 6), seed)
 
-        run = simulate_mechanism(found, names, seed, scale, noise, duration, path_seed, share_done,
-                                 thermometers, link_encoders)
-        assert run.motion.time is not None
-        recording = Recording.from_arrays('simulated', run.motion.time, run.position, None,
-                                          run.effort, found.drives, run.channels)
-        return SimulationResult(found, recording, run.effects, (), run.motion, MECHANISM_RATE, seed)
-    assert isinstance(found, DriveModel)
-    if feedforward not in FEEDFORWARDS:
-        raise MotionError('feedforward', repr(feedforward),
-                          f'be one of {", ".join(FEEDFORWARDS)}', 'shape')
-    from pprs_dynamics.simulation.injected_effects import draw_effects
-    from pprs_dynamics.simulation.sensors import SensorSettings
-    from pprs_dynamics.simulation.virtual_robot import DriveReference
-    from pprs_dynamics.simulation.virtual_robot import simulate as simulate_robot
 
-    if motion is None:
-        path = Excitation(duration=duration, seed=path_seed)
-        motion = path.motion(np.arange(0.0, path.duration, 1 / RATE))
-    forces = found.drive_forces(motion)
-    found.limits.check_strokes(forces.mechanism.position)
-    effort = {'friction': forces.total, 'rigid_body': forces.parts['rigid_body'], 'none': None}
-    driven = simulate_robot(
-        found.values, DriveReference(forces.mechanism.position, forces.mechanism.velocity,
-                                     effort[feedforward]),
-        draw_effects(names, np.random.default_rng(seed), scale), seed=seed, rate=RATE,
-        truth=False, control=ControlSettings(gravity_compensation=feedforward == 'none'),
-        sensors=SensorSettings.with_effort_noise(NOISE if noise is None else noise),
-        progress=share_done)
-    recording = Recording.from_arrays('simulated', driven.time, driven.position, driven.velocity,
-                                      driven.effort, channels=driven.channels)
-    return SimulationResult(found, recording, tuple(driven.effects), tuple(driven.notes),
-                            motion, RATE, seed)
+def _excitation(duration: float, seed: int) -> PlatformMotion:
+    path = Excitation(duration=duration, seed=seed)
+    return path.motion(np.arange(0.0, path.duration, 1 / RATE))
+
+
+def _of_drives(model: DriveModel, motion: PlatformMotion) -> JointMotion:
+    """Return the motion of the drives within their strokes along one of the platform."""
+    state = model.mechanism(motion)
+    model.limits.check_strokes(state.position)
+    return JointMotion(state.position, state.velocity, state.acceleration, motion.time)

@@ -3,7 +3,7 @@
 import {$, button, make} from './dom.mjs';
 import {amount, plain, titleOf} from './format.mjs';
 
-const VERDICTS = {adequate: 'the model is adequate', effect: 'effects are missing, or otherwise than in the model',
+const VERDICTS = {adequate: 'the model is adequate', effect: 'effects are missing or have other values',
                   ambiguous: 'several effects explain it alike',
                   unknown: 'something no effect explains'};
 /* The same, since a reference run. */

@@ -16,7 +16,7 @@ from pprs_dynamics.app.commands.input_output import read_inputs, tell
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.physics.effects.catalogue import catalogue
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
 
 EXAMPLE = 'pprs adopt stribeck_friction run.mcap --validate other.mcap --output better.yaml'
@@ -43,14 +43,15 @@ def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
     # What does not exist is said before recordings are read.
-    requested(options.effect, load_model(find_file(options.model)))
+    requested(options.effect, DriveModel.load(find_file(options.model)))
     inputs = read_inputs(options, screen)
     with staged_bar(screen) as progress:
         result = adopt(inputs.model, options.effect, inputs, force=options.force,
                        progress=progress, reference=options.reference)
+    if result.adopted:
+        result.save(options.output)
     tell(result, options, screen, lambda: result.page(options.output))
     if not result.adopted:
         return 1
-    result.save(options.output)
     screen.print(f'model: {shown(options.output)}')
     return 0

@@ -9,7 +9,6 @@ import argparse
 import math
 import os
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 from pprs_dynamics.errors import PprsError, UnreadableFileError
@@ -23,9 +22,11 @@ RECORDING = (*FILES_OF_RECORDINGS, '')  # without an ending: a rosbag2 folder
 LARGEST_SEED = 2**63 - 1
 MOST_SHOWN = 30  # characters of what is no number
 # Options that name files, by what is done with them.
-OUTPUTS = ('output', 'json', 'report', 'mcap', 'picture')
+OUTPUTS = ('output', 'json', 'report', 'mcap')
 INPUTS = ('model', 'recordings', 'validate', 'reference', 'beside', 'refit', 'file', 'manifest',
           'store', 'path')
+NAMED = {'recordings': 'a recording', 'file': 'the model', 'model': 'the model',
+         'store': 'the store'}
 
 DEFAULT_MODEL = 'config/paper.yaml'
 
@@ -75,8 +76,8 @@ def add_validation(parser: argparse.ArgumentParser,
 def add_reference(parser: argparse.ArgumentParser) -> None:
     """Declare --reference."""
     parser.add_argument('--reference', metavar='RECORDING', nargs='*',
-                        help='runs from a day on which the machine was right (none given: those '
-                        'that the model file names): what has changed since then?')
+                        help='runs of a day on which the machine was correct (default: those in '
+                        'the model file); report what has changed since then')
 
 
 def add_model_output(parser: argparse.ArgumentParser, what: str, required: bool = True) -> None:
@@ -156,60 +157,25 @@ def output_folder(text: str) -> str:
 
 
 def check_files(options: argparse.Namespace) -> None:
-    """Refuse outputs that are an input, or each other, through links too, before anything runs.
-
-    Recordings and poses that exist are never replaced.
+    """Refuse outputs that are an input or another output, and recordings that exist.
 
     Raises
     ------
     UnreadableFileError
     """
-    inputs = {(option, name) for option, value in vars(options).items() if option in INPUTS
-              for name in _names(value)}
-    seen: list[tuple[str, Path | int]] = [('what the command prints', number)
-                                          for number in (1, 2)]
-    seen += [(_said(option), file) for option, name in inputs for file in _files(option, name)]
-    for option in OUTPUTS:
-        for name in _names(getattr(options, option, None)):
-            same = next((other for other, file in seen if _is_same(Path(name), file)), None)
-            if same is not None:
+    # Here, as --help needs no model.
+    from pprs_dynamics.physics.model.parameter_file import find_file
+
+    seen: dict[str, str] = {}
+    for option in (*INPUTS, *OUTPUTS):
+        value = getattr(options, option, None)
+        for name in [value] if isinstance(value, str) else value or ():
+            path = find_file(name) if option == 'model' and name == DEFAULT_MODEL else Path(name)
+            real = os.path.realpath(path)
+            if option in OUTPUTS and real in seen:
                 raise UnreadableFileError(
-                    name, f'it is --{option} and {same} at once, must be another file')
-            seen.append((f'--{option}', Path(name)))
-            if Path(name).suffix in FILES_OF_RECORDINGS and os.path.lexists(name):
+                    name, f'it is --{option} and {seen[real]} at once, must be another file')
+            if option in OUTPUTS and path.suffix in FILES_OF_RECORDINGS and os.path.lexists(path):
                 raise UnreadableFileError(name, 'it exists already, must be another name for '
                                           f'--{option}: recordings are never replaced')
-
-
-def _said(option: str) -> str:
-    return {'recordings': 'a recording', 'validate': 'a recording of --validate',
-            'file': 'the model', 'model': 'the model', 'store': 'the store'
-            }.get(option, f'--{option}')
-
-
-def _names(value: object) -> list[str]:
-    return [value] if isinstance(value, str) and value else list(value) if isinstance(
-        value, list) else []
-
-
-def _files(option: str, name: str) -> list[Path]:
-    """Return the files that an input is made of."""
-    path = Path(name)
-    if option in ('model', 'file'):
-        # Here, as --help needs no model.
-        from pprs_dynamics.physics.model.parameter_file import find_file
-
-        with suppress(UnreadableFileError):
-            path = find_file(name)
-    with suppress(OSError, ValueError):
-        if path.is_dir():
-            return [path, *(file for file in path.iterdir() if file.is_file())]
-    return [path] if os.path.lexists(path) else []
-
-
-def _is_same(output: Path, other: Path | int) -> bool:
-    """Return whether both are one file, existing or not; other may be an open one's number."""
-    try:
-        return os.path.samestat(os.stat(output), os.stat(other))
-    except (OSError, ValueError):
-        return isinstance(other, Path) and os.path.realpath(output) == os.path.realpath(other)
+            seen[real] = NAMED.get(option, f'--{option}')

@@ -21,8 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_as_it_is(parser)
     arguments.add_details(parser)
     parser.add_argument('--mcap', metavar='FILE.mcap', type=arguments.output_file('.mcap'),
-                        help='write measured effort, model, parts and residual as joint states, '
-                        'with layouts for PlotJuggler and Foxglove')
+                        help='write measured effort, model, parts and residual as joint states')
     parser.add_argument('--beside', metavar='FILE.yaml', help='another model file: its '
                         'errors on the same recordings')
     arguments.add_report(parser)
@@ -38,6 +37,6 @@ def run(options: argparse.Namespace) -> int:
     tell(result, options, screen)
     if options.mcap:
         with staged_bar(screen) as progress:
-            written = result.write_bag(options.mcap, progress)
-        screen.print(f'bag and layouts: {shown(", ".join(map(str, written)))}')
+            result.write_bag(options.mcap, progress)
+        screen.print(f'bag: {shown(options.mcap)}')
     return 0

@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='adopt the reported effects until nothing is missing')
     parser.add_argument('--refit', metavar='RECORDING', nargs='*',
                         help='then fit the base model again with the added effects, as pprs fit '
-                        'does: to these recordings, or to those diagnosed')
+                        'does: to these recordings, or to the diagnosed ones')
     arguments.add_model_output(parser, 'model file that --adopt-all writes', required=False)
 
 
@@ -77,8 +77,8 @@ def _check(options: argparse.Namespace) -> None:
         raise arguments.UsageError('--adopt-all: no --output FILE is given, must say where the '
                                    'new model file goes')
     if options.refit is not None and not options.adopt_all:
-        raise arguments.UsageError('--refit: it is given without --adopt-all, which adds what the '
-                                   'base model is fitted again beside')
+        raise arguments.UsageError('--refit: it is given without --adopt-all, which adds the '
+                                   'effects that the base model is fitted again with')
     if options.refit is not None and options.reference is not None:
         raise arguments.UsageError('--refit: it is given with --reference, but the base is that of '
                                    'the reference: fit it to that by pprs fit')

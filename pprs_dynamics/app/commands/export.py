@@ -14,10 +14,10 @@ from typing import Any
 from pprs_dynamics.app.commands.arguments import output_file
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.terminal import console, shown, text_table
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.export.exported_robot import export_robot
 from pprs_dynamics.simulation.export.expressed import FORMATS, express
-from pprs_dynamics.simulation.export.replay import Replay, Replayed, replay_excitation
+from pprs_dynamics.simulation.export.replay import Replayed, replay
 from pprs_dynamics.simulation.export.writers import written
 from pprs_dynamics.system.output_files import write_text
 
@@ -38,11 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    model = load_model(options.file)
+    model = DriveModel.load(options.file)
     expressed = express(model, options.to)
     robot = export_robot(expressed, options.to)
     text = written(robot, options.to)
-    found = replay_excitation(model, Replay(expressed, robot, text, options.to))
+    found = replay(model, expressed, robot, text, options.to)
     write_text(options.output, text)
     if options.json:
         write_json(options.json, {'format': options.to, 'output': options.output,

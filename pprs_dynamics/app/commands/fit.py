@@ -21,8 +21,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     arguments.add_as_it_is(parser)
     arguments.add_validation(parser)
     arguments.add_model_output(parser, 'model file that is written')
-    parser.add_argument('--keep-residual', action='store_true', help='store the residual of these '
-                        'runs in the model file, as a reference that needs no files')
     arguments.add_details(parser)
     arguments.add_report(parser)
 
@@ -32,8 +30,7 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     inputs = read_inputs(options, screen)
     with staged_bar(screen) as progress:
-        result = fit(inputs.model, inputs, progress=progress,
-                     keep_residual=options.keep_residual)
+        result = fit(inputs.model, inputs, progress=progress)
     result.save(options.output)
     tell(result, options, screen)
     screen.print(f'model: {shown(options.output)}')

@@ -14,8 +14,8 @@ from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.terminal import console, shown
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import read_steps, without_last_step
-from pprs_dynamics.physics.model.model_file import load_model
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import find_file
 
@@ -25,7 +25,7 @@ EXAMPLE = 'pprs history better.yaml --report history.html'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     parser.add_argument('file', metavar='FILE', help='model file')
-    parser.add_argument('--undo', action='store_true', help='take the last step back')
+    parser.add_argument('--undo', action='store_true', help='undo the last step')
     add_model_output(parser, 'model file that --undo writes', required=False)
     add_report(parser, 'draw the falling error as a page')
 
@@ -39,10 +39,10 @@ def run(options: argparse.Namespace) -> int:
     from pprs_dynamics.app.report.history_report import history_page, history_view
 
     base = find_file(options.file)
-    model = load_model(base)
+    model = DriveModel.load(base)
     steps, unit = read_steps(model.values), common_effort(model.units)
     if options.undo and not steps:
-        print(f'pprs history: {options.file} holds no step that could be taken back',
+        print(f'pprs history: {options.file} has no step that could be undone',
               file=sys.stderr)
         return 1
     screen.print(history_view(steps, unit))
@@ -54,5 +54,5 @@ def run(options: argparse.Namespace) -> int:
     if options.undo:
         values, step = without_last_step(model.values)
         write_model(options.output, values, base)
-        screen.print(f'{step.effect} taken back: {shown(options.output)}')
+        screen.print(f'{step.effect} removed: {shown(options.output)}')
     return 0

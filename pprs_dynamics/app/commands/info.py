@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from pprs_dynamics.app.api.inputs import read_checked
@@ -17,9 +16,8 @@ from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.mechanism_description import (
     describe_mechanism,
     mechanism_lines,
-    write_mechanism_page,
 )
-from pprs_dynamics.app.report.tables import reading_table, recording_table
+from pprs_dynamics.app.report.tables import reading_table, recording_page, recording_table
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.inference.readings.findings import (
     Mistake,
@@ -27,11 +25,9 @@ from pprs_dynamics.inference.readings.findings import (
     columns_line,
     effort_looks_like,
 )
-from pprs_dynamics.measurement.files.recording import Summary, describe
+from pprs_dynamics.measurement.files.recording import Recording, Summary, describe
 from pprs_dynamics.measurement.files.repeats import find_repeat
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 EXAMPLE = 'pprs info run.mcap --model robot.yaml'
 
@@ -39,37 +35,41 @@ EXAMPLE = 'pprs info run.mcap --model robot.yaml'
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what the command takes."""
     add_recordings(parser, required=False)
-    add_report(parser, 'an arm or a robot with loops, drawn at home')
+    add_report(parser, 'draw positions and efforts over time')
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    model = load_model(options.model)
+    model = DriveModel.load(options.model)
     content: dict[str, Any] = {}
-    if isinstance(model, MechanismModel) and model.is_described:
+    if model.is_described:
         content['robot'] = describe_mechanism(model)
         for line in mechanism_lines(model):
             screen.print(shown(line))
         description = model.robot.structure.description
         for remark in (*description.faults, *description.remarks):
             screen.print(f'[yellow]![/] {shown(remark)}')
-        if options.report:
-            write_mechanism_page(options.report, model, Path(options.model).stem)
-    elif options.report or not options.recordings:
-        raise UsageError('a RECORDING is needed: without one, info tells of an arm or of a robot '
-                         'with loops, and --report draws it')
-    summaries = show_recordings(model, options.recordings, options.topic, screen)
+    elif not options.recordings:
+        raise UsageError('a RECORDING is needed: without one, info describes an arm or a robot '
+                         'with loops')
+    if options.report and len(options.recordings) != 1:
+        raise UsageError('--report shows one RECORDING: one must be given')
+    recordings, summaries = show_recordings(model, options.recordings, options.topic, screen)
+    if options.report:
+        recording_page(recordings[0], model.units).write(options.report)
+        screen.print(f'page: {shown(options.report)}')
     if options.json:
         write_json(options.json, {
-            **content, 'effort_looks_like': effort_looks_like(one.findings for one in summaries),
+            **content,
+            'effort_looks_like': effort_looks_like(summary.findings for summary in summaries),
             'recordings': [asdict(summary) for summary in summaries]})
     return 0
 
 
-def show_recordings(model: ForceModel, paths: Sequence[str], topic: str | None, screen: Any,
-                    by_column: bool = False) -> list[Summary]:
-    """Print what is in recordings, drive by drive or column by column, and what is wrong."""
+def show_recordings(model: DriveModel, paths: Sequence[str], topic: str | None, screen: Any,
+                    by_column: bool = False) -> tuple[list[Recording], list[Summary]]:
+    """Print recordings by drive or by column, and their faults, and return both."""
     with staged_bar(screen) as progress:
         recordings = [read_checked(model, path, topic, progress) for path in paths]
     summaries = [describe(recording) for recording in recordings]
@@ -79,7 +79,7 @@ def show_recordings(model: ForceModel, paths: Sequence[str], topic: str | None, 
             screen.print(table)
         for finding in summary.findings:
             screen.print(f'[yellow]![/] {shown(finding.text)}')
-        others = [one for one in summary.findings if isinstance(one, OtherReading)]
+        others = [finding for finding in summary.findings if isinstance(finding, OtherReading)]
         if line := columns_line(others, model.recorded.columns is not None):
             screen.print(f'  if so, write into the model file  {shown(line)}')
         for finding in summary.findings:
@@ -91,4 +91,4 @@ def show_recordings(model: ForceModel, paths: Sequence[str], topic: str | None, 
     if repeat is not None:
         index, clause = repeat
         screen.print(f'[yellow]![/] {shown(summaries[index].name)}: {shown(clause)}')
-    return summaries
+    return recordings, summaries

@@ -7,18 +7,15 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
-from collections.abc import Sequence
 from dataclasses import asdict
 from shlex import quote
 
-from pprs_dynamics.app.api.first_model import FirstModel, first_model
+from pprs_dynamics.app.api.first_model import first_model
 from pprs_dynamics.app.commands.arguments import MODEL, UsageError, number, output_file
 from pprs_dynamics.app.commands.info import show_recordings
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.mechanism_description import mechanism_lines
 from pprs_dynamics.app.report.terminal import console, shown
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
 
@@ -34,13 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         'files of one quantity each (q.csv tau.csv), or their folder, are one')
     parser.add_argument('--output', metavar='FILE.yaml', type=output_file(*MODEL),
                         default='robot.yaml', help='model file to write (default robot.yaml)')
-    parser.add_argument('--base', metavar='LINK', default='', help='the link that stands')
+    parser.add_argument('--base', metavar='LINK', default='', help='the link that does not move')
     parser.add_argument('--tool', metavar='LINK', default='', help='the link that carries the load')
     parser.add_argument('--drives', metavar='JOINT,JOINT', default='', help='the driven joints')
     parser.add_argument('--rate', metavar='HZ', type=number(0.0, FASTEST, 'Hz', above=True),
                         help='samples per second of a table without times')
-    parser.add_argument('--picture', metavar='FILE.png', type=output_file('.png', '.svg', '.pdf'),
-                        help='positions and efforts as they were read')
     parser.add_argument('--overwrite', action='store_true', help='replace --output where it is')
 
 
@@ -52,10 +47,9 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     drives = [name for name in options.drives.split(',') if name]
     first = first_model(options.robot, options.recordings, options.output, base=options.base,
-                        tool=options.tool, drives=drives, rate=options.rate,
-                        ask=_ask if sys.stdin.isatty() else None)
+                        tool=options.tool, drives=drives, rate=options.rate)
     write_text(options.output, first.text)
-    for line in mechanism_lines(first.model) if isinstance(first.model, MechanismModel) else ():
+    for line in mechanism_lines(first.model) if first.model.moves_joints else ():
         screen.print(shown(line))
     for note in first.notes:
         screen.print(f'[yellow]![/] {shown(note)}')
@@ -64,16 +58,16 @@ def run(options: argparse.Namespace) -> int:
         for line in first.questions:
             screen.print(f'  {shown(line)}')
         return 1
-    summaries = show_recordings(first.model, [str(one) for one in first.recordings], None, screen,
-                                by_column=True)
+    _, summaries = show_recordings(first.model, list(map(str, first.recordings)), None, screen,
+                                   by_column=True)
     screen.print(f'model: {shown(options.output)} (read its comments: they say what was guessed)')
-    names = ' '.join(quote(str(one)) for one in first.recordings) or 'RECORDING'
+    names = ' '.join(quote(str(recording)) for recording in first.recordings) or 'RECORDING'
     model = quote(options.output)
     if first.has_efforts:
         screen.print(f'[bold]Next[/] pprs fit {names} --model {model} --output base.yaml')
         screen.print(f'then pprs diagnose {names} --model base.yaml')
-        screen.print('What is wrong with the robot in a run becomes part of the model that is '
-                     'fitted to it: fit a healthy run without load, and diagnose another one.')
+        screen.print('A fault of the robot becomes part of the model that is fitted to it: fit a '
+                     'healthy run without load, and diagnose another one.')
     else:
         screen.print(f'[bold]Next[/] pprs info {names} --model {model}')
     if options.json:
@@ -82,40 +76,7 @@ def run(options: argparse.Namespace) -> int:
             'drives': list(first.model.drives),
             'recordings': [asdict(summary) for summary in summaries],
             'questions': list(first.questions)})
-    if options.picture:
-        write_picture(options.picture, first)
     if first.questions:
         screen.print('[bold]Not sure[/]: the lines are comments in the model file; write what is '
                      'true, or go on with --as-it-is')
     return 1 if first.questions else 0
-
-
-def write_picture(path: str, first: FirstModel) -> None:
-    """Write positions and efforts of a first model's recording over time, a row per drive."""
-    from matplotlib.figure import Figure
-
-    from pprs_dynamics.app.report.pictures import plot_series
-    from pprs_dynamics.measurement.files.recording import read_recording
-
-    model = first.model
-    recording = read_recording(first.recordings[0], model.recorded)
-    count = len(model.drives)
-    figure = Figure(figsize=(10.0, 1.0 + 1.8 * count), layout='constrained')
-    axes = figure.subplots(count, 2, squeeze=False)
-    for d, (drive, units) in enumerate(zip(model.drives, model.units, strict=True)):
-        for k, (values, unit) in enumerate(((recording.position, units.position),
-                                            (recording.effort, units.effort))):
-            plot_series(axes[d][k], recording.time, {drive: values[:, d]},
-                        f'{("position", "effort")[k]} [{unit}]')
-    figure.savefig(path)
-
-
-def _ask(question: str, answers: Sequence[str]) -> int:
-    """Ask in the terminal until an answer is one of those listed."""
-    while True:
-        print(question)
-        for k, answer in enumerate(answers, 1):
-            print(f'  {k}  {displayed(answer)}')
-        given = input(f'1 to {len(answers)} [1]: ').strip() or '1'
-        if given.isdecimal() and 1 <= int(given) <= len(answers):
-            return int(given) - 1

@@ -68,9 +68,6 @@ def tell(result: Result, options: argparse.Namespace, screen: Any,
 
     What else is given stands in the JSON, too.
     """
-    if view is None:
-        view = result.view(details=getattr(options, 'details', False))
-    screen.print(view)
     if options.json:
         write_json(options.json, {**result.to_dict(), **beside})
     if getattr(options, 'report', None):
@@ -78,5 +75,8 @@ def tell(result: Result, options: argparse.Namespace, screen: Any,
             progress('page', 0.0)
             made = (page or result.page)()
             made.record(result.record(shlex.join(['pprs', *getattr(options, 'words', ())])))
-            written = made.write(options.report)
-        screen.print(f'page: {shown(written)}')
+            made.write(options.report)
+    # Last: a reader of the text that goes away, as `head` does, ends the command.
+    screen.print(result.view(details=getattr(options, 'details', False)) if view is None else view)
+    if getattr(options, 'report', None):
+        screen.print(f'page: {shown(options.report)}')

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import io
 import os
 import re
 import signal
@@ -31,9 +32,8 @@ from pprs_dynamics.app.commands.arguments import (
     check_files,
     output_file,
 )
-from pprs_dynamics.app.commands.streams import lasting_output
 from pprs_dynamics.errors import MisreadError, PprsError, suggestion
-from pprs_dynamics.system.plain_text import displayed
+from pprs_dynamics.system.plain_text import PLAIN, displayed
 from pprs_dynamics.system.threads import use_one_thread
 
 # Each a module of this folder with a docstring, EXAMPLE, add_arguments and run.
@@ -51,8 +51,6 @@ examples:
   pprs simulate --output run.mcap --effect stribeck_friction
   pprs COMMAND --help
 """
-# Characters of an error: ten lines of a terminal, more than any sentence with usual names has.
-LONGEST_SENTENCE = 800
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -61,14 +59,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else list(arguments)
     if '_ARGCOMPLETE' in os.environ:
         _complete()
-    with lasting_output() as output, warnings.catch_warnings(), _cleaned_up():
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors=PLAIN)
+    with warnings.catch_warnings(), _cleaned_up():
         warnings.showwarning = _show_warning
-        status = _ended(given)
-    if output.error is None or isinstance(output.error, BrokenPipeError):
-        # A reader of our output that went away, e.g. `head`, had enough of it.
-        return status
-    _say(f'output: {output.error.strerror or output.error}', given)
-    return 2
+        return _ended(given)
 
 
 def _complete() -> None:
@@ -157,14 +153,7 @@ def _choose_model(options: argparse.Namespace) -> bool:
 
 def _say(sentence: str, given: Sequence[str]) -> None:
     command = next((f' {word}' for word in given if word in COMMANDS), '')
-    print(f'pprs{command}: {_short(sentence)}', file=sys.stderr)
-
-
-def _short(sentence: str) -> str:
-    """Return a sentence without the middle of a name or value that would fill the screen."""
-    if len(sentence) <= LONGEST_SENTENCE:
-        return sentence
-    return f'{sentence[:LONGEST_SENTENCE // 2]}…{sentence[-LONGEST_SENTENCE // 2:]}'
+    print(f'pprs{command}: {sentence}', file=sys.stderr)
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
@@ -179,7 +168,7 @@ class OneLineParser(argparse.ArgumentParser):
         """End with status 2."""
         unknown = re.match(r'unrecognized arguments: (--[^\s=]+)', message)
         hint = suggestion(unknown[1], self._options()) if unknown else ''
-        self.exit(2, f'{self.prog}: {_short(message)}{hint}\n')
+        self.exit(2, f'{self.prog}: {message}{hint}\n')
 
     def _options(self) -> list[str]:
         """Return the options of the command that was called, and of this parser."""
@@ -195,12 +184,6 @@ class OneLineParser(argparse.ArgumentParser):
             raise argparse.ArgumentError(action, f'unknown {action.metavar or "value"} {value!r}'
                                          f'{suggestion(str(value), known)}, must be one of '
                                          f'{", ".join(known)}')
-
-    def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
-        """Return the value of an argument; of `--model=--` argparse itself makes an empty list."""
-        if action.option_strings and arg_strings == ['--']:
-            raise argparse.ArgumentError(action, 'expected one argument')
-        return super()._get_values(action, arg_strings)
 
 
 def _formatter(prog: str) -> argparse.HelpFormatter:

@@ -48,7 +48,8 @@ def run(options: argparse.Namespace) -> int:
         written = [draw_figure_8(folder / 'figure_8.png', result),
                    draw_figure_9(folder / 'figure_9.png', result),
                    _write_curves(folder / 'forces.csv', result)]
-    content = {'equations': model.equations, 'claims': [asdict(claim) for claim in result.claims]}
+    content = {'equations': model.values['equations'],
+               'claims': [asdict(claim) for claim in result.claims]}
     for file in filter(None, (folder / 'claims.json', options.json)):
         write_json(file, content)
     screen.print(claims_table(result.claims))

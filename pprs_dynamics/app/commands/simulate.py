@@ -12,17 +12,16 @@ import argparse
 
 import numpy as np
 
-from pprs_dynamics.app.api.simulate import NOISE, RATE, simulate
+from pprs_dynamics.app.api.simulate import RATE, simulate
 from pprs_dynamics.app.commands.arguments import RECORDING, number, output_file, seed
 from pprs_dynamics.app.commands.input_output import tell
 from pprs_dynamics.app.report.terminal import console, shown, staged_bar
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
-from pprs_dynamics.simulation.injected_effects import INJECTED_EFFECTS, RANDOM
-from pprs_dynamics.simulation.mechanism_run import NAMES as ARM_EFFECTS
+from pprs_dynamics.simulation.injection import NAMES, RANDOM
 
 LONGEST = 3600.0  # [s], of an excitation: minutes of simulation, and hundreds of megabytes
 
@@ -35,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         required=True,
                         help='.mcap, .csv, or the name of a rosbag2 folder to make')
     parser.add_argument('--effect', metavar='NAME', action='append', default=[],
-                        choices=(*dict.fromkeys((*INJECTED_EFFECTS, *ARM_EFFECTS)), RANDOM),
+                        choices=(*NAMES, RANDOM),
                         help='an effect that the model does not know, drawn from the seed; may be '
                         'repeated; random, or a name of docs/effects.md')
     parser.add_argument('--seed', type=seed, default=0, help='of noise and effects (default 0)')
@@ -45,14 +44,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='of an excitation [s] (default 40)')
     parser.add_argument('--path-seed', type=seed, default=0, help='of an excitation (default 0)')
     parser.add_argument('--noise', type=number(0.0, 1e3, 'N'),
-                        help=f'of the efforts, standard deviation [N] (default {NOISE:g}; of other '
-                        'robots [N m, N] half a percent of the largest)')
+                        help='of the efforts, standard deviation [N m, N] (default half a percent '
+                        'of the largest)')
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command and return its exit status."""
     screen = console()
-    model = load_model(find_file(options.model))
+    model = DriveModel.load(find_file(options.model))
     motion = None if model.moves_joints else _motion(options)
     with staged_bar(screen) as progress:
         result = simulate(

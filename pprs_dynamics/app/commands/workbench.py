@@ -25,7 +25,7 @@ from pprs_dynamics.app.workbench.server.offered import Offered, is_folder
 from pprs_dynamics.app.workbench.server.serve import serve
 from pprs_dynamics.app.workbench.session_file import ENDING, SavedSession
 from pprs_dynamics.errors import MissingLibraryError
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.plain_text import displayed
 
 HOST = '127.0.0.1'
@@ -99,7 +99,7 @@ def _ros_name(text: str) -> str:
     return text
 
 
-def _live(options: argparse.Namespace, model: ForceModel) -> LiveSource:
+def _live(options: argparse.Namespace, model: DriveModel) -> LiveSource:
     try:
         from pprs_dynamics.ros.live_joint_states import LiveNodes
     except ImportError:

@@ -8,13 +8,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from itertools import islice
 from typing import Any
 
 from pprs_dynamics.errors import MissingLibraryError, PprsError
 
 LOOPBACK = '127.0.0.1'
-PER_WORKER = 4  # items in the cluster for each worker, so that none waits
 ALLOWED_FAILURES = 2  # workers that an item may lose before it is given up
 REACHED_WITHIN = '15s'  # the scheduler
 SILENCE = '60s'  # without a message a worker is killed and started again
@@ -79,19 +77,9 @@ def run_each(client: Any, work: Callable[[Any], Any], items: Iterable[Any],
     import distributed
 
     library: Any = distributed
-    waiting = iter(items)
-    queue, running = library.as_completed(loop=client.loop), {}
-
-    def submit(count: int) -> None:
-        for item in islice(waiting, count):
-            future = client.submit(work, item, pure=False)
-            running[future.key] = item
-            queue.add(future)
-
-    submit(PER_WORKER * max(len(client.ncores()), 1))
-    while running:
-        future = next(queue)
-        item = running.pop(future.key)
+    running = {client.submit(work, item, pure=False): item for item in items}
+    for future in library.as_completed(running, loop=client.loop):
+        item = running.pop(future)
         if future.status == 'finished':
             yield item, future.result(), None
         elif client.status != 'running' or future.status != 'error':
@@ -102,4 +90,3 @@ def run_each(client: Any, work: Callable[[Any], Any], items: Iterable[Any],
                                'or for lack of memory')
         else:
             yield item, None, f'{type(error).__name__}: {error}'
-        submit(1)

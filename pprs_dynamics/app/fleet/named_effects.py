@@ -26,10 +26,10 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import Parameter
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 
-def fit_named_effects(model: ForceModel, recording: Recording,
+def fit_named_effects(model: DriveModel, recording: Recording,
                       requests: Sequence[EffectRequest],
                       ) -> tuple[list[dict[str, Any]], Residuals, dict[str, float]]:
     """Return the values of named effects and of the model's numbers.
@@ -44,7 +44,7 @@ def fit_named_effects(model: ForceModel, recording: Recording,
     residuals : Residuals
         Of the model as given.
     noise : dict of str to float
-        That the fit leaves, by drive [N].
+        Noise of the fit, by drive [N].
 
     Raises
     ------
@@ -86,7 +86,7 @@ def _terms(design: Design, regression: Regression, request: EffectRequest) -> It
         else:
             # The best of the shapes tried, beside the model alone.
             alone = regression.fit(())
-            yield max(terms, key=lambda one: regression.gain(alone, _block(regression, one)))
+            yield max(terms, key=lambda term: regression.gain(alone, _block(regression, term)))
 
 
 def _block(regression: Regression, term: Term) -> Block:

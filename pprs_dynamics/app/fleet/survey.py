@@ -33,8 +33,7 @@ from pprs_dynamics.measurement.files.fingerprint import fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, describe, read_recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.plain_text import displayed
 from pprs_dynamics.system.threads import use_one_thread
 
@@ -43,7 +42,7 @@ FITTED, REFUSED = 'fitted', 'refused'  # verdicts: named effects were fitted; no
 # are checked. Wrong ones have an error as large as the effort.
 SUSPECT = 1.0
 
-model_of = lru_cache(maxsize=8)(load_model)
+model_of = lru_cache(maxsize=8)(DriveModel.load)
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,7 @@ def key(common: Mapping[str, Any]) -> str:
     return key_of(*(common[name] for name in ('sha256', 'robot', 'model', 'options', 'version')))
 
 
-def requests_of(options: str, model: ForceModel) -> tuple[EffectRequest, ...]:
+def requests_of(options: str, model: DriveModel) -> tuple[EffectRequest, ...]:
     """Return the effects that options name, as EFFECT or EFFECT:drive+drive; errors as theirs."""
     return tuple(EffectRequest.of(text.strip().replace('+', ','), tuple(model.drives)).placed(model)
                  for text in options.split(',') if text.strip())
@@ -100,7 +99,7 @@ Judged = tuple[list[dict[str, Any]], dict[str, dict[str, float]], str]
 """Rows of values, numbers by drive, and the verdict."""
 
 
-def _diagnosed(model: ForceModel, recording: Recording, job: SurveyJob) -> Judged:
+def _diagnosed(model: DriveModel, recording: Recording, job: SurveyJob) -> Judged:
     _refuse_mistakes(model, recording, job)
     diagnosis = diagnose(model, [recording])
     rows: list[dict[str, Any]] = []
@@ -116,7 +115,7 @@ def _diagnosed(model: ForceModel, recording: Recording, job: SurveyJob) -> Judge
     return rows, _drives(diagnosis.residuals, diagnosis.noise_floors), diagnosis.verdict
 
 
-def _fitted(model: ForceModel, recording: Recording, job: SurveyJob) -> Judged:
+def _fitted(model: DriveModel, recording: Recording, job: SurveyJob) -> Judged:
     # The check of units and signs takes longer than a fit: only a bad fit is checked.
     try:
         rows, residuals, noise = fit_named_effects(model, recording,
@@ -130,7 +129,7 @@ def _fitted(model: ForceModel, recording: Recording, job: SurveyJob) -> Judged:
     return rows, drives, FITTED
 
 
-def _refuse_mistakes(model: ForceModel, recording: Recording, job: SurveyJob) -> None:
+def _refuse_mistakes(model: DriveModel, recording: Recording, job: SurveyJob) -> None:
     for finding in find_mistakes(model, recording):
         raise UnreadableFileError(displayed(job.entry.path), finding.text)
 

@@ -123,13 +123,13 @@ def fleet_trends(store: str) -> FleetTrends:
         parameter='rms', value=rows.rms, unit='')
     values = pandas().concat([rows[rows.effect.notna()], errors]).dropna(subset='value')
     values = values.fillna({'drive': '', 'effect': '', 'parameter': '', 'unit': ''})
-    times = {key: one.groupby('sha256').time.first()
-             for key, one in rows.groupby(['robot', *SAME])}
+    times = {key: group.groupby('sha256').time.first()
+             for key, group in rows.groupby(['robot', *SAME])}
     groups = list(values.groupby([*SAME, *QUANTITY]))
     trends = []
-    for (model, options, version, *names), one in groups:
+    for (model, options, version, *names), entry in groups:
         robot, drive, effect, parameter, unit = names
-        series = one.set_index('sha256').value
+        series = entry.set_index('sha256').value
         series = series[~series.index.duplicated()]
         when = times[robot, model, options, version]
         if options == AUTO and _is_strength(effect, parameter):

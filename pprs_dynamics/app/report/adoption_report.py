@@ -22,7 +22,6 @@ from pprs_dynamics.app.report.terminal import (
     PlainTable,
     escape,
     stacked,
-    titled_table,
     verdict_panel,
 )
 from pprs_dynamics.inference.adoption.adoption import VALIDATION, Adoption
@@ -32,27 +31,28 @@ from pprs_dynamics.inference.diagnosis.sentences import sure_moments
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.system.plain_text import counted
 
 MOST_SHOWN = 6  # values without --details
 MOST_REMARKS = 2
 
 
-def adoption_view(answer: Adoption, details: bool = False) -> Any:
-    """Return what the terminal shows, most important first; all there is with `details`."""
-    return stacked(*(_parts if details else _brief)(answer))
-
-
 def run_view(run: AdoptionRun, details: bool = False) -> Any:
-    """Return what was adopted and refused, a line each, or all of each, and why it ended."""
-    steps = [adoption_view(step, True) if details else escape(headline(step))
-             for step in run.steps]
+    """Return the adopted and refused effects, a line or all values of each, and the reason to end.
+    """
+    steps = [adoption_view(step) if details else escape(headline(step)) for step in run.steps]
     return stacked(*steps, f'[bold]{run.ended}[/]: {escape(run.reason)}')
 
 
-def _brief(answer: Adoption) -> Iterator[Any]:
-    """Yield the answer, the fall of the error and the first values, in at most 20 lines."""
-    yield _verdict(answer)
+def adoption_view(answer: Adoption) -> Any:
+    """Return the answer for the terminal, in at most 20 lines."""
+    return stacked(*_parts(answer))
+
+
+def _parts(answer: Adoption) -> Iterator[Any]:
+    """Yield the answer, the fall of the error and the first values."""
+    word, colour = (('refused', 'red') if not answer.adopted else
+                    ('forced', 'yellow') if answer.forced else ('adopted', 'green'))
+    yield verdict_panel(word, colour, headline(answer))
     held = 'held-out recordings' if answer.held_out_on == VALIDATION else 'held-out blocks'
     for label, before, after in (('recordings', answer.error_before, answer.error_after),
                                  (held, answer.held_out_before, answer.held_out_after)):
@@ -62,15 +62,9 @@ def _brief(answer: Adoption) -> Iterator[Any]:
     for key, text in rows[:MOST_SHOWN]:
         yield f'  {escape(key)} = {escape(text)}'
     if len(rows) > MOST_SHOWN:
-        yield f'  … and {len(rows) - MOST_SHOWN} more, with --details'
+        yield f'  … and {len(rows) - MOST_SHOWN} more, with --json or --report'
     for remark in answer.remarks[:MOST_REMARKS]:
         yield f'[yellow]![/] {escape(remark)}'
-
-
-def _verdict(answer: Adoption) -> Any:
-    word, colour = (('refused', 'red') if not answer.adopted else
-                    ('forced', 'yellow') if answer.forced else ('adopted', 'green'))
-    return verdict_panel(word, colour, headline(answer))
 
 
 def headline(answer: Adoption) -> str:
@@ -89,11 +83,11 @@ def parameter_rows(answer: Adoption) -> list[tuple[str, str]]:
     With first moments of bodies that are sure where the mass is not.
     """
     effect = answer.request.effect
-    scales = {one.name: one.scale for one in effect.parameters}
-    rows = [(key, as_fitted(one.value, one.std, one.unit,
+    scales = {parameter.name: parameter.scale for parameter in effect.parameters}
+    rows = [(key, as_fitted(parameter.value, parameter.std, parameter.unit,
                             scales.get(effect.place_and_parameter(key)[1], inf)))
-            for key, one in answer.parameters.items() if one.value != 0.0]
-    return rows + [(key, with_uncertainty(one.value, one.std, one.unit)) for key, one in (
+            for key, parameter in answer.parameters.items() if parameter.value != 0.0]
+    return rows + [(key, with_uncertainty(entry.value, entry.std, entry.unit)) for key, entry in (
         (told.name, answer.moments[told.name])
         for told in sure_moments(effect, answer.parameters, answer.moments))]
 
@@ -107,23 +101,6 @@ def errors_table(answer: Adoption, first: str) -> PlainTable:
         for label, before, after in (
             ('recordings', answer.error_before, answer.error_after),
             (held, answer.held_out_before, answer.held_out_after))]
-
-
-def _parts(answer: Adoption) -> Iterator[Any]:
-    yield _verdict(answer)
-    yield titled_table('Error, rms over samples and drives', errors_table(answer, 'on'),
-                       caption=f'the noise is {in_unit(answer.noise_floor, answer.unit)}')
-    rows = parameter_rows(answer)
-    if rows:
-        yield titled_table(f'{answer.effect}, ± two standard deviations',
-                           (('parameter', 'value'), rows))
-    if answer.adopted and answer.calibrated:
-        clear = [one for one in answer.calibrated if abs(one.after - one.before) > 2 * one.std]
-        told = f', clearly {", ".join(one.label for one in clear)}' if clear else ''
-        yield escape(f'{counted(len(answer.calibrated), "number of the model")} moved as well'
-                     f'{told}')
-    for remark in answer.remarks:
-        yield f'[yellow]![/] {escape(remark)}'
 
 
 def adoption_page(answer: Adoption, recordings: Sequence[Recording],
@@ -141,43 +118,43 @@ def adoption_page(answer: Adoption, recordings: Sequence[Recording],
     before, after = answer.residuals_before, answer.residuals_after
     page = Page(f'{answer.effect}: ' + ('added to the model' if answer.adopted else 'refused'))
     page.text(headline(answer), 'lead')
-    page.sources(answer.before.source, [one.name for one in recordings],
-                 [one.name for one in validation])
+    page.sources(answer.before.source, [recording.name for recording in recordings],
+                 [recording.name for recording in validation])
     errors, fallen = rms_by_drive(before), rms_by_drive(after)
     with page.columns():
         page.errors([ErrorRow('all drives', answer.error_before, answer.error_after,
                               answer.noise_floor),
                      *(ErrorRow(name, errors[name], fallen[name], answer.noise_floors.get(name))
                        for name in errors)],
-                    f'Error on the recordings, rms [{answer.unit}], before (grey) and with it '
-                    '(blue); dotted: the noise.')
+                    f'Error on the recordings, rms [{answer.unit}], before (grey) and with the '
+                    'effect (blue); dotted: the noise.')
         most = max(answer.noise_floors, key=lambda name: errors[name] - fallen[name], default='')
         if most:
             page.figure(before_and_after(before, after, before.drives.index(most),
                                          answer.noise_floors[most]),
-                        f'{most}, where it changes most: effort and error, before and with it.',
+                        f'{most}, where the error falls most: effort and error.',
                         over_time=True)
     if answer.curve is not None:
         page.figure(curve_with_band(answer), 'The measured curve with two standard deviations, '
-                    'and what the model without it leaves: a table of correction, not a cause. '
-                    'Beyond the measured range it goes on with its last value.')
+                    'and the residual of the model without it. It is a correction table, not a '
+                    'cause. Beyond the measured range it is constant.')
     if command and answer.adopted:
-        page.command('See what is still missing', command)
-    page.table(*errors_table(answer, 'error on'), caption='What was fitted to, and what decides.')
+        page.command('Look for further effects', command)
+    page.table(*errors_table(answer, 'error on'), caption='Errors on fitted and on held-out data.')
     page.bullets(answer.remarks)
     if answer.parameters:
         page.table(('parameter', '± two standard deviations'), parameter_rows(answer),
-                   caption='Its values')
+                   caption='Fitted values')
     forces = {effect.name: after.parts[effect.name] for effect in answer.after.effects
               if isinstance(effect, CatalogueEffect) and effect.name in after.parts}
     if any(np.any(force) for force in forces.values()):
-        with page.fold('What each added effect contributes'):
-            add_contributions(page, after, forces, 'What each added effect contributes.')
+        with page.fold('Contribution of each added effect'):
+            add_contributions(page, after, forces, 'Contribution of each added effect.')
     add_every_drive(page, before, after, answer.noise_floors, f'before and with {answer.effect}')
     if answer.calibrated:
-        with page.fold('Numbers of the model that move within their tolerances'):
+        with page.fold('Numbers of the model that changed within their tolerances'):
             page.table(('number', 'before', 'after'),
-                       [(one.label, with_uncertainty(one.before, 0.0, one.unit),
-                         with_uncertainty(one.after, one.std, one.unit))
-                        for one in answer.calibrated])
+                       [(number.label, with_uncertainty(number.before, 0.0, number.unit),
+                         with_uncertainty(number.after, number.std, number.unit))
+                        for number in answer.calibrated])
     return page

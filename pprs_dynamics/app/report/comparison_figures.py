@@ -195,7 +195,7 @@ def _power(unit: str) -> str:
 def axis_of(variable: str, residuals: Residuals, drive: str = '') -> tuple[float, str]:
     """Return factor from SI and label of an axis: of one drive, or of all."""
     chosen = variable.partition(' of ')[2] or drive
-    found = list(dict.fromkeys(read_in(variable, residuals.units_of(one)) for one in (
+    found = list(dict.fromkeys(read_in(variable, residuals.units_of(entry)) for entry in (
         (chosen,) if chosen else residuals.drives)))
     unit = ' or '.join(unit for _, unit in found)
     return found[0][0], f'{in_words(variable)} [{unit}]'
@@ -229,7 +229,7 @@ def over_workspace(residuals: Residuals) -> Any | None:
 
 
 def spectrum(residuals: Residuals, comparison: Comparison) -> Any:
-    """Return the spectrum of each drive's error beside that of its noise."""
+    """Return the spectra of error and noise of each drive."""
     traces = []
     for drive, name in enumerate(residuals.drives):
         noise = comparison.localisation.drives[name].noise
@@ -252,7 +252,8 @@ def curves_of(residuals: Residuals, *values: Array) -> tuple[Array, ...]:
     at = shown_samples(residuals, *values)
     is_break = at < 0
     # A screen shows no more than single precision holds.
-    curves: list[Any] = [np.where(is_break, np.nan, one[at]).astype(np.float32) for one in values]
+    curves: list[Any] = [np.where(is_break, np.nan, value[at]).astype(np.float32)
+                         for value in values]
     return residuals.time[np.where(is_break, np.roll(at, 1), at)], *curves
 
 
@@ -263,7 +264,7 @@ def shown_samples(residuals: Residuals, *values: Array, points: int = charts.POI
     parts: list[np.typing.NDArray[np.int_]] = []
     for segment in segments:
         inside = np.flatnonzero(residuals.segment == segment)
-        at = charts.extremes(*(one[inside] for one in values),
+        at = charts.extremes(*(value[inside] for value in values),
                              points=max(50, points // len(segments)))
         parts += [inside[at], np.array([-1])]
     return np.concatenate(parts)

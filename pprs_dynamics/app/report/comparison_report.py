@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import accumulate
 from typing import Any
 
 from pprs_dynamics.app.report import comparison_figures as figures
@@ -16,13 +15,10 @@ from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.quantities import percent, plain, rounded_as, sentence
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
-NOWHERE = 'No place stands out: the error lies nowhere in particular.'
-FIRST = 3  # statements on the first screen
-# Lines that places take without --details, and characters of a line of 80 columns, which words
-# seldom fill.
-MOST_LINES, LINE = 9, 70
+NOWHERE = 'The error is not concentrated in any region.'
+FIRST = 3  # statements on the first screen, and without --details
 EFFORTS = ('rms', 'bias', 'peak', 'noise')
 
 
@@ -52,15 +48,14 @@ def comparison_view(comparison: Comparison, following: tuple[str, str], details:
         Everything, instead of at most 25 lines of 80 columns.
     beside : Beside, optional
     """
-    lines = [f'{number}. {one.text}' for number, one in enumerate(comparison.where, start=1)]
-    taken = accumulate(-(-len(line) // LINE) for line in lines)
-    told = [line for line, total in zip(lines, taken, strict=True)
-            if details or total <= MOST_LINES]
-    parts = [_drives_table(comparison), escape(comparison.verdict), *map(escape, told)]
+    lines = [f'{number}. {statement.text}'
+             for number, statement in enumerate(comparison.where, start=1)]
+    shown = lines if details else lines[:FIRST]
+    parts = [_drives_table(comparison), escape(comparison.verdict), *map(escape, shown)]
     if not lines:
         parts.append(NOWHERE)
-    if len(lines) > len(told):
-        parts.append(f'… and {len(lines) - len(told)} more, with --details, --json or --report')
+    if len(lines) > len(shown):
+        parts.append(f'… and {len(lines) - len(shown)} more, with --details, --json or --report')
     if details:
         parts += [escape(drive.verdict) for drive in comparison.drives.values()]
     if comparison.is_beyond_noise:
@@ -72,7 +67,8 @@ def comparison_view(comparison: Comparison, following: tuple[str, str], details:
 
 
 def _beside_table(comparison: Comparison, beside: Beside) -> Any:
-    rows = [*((name, one.rms, beside.drives.get(name)) for name, one in comparison.drives.items()),
+    rows = [*((name, drive.rms, beside.drives.get(name))
+              for name, drive in comparison.drives.items()),
             ('all', comparison.rms, beside.rms)]
     return text_table(
         ('drive', f'rms [{comparison.unit}]', f'rms, {beside.name}', 'change'),
@@ -94,7 +90,7 @@ def _drives_table(comparison: Comparison) -> Any:
 
 
 def comparison_page(
-    model: ForceModel, recordings: Sequence[Recording], residuals: Residuals,
+    model: DriveModel, recordings: Sequence[Recording], residuals: Residuals,
     comparison: Comparison, notes: Sequence[str], following: tuple[str, str] = ('', ''),
     beside: Beside | None = None,
 ) -> Page:
@@ -102,7 +98,7 @@ def comparison_page(
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings : sequence of Recording
     residuals : Residuals
     comparison : Comparison
@@ -126,7 +122,7 @@ def comparison_page(
                         f'Error, rms [{comparison.unit}]; dotted: the noise.'
                         + (f' Second bar: {beside.name}.' if beside else ''))
             if statements:
-                page.bullets([one.text for one in statements[:FIRST]], numbered=True)
+                page.bullets([statement.text for statement in statements[:FIRST]], numbered=True)
             else:
                 page.text(NOWHERE)
         if statements:
@@ -138,7 +134,7 @@ def comparison_page(
     if following[1] and comparison.is_beyond_noise:
         page.command(*following)
     page.folded_list(f'{len(statements) - FIRST} more places',
-                     [one.text for one in statements[FIRST:]])
+                     [statement.text for statement in statements[FIRST:]])
     with page.fold('Drive by drive'):
         page.table(*drives_table(comparison),
                    [drive.grade for drive in comparison.drives.values()])
@@ -152,10 +148,10 @@ def comparison_page(
                     residuals, drive)), f'{name}: effort, model and their difference.',
                     over_time=True)
     _by_drive(page, residuals, comparison)
-    page.folded_list('How it was computed', notes)
+    page.folded_list('Method', notes)
     findings = [f'{recording.name}: {finding.text}' for recording in recordings
                 for finding in recording.findings]
-    page.folded_list('What is wrong with the recordings', findings)
+    page.folded_list('Faults of the recordings', findings)
     return page
 
 
@@ -163,7 +159,7 @@ def _by_drive(page: Page, residuals: Residuals, comparison: Comparison) -> None:
     """Add figures of one drive at a time, the worst first."""
     names = list(comparison.drives)
     worst = max(names, key=lambda name: comparison.drives[name].unexplained)
-    with page.fold('Against what it may depend on'):
+    with page.fold('Error over other variables'):
         page.text('Mean error over bins, with two standard deviations under noise that is '
                   'correlated in time.', 'note')
         page.menu('Drive', names, worst)

@@ -39,10 +39,10 @@ def before_and_after(before: Residuals, after: Residuals, drive: int, floor: flo
         before, before.measured[:, drive], before.model[:, drive], after.model[:, drive])
     figure = effort_over_error(
         before, drive, time,
-        (('measured', measured, charts.MEASURED), ('model as given', given, charts.ERROR),
-         ('model with what was found', found, AFTER)),
-        (('error as given', measured - given, charts.ERROR),
-         ('error with what was found', measured - found, AFTER)))
+        (('measured', measured, charts.MEASURED), ('input model', given, charts.ERROR),
+         ('model with the reported effects', found, AFTER)),
+        (('error of the input model', measured - given, charts.ERROR),
+         ('error with the reported effects', measured - found, AFTER)))
     for level in (-2 * floor, 2 * floor):
         figure.add_hline(y=level, row=2, col=1, line={'color': FLOOR, 'width': 1, 'dash': 'dot'})
     return figure
@@ -61,7 +61,7 @@ def add_every_drive(page: Page, before: Residuals, after: Residuals,
 
 
 def curve_with_band(answer: Adoption) -> Any:
-    """Return a measured curve over its variable, its band, and the errors that it stands for."""
+    """Return a measured curve over its variable, its band, and the errors without it."""
     assert isinstance(answer.request, CurveRequest)
     assert answer.curve is not None
     after, curve = answer.residuals_after, answer.curve.curve
@@ -122,13 +122,13 @@ def effect_pictures(diagnosis: Diagnosis, found: FittedEffect,
                     ) -> list[tuple[Any, str]]:
     """Return what one effect has to explain and what it makes of it, with captions.
 
-    The first is along what it depends on, where that tells most of it; the last over time.
+    The first is over the variable that the effect depends on; the last is over time.
     """
     part = partial_residual(diagnosis, found)
     residuals = diagnosis.residuals
     drive = residuals.drives[part.drive]
     units = residuals.units_of(drive)
-    without, hover = 'measured, all but this in the model', charts.hover(units)
+    without, hover = 'measured minus the other effects', charts.hover(units)
     layout = {'hovermode': 'x unified', 'yaxis': {
         'title': f'force on {drive} [{units.effort}]', 'rangemode': 'tozero'}}
     figures = []
@@ -163,18 +163,20 @@ def unknown_picture(diagnosis: Diagnosis, statement: Statement) -> Any | None:
 def evidence_bars(diagnosis: Diagnosis) -> Any:
     """Return the evidence for each candidate for the first place."""
     unit = diagnosis.residuals.unit
-    ranked = sorted(diagnosis.candidates, key=lambda one: one.evidence)
-    adopted = {one.name for one in diagnosis.effects}
+    ranked = sorted(diagnosis.candidates, key=lambda candidate: candidate.evidence)
+    adopted = {effect.name for effect in diagnosis.effects}
     rivals = {name for names in diagnosis.indistinguishable for name in names[1:]}
-    colours = [charts.MODEL if one.name in adopted else RIVAL if one.name in rivals else OTHER
-               for one in ranked]
-    lowest, highest = (end(0.0, *(one.evidence for one in ranked)) for end in (min, max))
+    names = [candidate.name for candidate in ranked]
+    evidence = [candidate.evidence for candidate in ranked]
+    colours = [charts.MODEL if name in adopted else RIVAL if name in rivals else OTHER
+               for name in names]
+    lowest, highest = min(0.0, *evidence), max(0.0, *evidence)
     reach = highest - lowest or 1.0
     figure = charts.figure([charts.plotly_objects().Bar(
-        x=[one.evidence for one in ranked], y=[one.name for one in ranked], orientation='h',
-        marker={'color': colours}, text=[f'{one.evidence:.0f}' for one in ranked],
+        x=evidence, y=names, orientation='h',
+        marker={'color': colours}, text=[f'{value:.0f}' for value in evidence],
         textposition='outside', cliponaxis=False,
-        hovertext=[f'error after: {one.error_after:.3f} {unit}' for one in ranked],
+        hovertext=[f'error after: {candidate.error_after:.3f} {unit}' for candidate in ranked],
         hoverinfo='text')],
         90 + 26 * len(ranked), margin={**charts.MARGIN, 't': 15, 'r': 60},
         yaxis={'automargin': True}, xaxis={

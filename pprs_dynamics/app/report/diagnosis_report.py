@@ -51,13 +51,12 @@ ELSEWHERE = '[dim]Evidence, confirmation and all values: --details, or --report 
 LEGEND = '[dim]Cost terms: fit = misfit; coefficients = prior; others = model choices[/]'
 SEEN = 'Not seen, and from which size it would have been'
 METHOD = (
-    'Model and measured effort get the same treatment; every effect of the catalogue, in every '
-    'shape tried and on every drive, is a column of one regression beside the model\'s own numbers '
-    'as far as these are free.',
-    'Sets of effects and of patterns of no catalogue are compared by one cost: the penalised '
-    'deviance under noise that is correlated in time, whose spectrum is fitted anew for each set, '
-    'and prior costs for effects, drives, shapes and patterns that were tried. Evidence of an '
-    'effect is by how much more the best set without it costs, whatever stands there instead.')
+    'Model and measured effort are filtered alike. Every effect of the catalogue is a column of '
+    'one regression, in each shape and on each drive, together with the free numbers of the model.',
+    'Sets of effects are compared by one cost: the penalised deviance under noise that is '
+    'correlated in time, plus prior penalties. The spectrum of the noise is fitted for each set. '
+    'The evidence of an effect is the cost of the best set without it minus the cost of the '
+    'reported set.')
 
 
 def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False,
@@ -72,7 +71,7 @@ def diagnosis_view(diagnosis: Diagnosis, words: Sentences, details: bool = False
     details : bool
         Whether all is shown that there is.
     next_step : bool
-        Whether the command to go on with is told; not where it runs already.
+        Whether the next command is shown.
     """
     return stacked(*(_parts if details else _brief)(diagnosis, words),
                    *(_following(words) if next_step else ()),
@@ -130,7 +129,7 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     for number, finding in enumerate((*words.effects, *words.rivals, *words.unexplained), start=1):
         yield _finding(number, finding)
     values = fitted_values(diagnosis)
-    if len({(one.effect, one.drive) for one in values}) > MOST_LISTED:
+    if len({(value.effect, value.drive) for value in values}) > MOST_LISTED:
         yield _table('Values, ± two standard deviations', ('effect', 'drive', 'values'),
                      [tuple(map(escape, row)) for row in _joined(values)])
     if diagnosis.sets:
@@ -141,8 +140,8 @@ def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
     if diagnosis.candidates:
         yield _table('Each effect alone', (
             'effect', 'on', 'evidence', f'error after [{diagnosis.residuals.unit}]'), [
-            (one.name, sites(one.drives, diagnosis), f'{one.evidence:.0f}',
-             f'{one.error_after:.3f}') for one in diagnosis.candidates], right=(2, 3))
+            (candidate.name, sites(candidate.drives, diagnosis), f'{candidate.evidence:.0f}',
+             f'{candidate.error_after:.3f}') for candidate in diagnosis.candidates], right=(2, 3))
     if rows := detectable_rows(diagnosis):
         yield _table(SEEN, ('effect', 'size'), [tuple(map(escape, row)) for row in rows])
     yield from _list('Calibrated within their tolerance', words.calibrated, 'blue')
@@ -171,8 +170,9 @@ def _effect_rows(diagnosis: Diagnosis) -> list[tuple[str, ...]]:
 def _joined(values: Sequence[FittedValue]) -> list[tuple[str, str, str]]:
     """Return one row per effect and drive."""
     rows: dict[tuple[str, str], list[str]] = {}
-    for one in values:
-        rows.setdefault((one.effect, one.drive), []).append(f'{one.parameter.symbol} {one.text}')
+    for value in values:
+        rows.setdefault((value.effect, value.drive), []).append(
+            f'{value.parameter.symbol} {value.text}')
     return [(effect, drive, ', '.join(texts)) for (effect, drive), texts in rows.items()]
 
 
@@ -311,9 +311,9 @@ def _errors(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep]) -> Non
 
 
 def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
-    """Add the one picture that shows what was found."""
+    """Add the first picture: the unexplained pattern, or the first effect."""
     if diagnosis.depends_on:
-        statement = max(diagnosis.depends_on, key=lambda one: one.mean_square)
+        statement = max(diagnosis.depends_on, key=lambda statement: statement.mean_square)
         picture = figures.unknown_picture(diagnosis, statement)
         if picture is not None:
             page.figure(picture, f'What no effect explains, on {statement.drive}.')
@@ -330,7 +330,7 @@ def _findings(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
                 page.card(finding.title, _lines(finding, effect.effect.card_in(kind).equation),
                           figures.effect_pictures(diagnosis, effect))
     if words.unexplained:
-        with page.fold('What no effect of the catalogue explains'):
+        with page.fold('Patterns that no effect of the catalogue explains'):
             for finding, group in zip(words.unexplained, unexplained_groups(diagnosis),
                                       strict=True):
                 pictures = [(figures.unknown_picture(diagnosis, statement), f'{statement.drive}.')
@@ -377,22 +377,24 @@ def _contributions(page: Page, diagnosis: Diagnosis, steps: Sequence[ErrorStep])
     unit = diagnosis.residuals.unit
     where = ('the recordings given with --validate' if diagnosis.held_out_on == 'validation'
              else 'blocks of the same recordings, the weaker evidence')
-    with page.fold('What each effect does to the error'):
+    with page.fold('Error reduction by each effect'):
         if len(steps) > 2:
             page.errors([ErrorRow(f'+ {step.label}' if k else step.label, step.overall)
                          for k, step in enumerate(steps)],
                         f'Error over all drives, rms [{unit}], as one after the other is added; '
-                        f'both ends are what a comparison says, the noise is '
+                        f'the noise is '
                         f'{in_unit(diagnosis.noise_floor, unit)}.')
         page.table(('effect', 'evidence', f'error before [{unit}]', f'after [{unit}]',
                     f'held out before [{unit}]', f'after [{unit}]', 'on'), [
-            (one.name, f'{one.evidence:.0f}', f'{one.error_before:.3f}', f'{one.error_after:.3f}',
-             f'{one.held_out_before:.3f}', f'{one.held_out_after:.3f}',
-             sites(one.drives, diagnosis, one.places)) for one in diagnosis.effects],
+            (effect.name, f'{effect.evidence:.0f}', f'{effect.error_before:.3f}',
+             f'{effect.error_after:.3f}', f'{effect.held_out_before:.3f}',
+             f'{effect.held_out_after:.3f}',
+             sites(effect.drives, diagnosis, effect.places)) for effect in diagnosis.effects],
             caption='Error before: without the force of this effect, all else as fitted. '
             f'Held out before: fitted without it. Held out: {where}.')
         figures.add_contributions(page, diagnosis.residuals, {
-            one.name: one.force for one in diagnosis.effects}, 'What each effect contributes.')
+            effect.name: effect.force for effect in diagnosis.effects},
+            'Contribution of each effect.')
 
 
 def _parameters(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
@@ -400,6 +402,6 @@ def _parameters(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
     if values:
         with page.fold('Values'):
             page.table(('effect', 'drive', 'symbol', '± two standard deviations', 'parameter'),
-                       [(one.effect, one.drive, one.parameter.symbol, one.text,
-                         one.parameter.description) for one in values])
+                       [(value.effect, value.drive, value.parameter.symbol, value.text,
+                         value.parameter.description) for value in values])
     page.folded_list('Numbers of the model that moved within their tolerance', words.calibrated)

@@ -12,7 +12,7 @@ from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, titled_table
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_unit
-from pprs_dynamics.inference.experiments.arm_motions import ArmExcitation
+from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation
 from pprs_dynamics.inference.experiments.next_experiment import Experiment
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -26,15 +26,17 @@ HIGH = 0.5  # use of a limit, from which on it is shown
 def contests_table(experiment: Experiment) -> PlainTable:
     """Return pairs of effects with their evidence, now and expected."""
     return ('if the truth is', 'and the rival', 'evidence now', 'expected', 'chance'), [
-        (one.truth, one.rival, f'{one.now:.0f}', f'{one.expected:.0f}', f'{one.probability:.0%}')
-        for one in experiment.contests]
+        (contest.truth, contest.rival, f'{contest.now:.0f}', f'{contest.expected:.0f}',
+         f'{contest.probability:.0%}')
+        for contest in experiment.contests]
 
 
 def accuracies_table(experiment: Experiment) -> PlainTable:
     """Return numbers with their standard deviations, before and after."""
     return ('number', 'before', 'after', 'matters from', 'unit'), [
-        (one.label, _number(one.before), _number(one.after), f'{one.scale:.3g}', one.unit)
-        for one in experiment.accuracies]
+        (accuracy.label, _number(accuracy.before), _number(accuracy.after),
+         f'{accuracy.scale:.3g}', accuracy.unit)
+        for accuracy in experiment.accuracies]
 
 
 def limit_rows(experiment: Experiment) -> list[tuple[str, str]]:
@@ -51,21 +53,21 @@ def experiment_view(experiment: Experiment) -> Any:
     """Return what a motion is for, what it promises, and which limits it uses."""
     parts: list[Any] = [f'[bold]{escape(experiment.text)}[/]']
     if experiment.contests:
-        parts.append(titled_table('What it would tell', contests_table(experiment), right=()))
+        parts.append(titled_table('Expected evidence', contests_table(experiment), right=()))
     if experiment.accuracies:
         headings, rows = accuracies_table(experiment)
         parts.append(titled_table('Standard deviations', (headings, rows[:MOST_SHOWN]), right=()))
         if len(rows) > MOST_SHOWN:
             parts.append(f'… and {len(rows) - MOST_SHOWN} more, in --json')
     used = [row for row in limit_rows(experiment) if float(row[1].rstrip(' %')) >= 100 * HIGH]
-    parts.append('limits, of what their margin leaves: ' + ', '.join(
+    parts.append('use of the limits, less their margin: ' + ', '.join(
         f'{name} {share}' for name, share in used[:6]) + '; all others less')
     return stacked(*parts)
 
 
 def excitation_view(excitation: ArmExcitation) -> Any:
     """Return what an arm's first motion is for, and which limits it uses."""
-    return stacked(escape(excitation.text), 'limits, of what their margin leaves: ' + ', '.join(
+    return stacked(escape(excitation.text), 'use of the limits, less their margin: ' + ', '.join(
         f'{name} {share:.0%}' for name, share in excitation.limits.items()))
 
 
@@ -76,15 +78,15 @@ def experiment_page(experiment: Experiment, motion: Motion) -> Page:
     ----------
     experiment : Experiment
     motion : PlatformMotion or JointMotion
-        As it is written.
+        Sampled as in the file.
     """
     page = Page('The next experiment')
     page.text(experiment.text, 'lead')
     if experiment.contests:
         page.table(*contests_table(experiment),
-                   caption='What it would tell. Evidence is by how much the rival costs more in a '
-                   'diagnosis of all recordings; the chance is that of the rival falling so far '
-                   'behind that it is told as a rival no more.')
+                   caption='Evidence is the cost of the rival minus that of the truth, in a '
+                   'diagnosis of all recordings. The chance is that of the rival no longer '
+                   'being reported.')
     if isinstance(motion, PlatformMotion):
         page.figure(_platform(motion), 'The motion of the platform, from where it starts.',
                     over_time=True)
@@ -92,14 +94,14 @@ def experiment_page(experiment: Experiment, motion: Motion) -> Page:
         page.figure(_drives(experiment, motion),
                     'Position, velocity, acceleration and effort of every drive.', over_time=True)
     with page.fold('Use of the limits'):
-        page.figure(_limits(experiment), 'Use of every limit, of what the margin leaves of it; '
-                    'checked at 500 Hz. Dashed: all of it.')
+        page.table(('limit', 'use'), limit_rows(experiment),
+                   caption='Use of each limit, less its margin; checked at 500 Hz.')
     if experiment.accuracies:
         with page.fold('How well numbers would be known'):
             page.table(*accuracies_table(experiment), caption='Standard '
-                       'deviations; effects that may or may not be there each beside the model '
-                       'alone. A number of an effect matters from the size in the fourth column; '
-                       'for a number of the model that is what its tolerance says.')
+                       'deviations. Each uncertain effect is fitted alone with the model. A number '
+                       'matters from the size in the fourth column, which is the tolerance for '
+                       'numbers of the model.')
     return page
 
 
@@ -145,15 +147,4 @@ def _stacked(motion: Motion, rows: tuple[tuple[str, tuple[tuple[str, Array], ...
             figure.add_trace(charts.trace(time, shown, name, colour, legendgroup=name,
                                           showlegend=is_new), row=row, col=1)
         figure.update_yaxes(title_text=label, row=row, col=1)
-    return figure
-
-
-def _limits(experiment: Experiment) -> Any:
-    rows = limit_rows(experiment)[::-1]
-    figure = charts.figure([charts.plotly_objects().Bar(
-        x=[100 * experiment.limits[name] for name, _ in rows], y=[name for name, _ in rows],
-        orientation='h', marker_color=charts.LINES[0], hovertemplate='%{y}: %{x:.0f} %')],
-        70 + 20 * len(rows), xaxis_title='use [%]', yaxis={'automargin': True, 'dtick': 1},
-        margin={'l': 10, 'r': 20, 't': 20, 'b': 45})
-    figure.add_vline(x=100, line={'color': charts.LINES[1], 'dash': 'dash'})
     return figure

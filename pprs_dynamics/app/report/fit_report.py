@@ -14,14 +14,14 @@ from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import PlainTable, escape, plain_rows, stacked, text_table
 from pprs_dynamics.inference.diagnosis.quantities import plain, sentence, word_little
 from pprs_dynamics.inference.fit.base_fit import HALVES, RECORDINGS, VALIDATION, BaseFit
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 HELD_OUT = {RECORDINGS: 'each recording predicted from the others',
             HALVES: 'each half of the recording predicted from the other',
             VALIDATION: 'the validation recordings'}
 
 
-def errors_table(model: ForceModel, fit: BaseFit) -> PlainTable:
+def errors_table(model: DriveModel, fit: BaseFit) -> PlainTable:
     """Return drives, units, errors before, after and held out."""
     return ('drive', 'unit', 'before', 'after', 'held out'), [
         (drive, unit.effort, plain(fit.before[drive]), plain(fit.after[drive]),
@@ -32,26 +32,27 @@ def errors_table(model: ForceModel, fit: BaseFit) -> PlainTable:
 def numbers_table(fit: BaseFit) -> PlainTable:
     """Return the fitted numbers."""
     return ('number', 'drive', 'before', 'after', '± two std', 'unit'), [
-        (one.key, one.drive, plain(one.before), plain(one.after),
-         plain(2 * one.std) if isfinite(one.std) else '', one.unit) for one in fit.numbers]
+        (number.key, number.drive, plain(number.before), plain(number.after),
+         plain(2 * number.std) if isfinite(number.std) else '', number.unit)
+        for number in fit.numbers]
 
 
-def fit_view(model: ForceModel, fit: BaseFit, details: bool = False) -> Any:
+def fit_view(model: DriveModel, fit: BaseFit, details: bool = False) -> Any:
     """Return what the terminal shows: errors and notes; with `details` every number."""
     errors = text_table(*plain_rows(errors_table(model, fit)), right=(2, 3, 4),
                         title=f'Error, rms; held out: {HELD_OUT[fit.held_out_on]}')
     numbers = [text_table(*plain_rows(numbers_table(fit)), right=(2, 3, 4))] if details else []
-    headline = [escape(f'{word_little(fit.little)}, fitted as it is')] if fit.little else []
+    headline = [escape(f'{word_little(fit.little)}, fitted nevertheless')] if fit.little else []
     return stacked(*headline, errors, *map(escape, fit.told), *numbers)
 
 
-def fit_page(model: ForceModel, fit: BaseFit, recordings: Sequence[str],
+def fit_page(model: DriveModel, fit: BaseFit, recordings: Sequence[str],
              validate: Sequence[str]) -> Page:
     """Return the page of one fit.
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
         As it was.
     fit : BaseFit
     recordings, validate : sequence of str
@@ -59,7 +60,7 @@ def fit_page(model: ForceModel, fit: BaseFit, recordings: Sequence[str],
     """
     page = Page('Base model')
     if fit.little:
-        page.text(sentence(f'{word_little(fit.little)}, fitted as it is'), 'lead')
+        page.text(sentence(f'{word_little(fit.little)}, fitted nevertheless'), 'lead')
     held_out = f'; {", ".join(validate)} held out' if validate else ''
     page.text(f'Model: {Path(model.source).name or "built in memory"}. Fitted to '
               f'{", ".join(recordings)}{held_out}.', 'note')
@@ -68,7 +69,7 @@ def fit_page(model: ForceModel, fit: BaseFit, recordings: Sequence[str],
                 'Error, rms, before (grey) and with the fitted numbers (blue).')
     page.table(*errors_table(model, fit))
     page.text(f'Held out: {HELD_OUT[fit.held_out_on]}.', 'note')
-    page.bullets([sentence(one) for one in fit.told])
+    page.bullets([sentence(entry) for entry in fit.told])
     with page.fold('Every number'):
         page.table(*numbers_table(fit))
     return page

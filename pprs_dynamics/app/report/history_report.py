@@ -1,16 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A model's ledger: in the terminal, as a page, and the error's fall as a picture."""
+"""The ledger of a model, in the terminal and as a page."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import cycle
 from math import inf
 from typing import Any
 
-from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import ErrorRow, Page
 from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, text_table
 from pprs_dynamics.inference.diagnosis.quantities import change, in_unit, with_uncertainty
@@ -58,7 +56,7 @@ def details(step: Step) -> list[str]:
         found.append(f'{", ".join(step.rivals)} would explain the recordings as well')
     if step.forced:
         found.append(f'forced, in spite of this: {"; ".join(step.objections)}')
-    return [one for one in found if one]
+    return [entry for entry in found if entry]
 
 
 def _first_of(labels: Sequence[str]) -> str:
@@ -122,31 +120,4 @@ def history_page(name: str, steps: Sequence[Step], unit: str = 'N') -> Page:
     for number, step in enumerate(steps, start=1):
         page.heading(f'{number}. {step.effect}')
         page.bullets(details(step))
-    if first.measured:
-        with page.fold('Drive by drive'):
-            page.figure(falling_error_by_drive(steps, unit),
-                        'Error of every drive after each step.')
     return page
-
-
-def _levels(steps: Sequence[Step]) -> tuple[list[str], list[float], list[float], float]:
-    """Return labels, errors on recordings and on held-out data, and the noise."""
-    labels = ['before', *(f'{number}. {step.effect}' for number, step in enumerate(steps, 1))]
-    return (labels, [steps[0].error_before, *(step.error_after for step in steps)],
-            [steps[0].held_out_before, *(step.held_out_after for step in steps)],
-            steps[-1].noise_floor)
-
-
-def falling_error_by_drive(steps: Sequence[Step], unit: str) -> Any:
-    """Return the error on every drive that was measured all along, after each step."""
-    labels = _levels(steps)[0]
-    traces = []
-    for number, (drive, colour) in enumerate(zip(steps[0].measured, cycle(charts.LINES),
-                                                 strict=False)):
-        if all(drive in step.measured for step in steps):
-            errors = [steps[0].drive_errors_before[number],
-                      *(step.drive_errors_after[step.measured.index(drive)] for step in steps)]
-            traces.append(charts.trace(labels, errors, drive, colour, 2, mode='lines+markers',
-                                       hovertemplate=f'%{{y:.3f}} {unit}'))
-    return charts.figure(traces, 360, yaxis={'title': f'error, rms [{unit}]',
-                                             'rangemode': 'tozero'})

@@ -262,7 +262,7 @@ def _packed(name: str) -> str:
 @cache
 def assets() -> frozenset[str]:
     """Return the names of what `asset` has."""
-    return frozenset(one.name for one in files('pprs_dynamics.app').joinpath('browser').iterdir())
+    return frozenset(file.name for file in files('pprs_dynamics.app').joinpath('browser').iterdir())
 
 
 @cache

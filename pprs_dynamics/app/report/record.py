@@ -16,16 +16,16 @@ from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fin
 from pprs_dynamics.measurement.files.recording import Recording, describe
 
 if TYPE_CHECKING:
-    from pprs_dynamics.physics.model.force_model import ForceModel
+    from pprs_dynamics.physics.model.drive_model import DriveModel
 
 
-def record_of(model: ForceModel | None, recordings: Mapping[str, Recording],
+def record_of(model: DriveModel | None, recordings: Mapping[str, Recording],
               held_out: Mapping[str, Recording], command: str = '') -> list[tuple[str, str]]:
     """Return labelled lines.
 
     Parameters
     ----------
-    model : ForceModel or None
+    model : DriveModel or None
     recordings, held_out : mapping of str to Recording
         By path, or by a name that is none.
     command : str

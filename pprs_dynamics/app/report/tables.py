@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import Page
-from pprs_dynamics.app.report.terminal import escape, stacked, text_table
+from pprs_dynamics.app.report.terminal import escape, text_table
 from pprs_dynamics.drives import CHANNELS, DriveColumns, common_unit
 from pprs_dynamics.system.plain_text import counted
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from pprs_dynamics.drives import DriveUnits, RecordedDrives
     from pprs_dynamics.measurement.files.recording import Recording, Summary
     from pprs_dynamics.physics.model.reproduction import Claim
-    from pprs_dynamics.simulation.drive_control import Note
 
 
 def claims_table(claims: Iterable[Claim]) -> Any:
@@ -37,8 +36,8 @@ def claims_table(claims: Iterable[Claim]) -> Any:
 
 def recording_table(summary: Summary, units: Sequence[DriveUnits]) -> list[Any]:
     """Return what is in a recording, drive by drive; drives of one kind in one table."""
-    return [_recording_table(summary, kind, [name for name, one in zip(
-        summary.drives, units, strict=True) if one == kind]) for kind in dict.fromkeys(units)]
+    return [_recording_table(summary, kind, [name for name, entry in zip(
+        summary.drives, units, strict=True) if entry == kind]) for kind in dict.fromkeys(units)]
 
 
 def _recording_table(summary: Summary, units: DriveUnits, drives: Sequence[str]) -> Any:
@@ -88,11 +87,9 @@ def _span(bounds: tuple[float, float] | None) -> str:
     return 'none' if bounds is None else f'{bounds[0]:.4g} … {bounds[1]:.4g}'
 
 
-def simulation_view(samples: int, rate: float, hidden: int, notes: Iterable[Note]) -> Any:
-    """Return what a simulation made and what happened on the way; not what was hidden."""
-    told = [f'[yellow]{note.time:.2f} s {note.code}[/]: {escape(note.message)}' for note in notes]
-    return stacked(*told, f'{samples} samples at {rate:g} Hz, {hidden} hidden effect'
-                   f'{"s" * (hidden != 1)}')
+def simulation_view(samples: int, rate: float, hidden: int) -> str:
+    """Return the size of a simulated recording, without the names of its injected effects."""
+    return f'{samples} samples at {rate:g} Hz, {hidden} hidden effect{"s" * (hidden != 1)}'
 
 
 def recording_page(recording: Recording, units: Sequence[DriveUnits]) -> Page:

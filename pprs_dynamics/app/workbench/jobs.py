@@ -29,7 +29,7 @@ from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 RATE = 100.0  # of the poses of a designed motion [Hz], the default of play_trajectory
 Progress = Callable[[float], None]
@@ -167,14 +167,14 @@ class Jobs:
         return job.start()
 
 
-def _diagnosed(model: ForceModel, recordings: Sequence[Recording], reference: Reference | None,
+def _diagnosed(model: DriveModel, recordings: Sequence[Recording], reference: Reference | None,
                progress: Progress) -> Diagnosis:
     """Return a diagnosis without its searches, which are large."""
     return replace(diagnose(model, recordings, (), progress, reference=reference),
                    selection=None)
 
 
-def _designed(model: ForceModel, recordings: Sequence[Recording], duration: float,
+def _designed(model: DriveModel, recordings: Sequence[Recording], duration: float,
               progress: Progress) -> DesignedMotion:
     """Return the motion of `pprs next-experiment`."""
     found = next_experiment(model, recordings, duration=duration, progress=progress)

@@ -62,7 +62,7 @@ def quantity(fits: TickFits, view: ViewState, name: str, drive: int) -> Array:
     Raises
     ------
     ResidualsError
-        For a name that stands for nothing.
+        For an unknown name.
     """
     data = fits.design.residuals
     table = {'measured': fits.measured, 'error before': fits.before,
@@ -107,7 +107,7 @@ def shares_in(mask: Mask, fits: TickFits, view: ViewState) -> list[Share]:
         paid = max(offer.evidence, 0.0) / offer.gain if offer.gain > 0 else 0.0
         shares.append(Share(offer.candidate.name, names_of(offer.candidate, fits.drives),
                             explained, explained * paid))
-    return sorted(shares, key=lambda one: (-one.net, -one.explained))
+    return sorted(shares, key=lambda share: (-share.net, -share.explained))
 
 
 def _on(ticks: Ticks, drives: Sequence[str] | None) -> Mask:

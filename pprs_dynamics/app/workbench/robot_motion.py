@@ -42,13 +42,13 @@ def robot_motion(session: Session) -> RobotMotion:
     chosen = np.unique(np.linspace(0, len(data) - 1, MOST_POSES).astype(int))
     found: list[Skeleton] = []
     first = 0
-    for one in ticks.fits.design.reconstructions:
-        starts = one.treat.starts
+    for reconstruction in ticks.fits.design.reconstructions:
+        starts = reconstruction.treat.starts
         here = chosen[(chosen >= first) & (chosen < first + len(starts))] - first
         first += len(starts)
         if len(here):
-            found.append(Skeleton.of(ticks.model, one.motion[starts[here]]))
-    drawn = replace(found[0], points=np.concatenate([one.points for one in found]))
+            found.append(Skeleton.of(ticks.model, reconstruction.motion[starts[here]]))
+    drawn = replace(found[0], points=np.concatenate([entry.points for entry in found]))
     return RobotMotion(data.time[chosen], drawn,
                        _rms_between(ticks.fits.before, chosen),
                        _rms_between(ticks.view.residual, chosen))

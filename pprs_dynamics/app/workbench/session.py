@@ -13,17 +13,18 @@ from pprs_dynamics.app.api.inputs import Given, Inputs
 from pprs_dynamics.app.workbench import view_state
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.jobs import Jobs
+from pprs_dynamics.app.workbench.masks import shares_in, span_mask
 from pprs_dynamics.app.workbench.recordings import Recordings
 from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
 from pprs_dynamics.app.workbench.ticks import Ticks
-from pprs_dynamics.app.workbench.view_state import NOT_KNOWN, DriveError
+from pprs_dynamics.app.workbench.view_state import NOT_KNOWN, DriveError, Share
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.quantities import word_little
 from pprs_dynamics.inference.diagnosis.sentences import word_reference
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.system.numbers import finite
@@ -37,7 +38,7 @@ class Session:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings : mapping of str to Recording
         To fit to, by name.
     inputs : Inputs, optional
@@ -55,7 +56,7 @@ class Session:
         As `measure_residuals`.
     """
 
-    def __init__(self, model: ForceModel, recordings: Mapping[str, Recording],
+    def __init__(self, model: DriveModel, recordings: Mapping[str, Recording],
                  inputs: Inputs | None = None) -> None:
         if not recordings:
             raise SessionError('no recording is given, must be at least one')
@@ -147,6 +148,17 @@ class Session:
         return DriveError(root_mean_square(self.ticks.fits.before),
                           root_mean_square(self.ticks.view.residual),
                           root_mean_square(noise) if noise else NOT_KNOWN)
+
+    def shares(self, start: float, end: float, drives: Sequence[str] | None = None) -> list[Share]:
+        """Return the share of the squared error in a span [s] that each unticked effect explains.
+
+        Raises
+        ------
+        SessionError
+            For an unknown drive.
+        """
+        ticks = self.ticks
+        return shares_in(span_mask(ticks, start, end, drives), ticks.fits, ticks.view)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the page, without curves."""

@@ -20,8 +20,7 @@ from pprs_dynamics.app.api.inputs import Inputs
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.fingerprint import fingerprint
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.bounded_yaml import read_text
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
@@ -56,13 +55,13 @@ class SavedSession:
     ----------
     inputs : Inputs
         Recordings, and the model as it was given.
-    model : ForceModel
+    model : DriveModel
         With what was adopted.
     ticks : tuple of SavedTick
     """
 
     inputs: Inputs
-    model: ForceModel
+    model: DriveModel
     ticks: tuple[SavedTick, ...]
 
     def write(self, path: str | PathLike[str]) -> None:
@@ -88,10 +87,10 @@ class SavedSession:
             'recordings': _named(given.recordings), 'held_out': _named(given.validation),
             'topic': given.topic, 'as_it_is': given.as_it_is,
             'has_reference': given.reference is not None,
-            'reference': None if references is None else [str(Path(one).absolute())
-                                                          for one in references],
-            'ticks': [{'effect': one.effect, 'drives': one.drives, 'values': dict(one.values)}
-                      for one in self.ticks]}, indent=1))
+            'reference': None if references is None else [str(Path(path).absolute())
+                                                          for path in references],
+            'ticks': [{'effect': tick.effect, 'drives': tick.drives, 'values': dict(tick.values)}
+                      for tick in self.ticks]}, indent=1))
 
     @classmethod
     def read(cls, path: str | PathLike[str]) -> SavedSession:
@@ -115,14 +114,14 @@ class SavedSession:
             raise UnreadableFileError(path, f'is no session, must have the format {FORMAT!r}, as '
                                       'the workbench saves it')
         try:
-            given, now = (replace(build_model(found['model'][which]),
+            given, now = (replace(DriveModel.from_parameters(found['model'][which]),
                                   source=str(found['model']['source']))
                           for which in ('given', 'now'))
             recordings, held_out = (dict(found[which]) for which in ('recordings', 'held_out'))
             reference = tuple(found['reference'] or ()) if found['has_reference'] else None
-            ticks = tuple(SavedTick(one['effect'], None if one['drives'] is None
-                                    else tuple(one['drives']), dict(one['values']))
-                          for one in found['ticks'])
+            ticks = tuple(SavedTick(entry['effect'], None if entry['drives'] is None
+                                    else tuple(entry['drives']), dict(entry['values']))
+                          for entry in found['ticks'])
             topic, as_it_is = found['topic'] or None, bool(found['as_it_is'])
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise UnreadableFileError(

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Sets of effects around one model: fitted at the noise as it is, and with their own noise.
+"""Sets of effects on one model, fitted at given noise and with their own noise.
 
 At given noise a fit is linear and takes milliseconds, as all products of columns are summed up
 before. Noise, shapes and the exact forces of the fitted model follow after.
@@ -25,15 +25,19 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.estimates import Estimate, estimate
-from pprs_dynamics.inference.search.fitted_model import exact_forces, fitted_model, linear_residual
+from pprs_dynamics.inference.search.fitted_model import (
+    exact_forces,
+    fitted_model,
+    linear_residual,
+    linearised,
+)
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.relinearisation import relinearised
 from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 Place = tuple[int | None, str]
 """Drive, None in the structure, and name of a parameter."""
@@ -62,13 +66,13 @@ class Tick:
 
 @dataclass(frozen=True, eq=False)
 class Offer:
-    """An effect that takes no part, where it would pay best beside those that do.
+    """An unticked effect, on the drives where it reduces the cost most.
 
     Parameters
     ----------
     candidate : EffectCandidate
     gain, evidence : float
-        By which the penalised deviance would fall at the noise as it is; and less its prior cost.
+        Fall of the penalised deviance at given noise; and the same less the prior cost.
     residual : (M, D) array
         What would be left [N].
     """
@@ -85,14 +89,14 @@ class Exact:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     residual : (M, D) array
         Measured minus model [N].
     parameters : dict of str to dict of str to Estimate, optional
         By effect, where they were found around the fitted model.
     """
 
-    model: ForceModel
+    model: DriveModel
     residual: Array = field(repr=False)
     parameters: dict[str, dict[str, Estimate]] | None = None
 
@@ -102,8 +106,8 @@ class TickFits:
 
     Parameters
     ----------
-    model : ForceModel
-        As it is; its numbers count from where its ledger says they began.
+    model : DriveModel
+        In force. Its ledger gives the values that estimates count from.
     recordings : sequence of Recording
     reference : Reference, optional
         Whose forces are taken from all errors.
@@ -111,7 +115,7 @@ class TickFits:
     Attributes
     ----------
     before : (M, D) array
-        What the model as it is leaves [N].
+        Residual of the model [N].
     since : SinceReference or None
         What the reference says of the recordings.
 
@@ -121,7 +125,7 @@ class TickFits:
         As `measure_residuals` and `Regression`.
     """
 
-    def __init__(self, model: ForceModel, recordings: Sequence[Recording],
+    def __init__(self, model: DriveModel, recordings: Sequence[Recording],
                  reference: Reference | None = None) -> None:
         self.model, self.recordings = model, tuple(recordings)
         start = original(model)
@@ -156,7 +160,7 @@ class TickFits:
 
     def offered(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
                 found: CandidateSet) -> EffectCandidate | None:
-        """Return an effect on some drives, or where it pays best beside a set.
+        """Return an effect on some drives, or where it reduces the cost of a set most.
 
         In the best shape that a scan knows at the noise of the set; None where it cannot act.
         """
@@ -176,27 +180,28 @@ class TickFits:
             scanned = components.local[d].offers(found.fit).get(effect.name)
             if scanned is not None:
                 return scanned[0]
-        there = [one for one in components.spanning if one.effect is effect and one.drive == d]
+        there = [component for component in components.spanning
+                 if component.effect is effect and component.drive == d]
         # All have the same prior cost.
-        return max(there, key=lambda one: self.fits.regression.gain(
-            found.fit, components.block(one)), default=None)
+        return max(there, key=lambda component: self.fits.regression.gain(
+            found.fit, components.block(component)), default=None)
 
     def _proposed(self, found: CandidateSet) -> list[EffectCandidate]:
-        """Return every effect where it pays best beside a set."""
+        """Return every effect on the drives where it reduces the cost of a set most."""
         added = (sets[-1] for sets in self.scan.proposals(found, least=-np.inf))
-        return [one for one in added if isinstance(one, EffectCandidate)]
+        return [candidate for candidate in added if isinstance(candidate, EffectCandidate)]
 
     def offers(self, found: CandidateSet) -> list[Offer]:
-        """Return what every effect that is not in a set would gain beside it, the best first."""
+        """Return the gain of every effect that is not in a set, the best first."""
         there = {c.effect for c in found.effects}
         # A fit that was ended before it stood still has the deviance of the noise before.
         found = self.at(found.effects, found)
         with self._scanning:
-            return sorted((self.offer(found, one) for one in self._proposed(found)
-                           if one.effect not in there), key=lambda one: -one.evidence)
+            return sorted((self.offer(found, candidate) for candidate in self._proposed(found)
+                           if candidate.effect not in there), key=lambda offer: -offer.evidence)
 
     def offer(self, found: CandidateSet, candidate: EffectCandidate) -> Offer:
-        """Return what one candidate would gain beside a set at its noise."""
+        """Return the gain of one candidate in addition to a set, at its noise."""
         more = self.at((*found.effects, candidate), found)
         return Offer(candidate, found.fit.deviance - more.fit.deviance, found.total - more.total,
                      self.residual(more).astype(np.float32))
@@ -204,10 +209,10 @@ class TickFits:
     def with_chosen(self, tick: Tick) -> EffectCandidate:
         """Return a tick's candidate in the shapes that somebody chose."""
         placements = []
-        for one in tick.best.components:
-            shape = {name: tick.chosen.get((one.drive, name), value)
-                     for name, value in one.shape}
-            placements.append(replace(one, shape=tuple(sorted(shape.items()))))
+        for component in tick.best.components:
+            shape = {name: tick.chosen.get((component.drive, name), value)
+                     for name, value in component.shape}
+            placements.append(replace(component, shape=tuple(sorted(shape.items()))))
         return EffectCandidate.of(placements)
 
     # Fits
@@ -217,7 +222,7 @@ class TickFits:
         return self.fits.at_noise_of(near, tuple(candidates))
 
     def fitted(self, candidates: Sequence[EffectCandidate]) -> CandidateSet:
-        """Return a set with the noise fitted beside it."""
+        """Return a set with its own noise."""
         return self.fits.evaluate(tuple(candidates))
 
     def refined(self, found: CandidateSet) -> CandidateSet:
@@ -248,7 +253,7 @@ class TickFits:
     # What a set says
 
     def residual(self, found: CandidateSet) -> Array:
-        """Return what the linear fit leaves, (M, D) [N]."""
+        """Return the residual of the linear fit, (M, D) [N]."""
         return linear_residual(self.fits, found)
 
     def values(self, found: CandidateSet) -> dict[str, dict[str, float]]:
@@ -256,9 +261,9 @@ class TickFits:
         values: dict[str, dict[str, float]] = {}
         for candidate in found.effects:
             mine = values[candidate.name] = {}
-            for one in candidate.components:
-                every = {**one.values(found.coefficients(one)), **one.parameters}
-                mine.update({self.key(one.drive, name): float(value)
+            for component in candidate.components:
+                every = {**component.values(found.coefficients(component)), **component.parameters}
+                mine.update({self.key(component.drive, name): float(value)
                              for name, value in every.items()})
         return values
 
@@ -272,7 +277,7 @@ class TickFits:
         return name if drive is None else f'{self.drives[drive]}.{name}'
 
     def exact(self, found: CandidateSet, is_free: bool) -> Exact:
-        """Return the fitted model and what it leaves, with nothing linear about it.
+        """Return the fitted model and its residual, evaluated without linearisation.
 
         Where an effect of the set is nonlinear, and nothing is held, the set is fitted around
         its own model first.
@@ -284,7 +289,7 @@ class TickFits:
         """
         fits, parameters = self.fits, None
         if is_free and any(c.effect.nonlinear for c in found.effects):
-            fits, found = relinearised(fits, found)
+            fits, found = linearised(fits, found)
             parameters = {c.name: estimate(fits, found, c, True).parameters for c in found.effects}
         model = fitted_model(fits, found)
         return Exact(model, self.measured - exact_forces(fits.design, model), parameters)

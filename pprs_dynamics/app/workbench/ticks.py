@@ -17,7 +17,7 @@ from pprs_dynamics.app.workbench.tick_fits import Place, Tick, TickFits
 from pprs_dynamics.app.workbench.view_state import ViewState
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MOST_MOMENTS = 200  # that undo remembers; a moment is a few kilobytes
 
@@ -27,7 +27,7 @@ class Moment:
     """State before a deed: the model, the ticks, and the revision at which their fits began."""
 
     deed: str
-    model: ForceModel = field(repr=False)
+    model: DriveModel = field(repr=False)
     ticks: Mapping[str, Tick]
     fitted_since: int
 
@@ -40,7 +40,7 @@ class Ticks:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     inputs : Inputs
         Recordings.
 
@@ -61,7 +61,7 @@ class Ticks:
         As `measure_residuals`.
     """
 
-    def __init__(self, model: ForceModel, inputs: Inputs) -> None:
+    def __init__(self, model: DriveModel, inputs: Inputs) -> None:
         self.inputs, self.revision = inputs, 0
         self._lock, self._settling = RLock(), RLock()
         self._listeners: list[Callable[[], None]] = []
@@ -70,11 +70,11 @@ class Ticks:
         self.use(self.fits_of(model))
 
     @property
-    def model(self) -> ForceModel:
+    def model(self) -> DriveModel:
         """Model in force, with all adopted effects."""
         return self.fits.model
 
-    def fits_of(self, model: ForceModel, inputs: Inputs | None = None) -> TickFits:
+    def fits_of(self, model: DriveModel, inputs: Inputs | None = None) -> TickFits:
         """Return the fits of a model to these recordings, or to others."""
         inputs = inputs or self.inputs
         return TickFits(model, inputs.fitted, inputs.reference)
@@ -229,7 +229,7 @@ class Ticks:
                         self.notify()
             return self.view
 
-    def ticked_model(self) -> ForceModel:
+    def ticked_model(self) -> DriveModel:
         """Return the model with the ticked effects, without an entry in the ledger.
 
         Raises

@@ -19,13 +19,12 @@ from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.drives import DriveUnits, common_effort
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.sentences import word_terms
-from pprs_dynamics.inference.search.candidates import CandidateSet, EffectCandidate
-from pprs_dynamics.inference.search.cost_terms import CostTerms
+from pprs_dynamics.inference.search.candidates import CandidateSet, CostTerms, EffectCandidate
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.numbers import finite
 
 # How far a fit has come: at the noise of the fit before; with its own; with its shapes where the
@@ -83,7 +82,7 @@ class ViewState:
     free, found : CandidateSet
         The best fit of the ticked effects; and with what somebody chose, at the same noise.
     residual : (M, D) array
-        What is left [N].
+        With the ticked effects [N].
     estimates : mapping of str to mapping of str to Estimate
         By effect, of the values that are shown; NaN where the deviation is not known yet.
     stage : {'linear', 'fitted', 'refined', 'exact'}
@@ -133,7 +132,7 @@ class ViewState:
 
 
 def without_ticks(fits: TickFits, revision: int) -> ViewState:
-    """Return what is shown of a model as it is."""
+    """Return the view of a model without ticks."""
     return ViewState(revision, {}, fits.none, fits.none, fits.before, {}, FITTED)
 
 
@@ -141,7 +140,7 @@ def linear(fits: TickFits, last: ViewState, ticks: Mapping[str, Tick], revision:
     """Return what is shown of ticks at the noise of the state before, in milliseconds."""
     free = fits.at([tick.best for tick in ticks.values()], last.free)
     found = _with_chosen(fits, free, ticks)
-    stds = {name: {key: one.std for key, one in last.estimates[name].items()}
+    stds = {name: {key: estimate.std for key, estimate in last.estimates[name].items()}
             for name in ticks if name in last.estimates
             and last.ticks[name].best is ticks[name].best}
     values = {name: {key: Estimate(value, stds.get(name, {}).get(key, NOT_KNOWN), '')
@@ -181,7 +180,7 @@ def following(fits: TickFits, view: ViewState) -> Iterator[ViewState]:
 def _fitted(fits: TickFits, view: ViewState, free: CandidateSet, stage: str) -> ViewState:
     without = {}
     for candidate in free.effects:
-        rest = [one for one in free.effects if one is not candidate]
+        rest = [effect for effect in free.effects if effect is not candidate]
         without[candidate.name] = fits.fitted(rest).terms - free.terms
     free = fits.at(free.effects, free)
     found = _with_chosen(fits, free, view.ticks)
@@ -197,7 +196,7 @@ def _with_chosen(fits: TickFits, free: CandidateSet, ticks: Mapping[str, Tick]) 
     return fits.held(shaped, list(ticks.values()))
 
 
-def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: ForceModel,
+def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: DriveModel,
                    called_for: Set[str] | None) -> dict[str, Any]:
     """Return all that is shown of one effect.
 
@@ -205,13 +204,13 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: ForceM
     ----------
     view : ViewState
     effect : type of CatalogueEffect
-    model : ForceModel
+    model : DriveModel
     called_for : set of str or None
         Effects that the diagnosis calls for; None where there is none yet.
     """
     card, drives = effect.card_in(model.kind), model.drives
     tick = view.ticks.get(effect.name)
-    offer = next((one for one in view.offers if one.candidate.effect is effect), None)
+    offer = next((offer for offer in view.offers if offer.candidate.effect is effect), None)
     candidate = tick.best if tick else offer.candidate if offer else None
     without = view.without.get(effect.name) if tick else None
     evidence = without.total if without else offer.evidence if offer and not tick else None
@@ -229,7 +228,7 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: ForceM
         'parameters': _parameters(view, effect, model) if tick else []}
 
 
-def units_to_dict(model: ForceModel) -> dict[str, Any]:
+def units_to_dict(model: DriveModel) -> dict[str, Any]:
     """Return the units of all drives together, and drive by drive."""
     return {'unit': common_effort(model.units), 'units': {
         drive: {'effort': unit.effort, 'position': unit.position, 'velocity': unit.of('m/s'),
@@ -237,7 +236,7 @@ def units_to_dict(model: ForceModel) -> dict[str, Any]:
         for drive, unit in zip(model.drives, model.units, strict=True)}}
 
 
-def _parameters(view: ViewState, effect: type[CatalogueEffect], model: ForceModel,
+def _parameters(view: ViewState, effect: type[CatalogueEffect], model: DriveModel,
                 ) -> list[dict[str, Any]]:
     drives = model.drives
     units = dict(zip(drives, model.units, strict=True))
@@ -246,13 +245,13 @@ def _parameters(view: ViewState, effect: type[CatalogueEffect], model: ForceMode
     known = {parameter.name: parameter for parameter in effect.parameters}
     shapes = {parameter.name for parameter in effect.shape}
     rows = []
-    for key, one in view.estimates.get(effect.name, {}).items():
+    for key, each in view.estimates.get(effect.name, {}).items():
         drive, name = effect.place_and_parameter(key)
         unit = units.get(drive, DriveUnits())
         parameter = known[name].of(unit.turns)
         rows.append({
-            'key': key, 'symbol': parameter.symbol, 'value': finite(one.value),
-            'std': finite(one.std), 'description': parameter.description,
+            'key': key, 'symbol': parameter.symbol, 'value': finite(each.value),
+            'std': finite(each.std), 'description': parameter.description,
             'unit': unit.of(parameter.unit),
             'lower': parameter.lower, 'upper': parameter.upper, 'scale': parameter.scale,
             'is_shape': parameter.name in shapes, 'is_relative': parameter.is_relative,
@@ -265,8 +264,9 @@ def recordings_to_dict(recordings: Mapping[str, Recording], fits: TickFits, now:
     """Return every recording with its times and its error before and now."""
     found, first = [], 0
     time = fits.design.residuals.time
-    for (key, recording), one in zip(recordings.items(), fits.design.reconstructions, strict=True):
-        part = slice(first, first + len(one.treat.starts))
+    for (key, recording), reconstruction in zip(
+            recordings.items(), fits.design.reconstructions, strict=True):
+        part = slice(first, first + len(reconstruction.treat.starts))
         first = part.stop
         found.append({
             'key': key, 'name': recording.name,

@@ -35,6 +35,7 @@ from pprs_dynamics.inference.diagnosis.quantities import change, listed, plain
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
+from pprs_dynamics.inference.search.decisions import outside_cost
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.inference.search.held_out import PredictiveGain, predictive_gain
 from pprs_dynamics.inference.search.table import Row
@@ -42,9 +43,9 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.measured_curve import OF, OWN
-from pprs_dynamics.physics.model.force_model import ACTIVE_FRICTION, PASSIVE_FRICTION, ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.forces import ACTIVE_FRICTION, PASSIVE_FRICTION
 from pprs_dynamics.physics.model.ledger import original_values
-from pprs_dynamics.physics.model.model_file import build_model
 
 DIAGNOSED = 0.8  # share of the work that a diagnosis is, for the progress bar
 # Standard errors by which the first effect, and further ones, must lower the held-out error.
@@ -55,7 +56,7 @@ WEAK = 'Held-out blocks of the same recordings are weak evidence; confirm with -
 
 
 def adopt(
-    model: ForceModel, request: EffectRequest | CurveRequest, recordings: Sequence[Recording],
+    model: DriveModel, request: EffectRequest | CurveRequest, recordings: Sequence[Recording],
     validate: Sequence[Recording] = (), force: bool = False,
     progress: Callable[[float], None] | None = None, diagnosis: Diagnosis | None = None,
     reference: Reference | None = None,
@@ -67,7 +68,7 @@ def adopt(
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     request : EffectRequest or CurveRequest
     recordings : sequence of Recording
         To fit to.
@@ -109,7 +110,7 @@ def adopt(
     return answer
 
 
-def original(model: ForceModel) -> ForceModel:
+def original(model: DriveModel) -> DriveModel:
     """Return a model with its numbers as they were before anything was fitted to them.
 
     Tolerances are limits about what the file said at first. Counted from the last fit, they
@@ -118,14 +119,14 @@ def original(model: ForceModel) -> ForceModel:
     values = original_values(model.values)
     if all(values[key] == value for key, value in model.values.items()):
         return model
-    return replace(build_model(values), source=model.source)
+    return replace(DriveModel.from_parameters(values), source=model.source)
 
 
 @dataclass(frozen=True)
 class _Case:
     """A request with everything that decides about it."""
 
-    model: ForceModel
+    model: DriveModel
     request: EffectRequest | CurveRequest
     recordings: Sequence[Recording]
     validate: Sequence[Recording]
@@ -139,7 +140,7 @@ class _Case:
         return ('the validation recordings' if self.validate
                 else 'held-out blocks of the recordings')
 
-    def errors(self, recordings: Sequence[Recording], *models: ForceModel) -> list[Residuals]:
+    def errors(self, recordings: Sequence[Recording], *models: DriveModel) -> list[Residuals]:
         """Return the residuals of models, less the error that a reference has as well."""
         found = [measure_residuals(model, recordings)[0] for model in models]
         if self.reference is None:
@@ -147,6 +148,8 @@ class _Case:
         shown = self.reference.shown_by(recordings)
         return [replace(one, measured=one.measured - shown) for one in found]
 
+    @outside_cost('adopt refuses an effect that does not lower the error, on the recordings and '
+                  'held out')
     def objections(self, gain: PredictiveGain | None, residuals: Sequence[Residuals],
                    where: str) -> list[str]:
         """Return why an effect does not lower the error on some data for certain; none if it does.
@@ -176,7 +179,7 @@ class _Case:
                 f'must be more than {asked:g}']
 
     def answer(
-        self, after: ForceModel, drives: tuple[str, ...] | None, found: list[str],
+        self, after: DriveModel, drives: tuple[str, ...] | None, found: list[str],
         remarks: list[str], residuals: Sequence[Residuals],
         held_out: Sequence[float], parameters: dict[str, Estimate],
         calibrated: tuple[Calibration, ...] = (), rivals: tuple[str, ...] = (),
@@ -271,7 +274,8 @@ def _of_table(case: _Case, row: Row, effect: FoundEffect) -> list[str]:
     return [f'the recordings do not support {request.name}: {more} than the model without it']
 
 
-def _of_friction(places: Sequence[str], model: ForceModel, residuals: Residuals) -> list[str]:
+@outside_cost('adopt refuses friction that pushes along the motion')
+def _of_friction(places: Sequence[str], model: DriveModel, residuals: Residuals) -> list[str]:
     """Return whether friction of a model would push along the motion; '' is all joints."""
     own, passive = np.zeros((2, *residuals.model.shape))
     for effect in model.effects:

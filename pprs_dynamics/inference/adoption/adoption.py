@@ -13,7 +13,7 @@ from pprs_dynamics.inference.adoption.fit_curve import CurveRequest, FittedCurve
 from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 BLOCKS, VALIDATION = 'blocks', 'validation'
 
@@ -37,7 +37,7 @@ class Adoption:
         Numbers of the model that moved within their tolerances.
     rivals : tuple of str
         Effects that explain the recordings as well.
-    before, after : ForceModel
+    before, after : DriveModel
         As given; and with the effect. The latter is the former where the effect gives no model.
     residuals_before, residuals_after : Residuals
         On the recordings.
@@ -66,8 +66,8 @@ class Adoption:
     parameters: dict[str, Estimate]
     calibrated: tuple[Calibration, ...]
     rivals: tuple[str, ...]
-    before: ForceModel
-    after: ForceModel
+    before: DriveModel
+    after: DriveModel
     residuals_before: Residuals
     residuals_after: Residuals
     error_before: float

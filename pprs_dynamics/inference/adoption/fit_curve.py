@@ -33,8 +33,7 @@ from pprs_dynamics.physics.effects.laws.measured_curve import (
     check_variable,
     spline_basis,
 )
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 INTERVALS = (6, 12, 24, 48, 96, 192)  # between knots, tried
 # Prior standard deviations of the second difference of coefficients, as a share of the error's rms.
@@ -239,7 +238,7 @@ def held_out_residuals(
     return replace(residuals, model=model)
 
 
-def with_curve(model: ForceModel, drive: str, fitted: FittedCurve) -> ForceModel:
+def with_curve(model: DriveModel, drive: str, fitted: FittedCurve) -> DriveModel:
     """Return a model with a curve on a drive."""
     curve, prefix = fitted.curve, f'effects.{MeasuredCurve.name}.{drive}'
     active = [name for name in model.values.get(ACTIVE, ()) if name != MeasuredCurve.name]
@@ -250,7 +249,7 @@ def with_curve(model: ForceModel, drive: str, fitted: FittedCurve) -> ForceModel
         f'{prefix}.values': list(curve.values)})
 
 
-def without_curve(model: ForceModel, drive: str) -> ForceModel:
+def without_curve(model: DriveModel, drive: str) -> DriveModel:
     """Return a model without a drive's curve: itself, where there is none."""
     prefix = f'effects.{MeasuredCurve.name}.'
     if not any(key.startswith(f'{prefix}{drive}.') for key in model.values):
@@ -262,5 +261,5 @@ def without_curve(model: ForceModel, drive: str) -> ForceModel:
     return _built(model, values)
 
 
-def _built(model: ForceModel, values: dict[str, Any]) -> ForceModel:
-    return replace(build_model(values), source=model.source)
+def _built(model: DriveModel, values: dict[str, Any]) -> DriveModel:
+    return replace(DriveModel.from_parameters(values), source=model.source)

@@ -15,9 +15,8 @@ from pprs_dynamics.inference.adoption.adoption import Adoption
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import NOT_KNOWN, Step, with_step
-from pprs_dynamics.physics.model.model_file import build_model
 
 
 @dataclass(frozen=True)
@@ -48,10 +47,10 @@ class LedgerBook:
     fitted: tuple[RecordingEntry, ...]
     validation: tuple[RecordingEntry, ...]
 
-    def entered(self, adoption: Adoption) -> ForceModel:
+    def entered(self, adoption: Adoption) -> DriveModel:
         """Return the model of an adoption with its step in the ledger."""
         values = with_step(adoption.before.values, adoption.after.values, self._step(adoption))
-        return replace(build_model(values), source=adoption.before.source)
+        return replace(DriveModel.from_parameters(values), source=adoption.before.source)
 
     def _step(self, adoption: Adoption) -> Step:
         before, after = (rms_by_drive(one) for one in (

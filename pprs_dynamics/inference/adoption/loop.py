@@ -18,7 +18,7 @@ from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MOST_STEPS = 8
 REFUSED, AMBIGUOUS = 'refused', 'ambiguous'
@@ -34,7 +34,7 @@ class AdoptionRun:
         Those that were refused are among them.
     ended : {'adequate', 'ambiguous', 'unknown', 'refused'}
     reason : str
-    model : ForceModel
+    model : DriveModel
         With all that was adopted.
     last : Diagnosis
         Of the model where the run ended.
@@ -43,7 +43,7 @@ class AdoptionRun:
     steps: tuple[Adoption, ...]
     ended: str
     reason: str
-    model: ForceModel
+    model: DriveModel
     last: Diagnosis
 
     @property
@@ -58,8 +58,8 @@ class AdoptionRun:
 
 
 def adopt_all(
-    model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
-    record: Callable[[Adoption], ForceModel] = lambda adoption: adoption.after,
+    model: DriveModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
+    record: Callable[[Adoption], DriveModel] = lambda adoption: adoption.after,
     progress: Callable[[str, float], None] | None = None, diagnosis: Diagnosis | None = None,
     reference: Reference | None = None,
 ) -> AdoptionRun:
@@ -71,7 +71,7 @@ def adopt_all(
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings : sequence of Recording
         To fit to.
     validate : sequence of Recording, optional

@@ -15,7 +15,7 @@ from pprs_dynamics.physics.effects.catalogue import catalogue, find_effect
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 
 class EffectRequestError(PprsError, ValueError):
@@ -75,7 +75,7 @@ class EffectRequest:
                                          f'must be one of {", ".join(known)}')
         return cls(effect, tuple(sorted(drives, key=known.index)))
 
-    def placed(self, model: ForceModel) -> EffectRequest:
+    def placed(self, model: DriveModel) -> EffectRequest:
         """Return the request of the effect with the joints and links of what a model is of.
 
         Raises
@@ -94,14 +94,14 @@ class EffectRequest:
         """Of the effect."""
         return self.effect.name
 
-    def present(self, model: ForceModel) -> bool:
+    def present(self, model: DriveModel) -> bool:
         """Return whether the model has it already, on every drive that is asked for if any is."""
         return any(effect.name == self.name and (
             not isinstance(effect, DriveEffect) or set(self.drives or ()) <= set(effect.drives))
             for effect in model.effects)
 
 
-def requested(text: str, model: ForceModel) -> EffectRequest | CurveRequest:
+def requested(text: str, model: DriveModel) -> EffectRequest | CurveRequest:
     """Read EFFECT, EFFECT:drive,drive or measured_curve:DRIVE@VARIABLE for a model.
 
     Raises

@@ -16,18 +16,17 @@ from pprs_dynamics.inference.adoption.request import EffectRequest
 from pprs_dynamics.inference.diagnosis.answer import Answer
 from pprs_dynamics.inference.diagnosis.found_effects import FoundEffect
 from pprs_dynamics.inference.search.candidates import EffectCandidate
+from pprs_dynamics.inference.search.decisions import outside_cost
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate, estimate_present
 from pprs_dynamics.inference.search.estimates import calibrations as moved_numbers
-from pprs_dynamics.inference.search.fitted_model import model_at, parts_of
-from pprs_dynamics.inference.search.relinearisation import linearised
+from pprs_dynamics.inference.search.fitted_model import linearised, model_at, parts_of
 from pprs_dynamics.inference.search.reversal_widths import with_widths
 from pprs_dynamics.inference.search.scan import Scan
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.uncertainties import UNCERTAINTIES, with_uncertainties
 
 SURE = 2.0  # standard deviations by which a number must differ from 0
@@ -80,7 +79,7 @@ def requested_row(table: ModelTable, request: EffectRequest, margin: float) -> R
         raise PlacementError(f'{", ".join(standing)} hardly moved in the recordings' if standing
                              else f'{request.name} has no force in these recordings')
     fitted = fits.refined(fits.evaluate((*rest, EffectCandidate.of(chosen))))
-    return Row(*linearised(fits, fitted, alone=True), 0.0)
+    return Row(*linearised(fits, fitted), 0.0)
 
 
 def _candidate(row: Row, request: EffectRequest) -> EffectCandidate | None:
@@ -107,7 +106,7 @@ class RequestedModel:
         return next(effect for effect in self.answer.effects if effect.name == self.request.name)
 
     @cached_property
-    def model(self) -> ForceModel:
+    def model(self) -> DriveModel:
         """The model with the effect alone; other effects of the row are left out.
 
         Raises
@@ -143,6 +142,7 @@ class RequestedModel:
                 for key, estimate in self.effect.parameters.items() if prefix + key in values}
 
     @cached_property
+    @outside_cost('adopt removes an effect of the model of which the recordings show none')
     def gone(self) -> tuple[str, ...]:
         """Where the input model has the effect and the recordings leave none of it.
 
@@ -167,18 +167,18 @@ class RequestedModel:
         return tuple(found)
 
 
-def _with_uncertainties(model: ForceModel, known: Mapping[str, Mapping[str, Estimate]],
-                        ) -> ForceModel:
+def _with_uncertainties(model: DriveModel, known: Mapping[str, Mapping[str, Estimate]],
+                        ) -> DriveModel:
     """Return a model with the uncertainties of its effects' parameters."""
     values = dict(model.values)
     for name, parameters in known.items():
         values = with_uncertainties(values, name, {
             key: float(f'{number.std:.3g}') for key, number in parameters.items()
             if np.isfinite(number.std) and number.std > 0 and f'effects.{name}.{key}' in values})
-    return replace(build_model(values), source=model.source)
+    return replace(DriveModel.from_parameters(values), source=model.source)
 
 
-def _without(model: ForceModel, name: str, places: Sequence[str]) -> ForceModel:
+def _without(model: DriveModel, name: str, places: Sequence[str]) -> DriveModel:
     """Return a model without an effect in some places; without all of it where none is left."""
     if not places:
         return model
@@ -187,4 +187,4 @@ def _without(model: ForceModel, name: str, places: Sequence[str]) -> ForceModel:
     values = {key: value for key, value in model.values.items() if not key.startswith(gone)}
     if not any(key.startswith(f'effects.{name}.') for key in values):
         values['effects.active'] = [other for other in values['effects.active'] if other != name]
-    return replace(build_model(values), source=model.source)
+    return replace(DriveModel.from_parameters(values), source=model.source)

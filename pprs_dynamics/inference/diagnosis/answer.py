@@ -36,7 +36,7 @@ from pprs_dynamics.inference.search.candidates import (
     UnknownCandidate,
 )
 from pprs_dynamics.inference.search.constraints import limits_reached
-from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
 from pprs_dynamics.inference.search.estimates import (
     Estimates,
     averaged,
@@ -62,13 +62,13 @@ from pprs_dynamics.inference.search.noise_floors import noise_floors
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MOST_SETS, MOST_BARRED = 8, 3  # rows and inadmissible sets that are listed
 MOST_AVERAGED = 5  # sets that estimates are averaged over
 
 
-def model_of(fits: FittedSets, fitted: CandidateSet) -> ForceModel:
+def model_of(fits: FittedSets, fitted: CandidateSet) -> DriveModel:
     """Return the model of a set, with the effects that are there at the end and stay.
 
     Raises
@@ -110,10 +110,11 @@ class Answer:
         self.noise: dict[str, NoiseSpectrum] = {
             self.drives[d]: spectrum
             for d, spectrum in fits.regression.noise(fitted.fit).items()}
-        known = noise_floors(table.last, best=table.reported.fit)
-        # Where the noise is unknown, the residual of the reported set is an upper bound.
-        self.floors = {self.drives[d]: known.get(self.drives[d], self.fits.regression.noise_floor(
-            self.fitted.fit, d)) for d in self.fits.regression.drives}
+        known = noise_floors(table.first)
+        # The residual of the reported set is an upper bound of the noise.
+        self.floors = {self.drives[d]: min(known.get(self.drives[d], np.inf),
+                                           self.fits.regression.noise_floor(self.fitted.fit, d))
+                       for d in self.fits.regression.drives}
         self.unseen = tuple(name for name in self.floors if name not in known)
 
     def _remaining(self) -> Array:
@@ -126,6 +127,7 @@ class Answer:
             remaining[:, d] -= series.open_forces(remaining[:, d])
         return remaining
 
+    @outside_cost('widths of reversal are refitted if the error falls with them')
     def _fit_widths(self) -> None:
         """Fit the velocities within which friction reverses, where the error falls with them."""
         widths = estimate_widths(self.fits, self.fitted)
@@ -219,8 +221,8 @@ class Answer:
         if gain is None or not np.isfinite(gain.certainty):
             return 'held-out data cannot confirm it'
         if gain.certainty < -self.decisions.sure:
-            return ('held-out data are predicted worse with it, by '
-                    f'{-gain.certainty:.2g} standard errors in units of the noise')
+            return (f'held-out data are predicted worse with it, by {-gain.certainty:.2g} standard '
+                    'errors')
         if gain.losing and gain.certainty < self.decisions.sure:
             return f'held-out data of {listed(gain.losing)} are predicted worse with it'
         return ''
@@ -297,6 +299,7 @@ class Answer:
                 force += self.force(candidate)
         return [self.decisions.form_share * root_mean_square(of_drive) for of_drive in force.T]
 
+    @outside_cost('a residual above hypot(1.5 noise, form error), or 5 times the noise: `unknown`')
     def _above_noise(self) -> dict[str, float]:
         """Return the drives with more residual than noise and forms explain, over the noise."""
         found = {}
@@ -311,6 +314,7 @@ class Answer:
                 found[self.drives[d]] = ratio
         return found
 
+    @outside_cost('an effect that ends is no property of the machine: `unknown`')
     def _passing(self) -> Iterator[Statement]:
         """Yield a statement for each drive on which something is there for a stretch alone."""
         residuals = self.table.first.design.residuals
@@ -399,19 +403,13 @@ class Answer:
 
 
 def answer_of(table: ModelTable, validate: Sequence[Recording], decisions: Decisions) -> Diagnosis:
-    """Return the answer of a table.
+    """Return the answer of a table: that of the row of least cost.
 
-    Its effects are those of the row of least cost. Where one of them is no finding, the verdict is
-    `unknown`, and it is listed as unconfirmed. Where it is impossible, or the error of the whole
-    row rises, so are all that were fitted with it.
+    Where an effect of it is not confirmed, the verdict is `unknown`, and the answer is that of the
+    row without it.
     """
     answer = Answer(table, table.best, validate, decisions)
-    unconfirmed: list[FoundEffect] = []
-    if answer.raises_the_error:
-        unconfirmed = [replace(effect, objection='the error of a model with the reported effects '
-                               'is larger than without') for effect in answer.effects]
-    else:
-        unconfirmed = _objected(answer)
+    unconfirmed = unconfirmed_effects(answer)
     if unconfirmed:
         names = {effect.name for effect in unconfirmed}
         rest = tuple(c for c in table.best.fitted.candidates if c.name not in names)
@@ -420,14 +418,22 @@ def answer_of(table: ModelTable, validate: Sequence[Recording], decisions: Decis
     return answer.diagnosis(tuple(unconfirmed))
 
 
-def _objected(answer: Answer) -> list[FoundEffect]:
-    """Return the effects that are no finding."""
+@outside_cost('an effect that raises the error of a drive, on the recordings or held out, is not '
+              'confirmed: `unknown`')
+def unconfirmed_effects(answer: Answer) -> list[FoundEffect]:
+    """Return the effects of a row that data do not confirm, with the reason.
+
+    Where one is impossible, or the error rises with all of them together, none is confirmed.
+    """
+    if answer.raises_the_error:
+        return [replace(effect, objection='the error with the reported effects is larger than '
+                        'without') for effect in answer.effects]
     objected = [effect for effect in answer.effects if effect.objection]
     impossible = [effect.name for effect in objected if not effect.is_only_refuted]
     if not impossible:
         return objected
     return [*objected, *(
-        replace(effect, objection=f'it was found beside {listed(impossible)}, which cannot be')
+        replace(effect, objection=f'it was fitted with {listed(impossible)}, which is impossible')
         for effect in answer.effects if not effect.objection)]
 
 

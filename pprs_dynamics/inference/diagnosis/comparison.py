@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""How wrong the model is: the numbers per drive and overall, and what they mean in words."""
+"""The error of a model per drive and over all drives, in numbers and in words."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ class DriveComparison:
     effective_samples : float
         Independent samples whose mean would be as uncertain.
     noise_floor : float or None
-        rms of the noise [N]; None where it cannot be told. See `search.noise_floors`.
-    parts : mapping of str to float
-        rms of each part of the model, its mean removed [N].
+        rms of the noise [N]; None where it is not known. See `search.noise_floors`.
+    smallest_part : float
+        rms of the smallest part of the model, its mean removed [N].
     unit : str
         Of the drive's efforts.
-    told : float
-        rms of the largest pattern that a statement tells [N]; it is no noise.
+    pattern : float
+        rms of the largest pattern of the error that a statement describes [N]; it is no noise.
     is_little : bool
         Whether the model explains little of the effort, see `search.explained_effort`.
     """
@@ -63,9 +63,9 @@ class DriveComparison:
     samples: int
     effective_samples: float
     noise_floor: float | None
-    parts: Mapping[str, float]
+    smallest_part: float
     unit: str
-    told: float
+    pattern: float
     is_little: bool = False
 
     @property
@@ -76,50 +76,33 @@ class DriveComparison:
     @property
     def grade(self) -> str:
         """How good the model is: 'noise', 'good', 'fair' or 'poor'."""
-        # The noise is known to a share: what is left beyond it is nothing below this.
-        sure = np.sqrt((1 + DECISIONS.noise_accuracy) ** 2 - 1)
+        # Below the uncertainty of the noise nothing can be attributed to the model.
+        least = np.sqrt((1 + DECISIONS.noise_accuracy) ** 2 - 1) * (self.noise_floor or 0.0)
         if self.is_little:
             return 'poor'
         if self.rms == 0 or self.relative < DECISIONS.negligible or (
-                self.noise_floor is not None
-                and max(self.unexplained, self.told) <= sure * self.noise_floor):
+                self.noise_floor is not None and max(self.unexplained, self.pattern) <= least):
             return 'noise'
         if np.isnan(self.relative) or self.unexplained > DECISIONS.poor * self.effort:
             return 'poor'
-        smallest = min((size for size in self.parts.values() if size > 0), default=np.inf)
-        is_small = self.unexplained <= min(DECISIONS.good * self.effort, smallest)
+        is_small = self.unexplained <= min(DECISIONS.good * self.effort, self.smallest_part)
         return 'good' if is_small else 'fair'
 
     @property
     def verdict(self) -> str:
         """The numbers in words."""
-        of = ('of a constant effort' if np.isnan(self.relative)
-              else f'of {self._told(self.effort)} ({percent(self.relative)})')
-        if self.rms == 0:
-            return f'{self.drive}: the model leaves nothing {of}'
-        left = f'{self.drive}: the model leaves {self._told(self.rms)} {of}; '
-        if self.relative < DECISIONS.negligible:
-            return f'{left}next to nothing'
+        share = ('of a constant effort' if np.isnan(self.relative)
+                 else f'{percent(self.relative)} of the effort')
+        error = f'{self.drive}: the error is {in_unit(self.rms, self.unit)} ({share})'
+        if self.rms == 0 or self.relative < DECISIONS.negligible:
+            return f'{error}: negligible'
         if self.grade == 'noise':
-            is_told = self.told ** 2 >= DECISIONS.statement_share * self.rms ** 2
-            return left + ('noise accounts for most of it' if is_told else
-                           'noise accounts for it: nothing else stands out in this recording')
-        left += ('how much of it is noise cannot be told' if self.noise_floor is None else
-                 f'noise accounts for {self._told(self.noise_floor)}, so '
-                 f'{self._told(self.unexplained)} is unexplained')
-        # What contributes next to nothing is no measure of anything.
-        least = DECISIONS.statement_share * self.effort
-        ranked = sorted(((size, part) for part, size in self.parts.items() if size > least),
-                        reverse=True)
-        below = [(size, part) for size, part in ranked if size < self.unexplained]
-        if ranked:
-            size, part = below[0] if below else ranked[-1]
-            left += (f' - {"more" if below else "less"} than {part.replace("_", " ")} contributes '
-                     f'({self._told(size)})')
-        return f'{left}: {self.grade}'
-
-    def _told(self, value: float) -> str:
-        return in_unit(value, self.unit)
+            has_pattern = self.pattern ** 2 >= DECISIONS.statement_share * self.rms ** 2
+            return f'{error}, {"mostly" if has_pattern else "all of it"} noise'
+        noise = ('the noise is not known' if self.noise_floor is None else
+                 f'{in_unit(self.noise_floor, self.unit)} of it is noise and '
+                 f'{in_unit(self.unexplained, self.unit)} unexplained')
+        return f'{error}; {noise}: {self.grade}'
 
 
 @dataclass(frozen=True)
@@ -176,46 +159,42 @@ class Comparison:
 
     @property
     def where(self) -> tuple[Statement, ...]:
-        """Where it fails, what explains most of the squared error first, and nothing slight."""
-        told = [statement for statement in self.localisation.statements
+        """Statements that explain a visible share of the squared error, the largest first."""
+        large = [statement for statement in self.localisation.statements
                 if statement.drive in self.drives
                 and not self.drives[statement.drive].relative < DECISIONS.negligible
                 and statement.share_of_error >= DECISIONS.statement_share
                 and statement.mean_square >= (
                     DECISIONS.statement_share * self.drives[statement.drive].rms ** 2)]
-        return tuple(sorted(told, key=lambda one: -one.mean_square))
+        return tuple(sorted(large, key=lambda statement: -statement.mean_square))
 
     @property
     def is_beyond_noise(self) -> bool:
         """Whether there is anything but noise on any drive."""
-        return bool(self.where) or any(one.grade != 'noise' for one in self.drives.values())
+        return bool(self.where) or any(
+            drive.grade != 'noise' for drive in self.drives.values())
 
     @property
     def verdict(self) -> str:
         """The numbers over all drives in words."""
         share = '' if np.isnan(self.relative) else f' ({percent(self.relative)} of the effort)'
-        leaves = f'leaves {in_unit(self.rms, self.unit)}{share}'
-        left = (f'{word_little(self.little)}; it {leaves}: ' if self.little
-                else f'the model {leaves}: ')
+        little = f'{word_little(self.little)}; ' if self.little else ''
+        error = f'{little}the error is {in_unit(self.rms, self.unit)}{share}'
         beyond = [drive for drive in self.drives.values() if drive.grade != 'noise']
-        told = [drive for drive in beyond if drive.noise_floor is not None]
-        if beyond and not told:
-            worst = max(beyond, key=lambda drive: drive.rms / max(drive.effort, 1e-300))
-            return (f'{left}how much of it is noise cannot be told on '
-                    f'{listed([drive.drive for drive in beyond])}; worst on {worst.drive}, '
-                    f'{in_unit(worst.rms, worst.unit)} ({worst.grade})')
+        known = [drive for drive in beyond if drive.noise_floor is not None]
         if self.relative < DECISIONS.negligible:
-            return f'{left}next to nothing'
+            return f'{error}: negligible'
         if not beyond:
             placed = sorted({place.drive for place in self.where})
-            return f'{left}noise accounts for ' + (
-                f'most of it on {listed(placed)}, for all of it elsewhere' if placed
-                else 'it on every drive')
-        worst = max(told, key=lambda drive: drive.unexplained)
-        where = ('every drive' if len(told) == len(self.drives) > 1
-                 else ', '.join(drive.drive for drive in told))
-        return (f'{left}more than noise on {where}; worst on {worst.drive}, '
-                f'{in_unit(worst.unexplained, worst.unit)} unexplained ({worst.grade})')
+            return f'{error}, all of it noise' + (f' except on {listed(placed)}' if placed else '')
+        worst = (max(known, key=lambda drive: drive.unexplained) if known else
+                 max(beyond, key=lambda drive: drive.rms / max(drive.effort, 1e-300)))
+        where = 'every drive' if len(beyond) == len(self.drives) > 1 else listed(
+            [drive.drive for drive in beyond])
+        what = 'more than noise' if known else 'the noise is not known'
+        unexplained = ' unexplained' if known else ''
+        return (f'{error}; {what} on {where}. Worst is {worst.drive}, '
+                f'{in_unit(worst.unexplained, worst.unit)}{unexplained} ({worst.grade})')
 
     def to_dict(self) -> dict[str, Any]:
         """Return the keys of the interface; a number that is not defined is null."""
@@ -239,9 +218,9 @@ def compare(residuals: Residuals, localisation: Localisation | None = None,
     ----------
     residuals : Residuals
     localisation : Localisation, optional
-        Its result where it is known already; what it finds is not noise.
+        Of these residuals, where it is known already.
     floors : mapping of str to float, optional
-        The noise of the drives where it can be told [N], see `search.noise_floors`.
+        The noise of the drives [N], see `search.noise_floors`.
     little : mapping of str to float, optional
         Drives of whose effort little is explained, see `search.explained_effort`.
     """
@@ -266,13 +245,17 @@ def _compare_drive(
     error, effort = residuals.error[known, index], residuals.measured[known, index]
     rms, swing = root_mean_square(error), root_mean_square(effort - effort.mean())
     findings = where.drives.get(name, DriveFindings((), None))
+    noise = findings.noise
+    if floor is not None and noise is not None and noise.period == residuals.period:
+        # What no pattern explains is an upper bound of the noise.
+        floor = min(floor, noise.rms)
     most = max((statement.mean_square for statement in findings.statements
                 if statement.kind not in ('scatter', 'level')), default=0.0)
+    parts = [root_mean_square(part[known, index] - part[known, index].mean())
+             for part in residuals.parts.values()]
     return DriveComparison(
         name, rms, float(error.mean()), float(np.abs(error).max()), swing,
         float('nan') if np.isnan(share) else rms / swing, share, len(error),
-        float(len(error)) if findings.noise is None else findings.noise.effective_samples(
-            len(error)), floor,
-        {part: root_mean_square(values[known, index] - values[known, index].mean())
-         for part, values in residuals.parts.items()},
+        float(len(error)) if noise is None else noise.effective_samples(len(error)), floor,
+        min((size for size in parts if size > 0), default=np.inf),
         residuals.units_of(name).effort, float(np.sqrt(most)), is_little)

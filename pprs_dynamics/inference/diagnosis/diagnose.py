@@ -14,16 +14,17 @@ from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReferenc
 from pprs_dynamics.inference.diagnosis.statements import word_stick_slip
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.readings.efforts import looks_like
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.readings.findings import NoMeasurement
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions, outside_cost
 from pprs_dynamics.inference.search.table import input_model_alone, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
-from pprs_dynamics.measurement.motion.stick_slip import sticking_drives
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.measurement.motion.stick_slip import StickSlip, sticking_drives
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 
 def diagnose(
-    model: ForceModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
+    model: DriveModel, recordings: Sequence[Recording], validate: Sequence[Recording] = (),
     progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
     as_it_is: bool = False, reference: Reference | None = None,
 ) -> Diagnosis:
@@ -31,7 +32,7 @@ def diagnose(
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings : sequence of Recording
         To fit to.
     validate : sequence of Recording, optional
@@ -53,18 +54,8 @@ def diagnose(
     if not any(share_in_motion(recording.time, recording.position) for recording in recordings):
         raise MotionError('position', 'no drive moves by more than its measured position resolves '
                           f'in {", ".join(recording.name for recording in recordings)}',
-                          'move: a robot that stands tells nothing of friction, masses or '
-                          'delays', 'shape')
-    other = {} if as_it_is else looks_like(model, recordings)
-    if other and reference is not None:
-        # What the reference looks like as well is no change.
-        before = looks_like(model, reference.recordings)
-        other = {drive: one for drive, one in other.items()
-                 if drive not in before or before[drive].kind != one.kind}
-    # No law of the drive's own motion describes what its controller and its elasticity do.
-    sticking = {} if as_it_is or other else {
-        drive: slip for drive, slip in sticking_drives(recordings).items()
-        if slip.share > decisions.stick_slip}
+                          'move: a robot at rest shows no friction, mass or delay', 'shape')
+    other, sticking = ({}, {}) if as_it_is else _gate(model, recordings, decisions, reference)
     if other or sticking:
         table = input_model_alone(model, recordings, decisions, report)
         bare = Answer(table, table.best, validate, decisions).diagnosis()
@@ -78,3 +69,19 @@ def diagnose(
     found = replace(answer_of(table, validate, decisions), since=since)
     report(1.0)
     return found
+
+
+@outside_cost('efforts that are no measurement, and stick-slip, end the diagnosis before the '
+              'search: `unknown`')
+def _gate(model: DriveModel, recordings: Sequence[Recording], decisions: Decisions,
+          reference: Reference | None) -> tuple[dict[str, NoMeasurement], dict[str, StickSlip]]:
+    """Return the drives whose efforts are no measurement, and those that stick and slip."""
+    other = looks_like(model, recordings)
+    if other and reference is not None:
+        # What the reference looks like as well is no change.
+        before = looks_like(model, reference.recordings)
+        other = {drive: looks for drive, looks in other.items()
+                 if drive not in before or before[drive].kind != looks.kind}
+    # No law of a drive's motion describes what its controller and its elasticity do.
+    return other, {} if other else {drive: slip for drive, slip in sticking_drives(
+        recordings).items() if slip.share > decisions.stick_slip}

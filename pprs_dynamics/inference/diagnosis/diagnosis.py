@@ -31,7 +31,7 @@ from pprs_dynamics.inference.search.estimates import Calibration
 from pprs_dynamics.inference.search.explained_effort import explained_shares
 from pprs_dynamics.inference.search.table import ModelTable
 from pprs_dynamics.measurement.motion.stick_slip import StickSlip
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.numbers import finite
 
 
@@ -104,9 +104,9 @@ class Diagnosis:
     calibrated : tuple of Calibration
         Numbers that moved within their tolerances.
     warnings, notes : tuple of str
-    model : ForceModel
+    model : DriveModel
         As given.
-    adopted : ForceModel
+    adopted : DriveModel
         With the effects.
     residuals : Residuals
         Of the model as given.
@@ -152,8 +152,8 @@ class Diagnosis:
     calibrated: tuple[Calibration, ...]
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
-    model: ForceModel
-    adopted: ForceModel
+    model: DriveModel
+    adopted: DriveModel
     residuals: Residuals
     remaining: Array
     noise: dict[str, NoiseSpectrum]

@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.search.candidates import SINCE, Course
-from pprs_dynamics.inference.search.cost_terms import CostTerms
+from pprs_dynamics.inference.search.candidates import SINCE, CostTerms, Course
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.inference.search.held_out import PredictiveGain
 from pprs_dynamics.physics.effects.effect import CatalogueEffect

@@ -35,7 +35,7 @@ from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.search.held_out import predictive_gain, sample_gains
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 
 @dataclass(frozen=True)
@@ -122,9 +122,9 @@ class Window:
         [s], on the stream's clock.
     diagnosis : dict
         JSON of `pprs diagnose`.
-    adopted : ForceModel
+    adopted : DriveModel
         The model with what was found, and its numbers as the fit moves them.
-    plain : ForceModel
+    plain : DriveModel
         The same without what was found.
     """
 
@@ -132,8 +132,8 @@ class Window:
     start: float
     end: float
     diagnosis: Mapping[str, Any]
-    adopted: ForceModel
-    plain: ForceModel
+    adopted: DriveModel
+    plain: DriveModel
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ class LiveDiagnosis:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
         As given: every window is diagnosed against it.
     effects : tuple of LiveEffect
         Named by the latest windows; only the confirmed ones are claimed.
@@ -159,7 +159,7 @@ class LiveDiagnosis:
         Since which every window is diagnosed.
     """
 
-    model: ForceModel
+    model: DriveModel
     effects: tuple[LiveEffect, ...] = ()
     last: Window | None = None
     withdrawn: tuple[LiveEffect, ...] = ()
@@ -269,7 +269,7 @@ class LiveDiagnosis:
         return change_point(np.concatenate(times), np.concatenate(gains))
 
 
-def without_found(model: ForceModel, answer: Diagnosis) -> ForceModel:
+def without_found(model: DriveModel, answer: Diagnosis) -> DriveModel:
     """Return the model of a diagnosis without what it found, its other numbers as they are."""
     found = {effect.name for effect in answer.effects}
     given = {effect.name: effect for effect in model.effects}

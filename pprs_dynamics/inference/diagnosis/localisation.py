@@ -21,11 +21,11 @@ from pprs_dynamics.inference.diagnosis.quantities import in_unit, plain
 from pprs_dynamics.inference.diagnosis.statements import Statement, word_scatter, word_statement
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
-from pprs_dynamics.inference.residuals.bins import MOST_SHARE
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
+from pprs_dynamics.inference.residuals.profiles import MOST_SHARE
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 from pprs_dynamics.inference.search.candidates import PriorCosts, UnknownCandidate
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions, outside_cost
 from pprs_dynamics.inference.search.patterns import Pattern
 from pprs_dynamics.inference.search.scan import with_fast_noise
 from pprs_dynamics.inference.search.unknown import DrivePatterns
@@ -48,13 +48,10 @@ class DriveFindings:
     statements : tuple of Statement
     noise : NoiseSpectrum or None
         Of what remains; None with too few samples to search.
-    patterns : tuple of (k, M) arrays
-        Of the statements, sample by sample.
     """
 
     statements: tuple[Statement, ...]
     noise: NoiseSpectrum | None
-    patterns: tuple[Array, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -69,11 +66,6 @@ class Localisation:
 
     statements: tuple[Statement, ...]
     drives: dict[str, DriveFindings]
-
-    @property
-    def patterns(self) -> dict[str, tuple[Array, ...]]:
-        """The patterns that were found on each drive, (k, M) each."""
-        return {name: findings.patterns for name, findings in self.drives.items()}
 
 
 def localise(residuals: Residuals, progress: Callable[[float], None] | None = None,
@@ -106,6 +98,7 @@ def localise(residuals: Residuals, progress: Callable[[float], None] | None = No
     return Localisation(tuple(ranked), drives)
 
 
+@outside_cost('slow noise three times that of the other drives: `unknown`')
 def levels(residuals: Residuals, noises: dict[str, NoiseSpectrum | None],
            decisions: Decisions) -> dict[str, Statement]:
     """Return statements on drives whose slow noise is far above its peers'.
@@ -147,7 +140,6 @@ def _search(residuals: Residuals, drive: int) -> DriveFindings:
     fit = regression.fit(())
     statements: list[Statement] = []
     blocks: list[Block] = []
-    patterns: list[Array] = []
     while len(statements) < MOST_STATEMENTS:
         winner = _best(drive_patterns, fit, blocks,
                        {statement.variable for statement in statements})
@@ -156,13 +148,12 @@ def _search(residuals: Residuals, drive: int) -> DriveFindings:
         candidate, found, evidence, other_variables = winner
         statements.append(word_statement(drive_patterns, candidate, found.of(
             candidate.parts[drive]), evidence, other_variables))
-        patterns.append(candidate.rows[drive])
         blocks += [*candidate.blocks, *_carried(drive_patterns, candidate)]
         fit = regression.fit(blocks, found.amplitudes)
     scatter = _scatter(drive_patterns, fit, {statement.variable for statement in statements})
     if scatter is not None:
         statements.append(scatter)
-    return DriveFindings(tuple(statements), regression.noise(fit)[drive], tuple(patterns))
+    return DriveFindings(tuple(statements), regression.noise(fit)[drive])
 
 
 def _best(drive_patterns: DrivePatterns, fit: JointFit, blocks: list[Block], stated: set[str],

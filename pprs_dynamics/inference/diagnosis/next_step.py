@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What to do after a diagnosis: in words, and as a command with the real names of files."""
+"""What to do after a diagnosis: in words, and as a command with the names of the files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pprs_dynamics.physics.model.reference_keys import reference_files
 if TYPE_CHECKING:  # naming files needs no diagnosis
     from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
     from pprs_dynamics.inference.readings.findings import NoMeasurement
-    from pprs_dynamics.physics.model.force_model import ForceModel
+    from pprs_dynamics.physics.model.drive_model import DriveModel
 
 OWN_FRICTION = ('friction.viscous', 'friction.coulomb')  # of an arm's model file
 SECOND = 'SECOND_RECORDING'  # that is still to be made
@@ -88,100 +88,85 @@ class GivenFiles:
 PLACEHOLDERS = GivenFiles()  # of a diagnosis that was made without files
 
 
-def first_step(model: ForceModel, files: GivenFiles) -> tuple[str, str]:
-    """Return what to do before anything else where a model explains little, and the command.
+def first_step(model: DriveModel, files: GivenFiles) -> tuple[str, str]:
+    """Return what to do first where a model explains little, and the command.
 
     A description alone, without friction and with the maker's masses, is fitted first.
     """
-    if model.is_described:
-        if _is_fitted(model):
-            return ('Check columns, units, signs and zeros, and that the file describes this '
-                    'machine: the model was fitted, and still explains little',
-                    files.command('info'))
-        words = ('The model has no friction yet. Fit inertia and friction first'
-                 if _has_no_friction(model) else
-                 'Check units, signs and zeros, and that the file describes this machine. Then '
-                 'fit the model')
-        return words, files.command('fit', '--output', files.output('base.yaml'))
-    return ('Check units, signs and zeros, and that the file describes this machine',
-            files.command('info'))
+    is_fitted = bool(reference_files(model.values, model.source))
+    check = 'Check units, signs and zeros, and that the file describes this machine'
+    if not model.is_described or is_fitted:
+        return check, files.command('info')
+    words = ('The model has no friction yet. Fit inertia and friction first'
+             if _has_no_friction(model) else f'{check}. Then fit the model')
+    return words, files.command('fit', '--output', files.output('base.yaml'))
 
 
-def _is_fitted(model: ForceModel) -> bool:
-    return bool(reference_files(model.values, model.source))
-
-
-def _has_no_friction(model: ForceModel) -> bool:
-    return model.is_described and not _is_fitted(model) and not any(
+def _has_no_friction(model: DriveModel) -> bool:
+    return model.is_described and not reference_files(model.values, model.source) and not any(
         np.any(model.values[key]) for key in OWN_FRICTION)
 
 
 def measure_first(findings: Sequence[NoMeasurement], files: GivenFiles) -> tuple[str, str]:
-    """Return what to do where efforts are no measurement, and the command that goes on."""
-    lines = dict.fromkeys(finding.line for finding in findings if finding.line)
-    say = ('; where it is what it looks like, write '
-           f'{listed(tuple(lines), "or")} into the model file' if lines else '')
-    return (f'Record the effort that is measured{say}. Where it is measured all the same',
+    """Return what to do where efforts are no measurement, and the command that ignores this."""
+    lines = list(dict.fromkeys(finding.line for finding in findings if finding.line))
+    say = f', or write {listed(lines, "or")} into the model file' if lines else ''
+    return (f'Record the measured effort{say}. If it is measured, continue with',
             files.command('diagnose', '--as-it-is'))
 
 
 def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
     """Return what to do next, and the command for it."""
+    other = replace(files, recordings=(SECOND,)).command('diagnose')
+    both = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
+    effects, is_change = diagnosis.effects, diagnosis.since is not None
     if diagnosis.effort_looks_like:
         return measure_first(list(diagnosis.effort_looks_like.values()), files)
     if diagnosis.stick_slip:
-        return ('Record a motion that is faster than the stick-slip, and diagnose that; as long as '
-                'the machine has to move so slowly, its cause comes first (grease, gains, a soft '
-                'transmission)', replace(files, recordings=(SECOND,)).command('diagnose'))
+        return ('Record a faster motion, without stick-slip, and diagnose it. If the machine must '
+                'move so slowly, remove the cause first (grease, gains, a soft transmission)',
+                other)
     if diagnosis.little or (
-            diagnosis.since is None and _has_no_friction(diagnosis.model)
-            and (diagnosis.verdict == 'unknown' or len(diagnosis.effects) > 1)):
-        # Of a model that lacks all friction several effects are what fits together, at best.
+            not is_change and _has_no_friction(diagnosis.model)
+            and (diagnosis.verdict == 'unknown' or len(effects) > 1)):
+        # Several effects of a model without any friction are at best a common fit.
         return first_step(diagnosis.model, files)
-    if changing := [f'{effect.name}{effect.when}' for effect in diagnosis.effects
-                    if effect.course is not None]:
-        # Fitted throughout it would be wrong at every moment.
-        return (f'Find out what happened to the machine ({"; ".join(changing)}). Then record it as '
-                'it is now, and diagnose that recording alone',
-                replace(files, recordings=(SECOND,)).command('diagnose'))
-    repeat = replace(files, recordings=(*files.recordings, SECOND)).command('diagnose')
+    if changing := [f'{effect.name}{effect.when}' for effect in effects if effect.course]:
+        return (f'Find out what happened to the machine ({"; ".join(changing)}). Then record it in '
+                'its present state, and diagnose that recording alone', other)
     if diagnosis.depends_on:
-        if diagnosis.since is None and (curve := _curve(diagnosis)) is not None:
-            return ('Look at that place on the machine. A measured curve takes the error away '
+        curve = None if is_change else _curve(diagnosis)
+        if curve is not None:
+            return ('Look at that place on the machine. A measured curve compensates the error '
                     'until the cause is known', files.command(
                         'adopt', curve, '--output', files.output('with_curve.yaml'), held_out=True))
-        return ('Look at that place on the machine, and record the motion again: what comes back '
-                'is the machine. Then diagnose both recordings', repeat)
-    if diagnosis.verdict == 'ambiguous' and all(
-            _need_another_load(names) for names in diagnosis.indistinguishable):
-        return ('Repeat the motion with another load, or in a posture in which the drive carries '
-                'more: only friction by load grows with it. Then diagnose that recording with the '
-                'load in the model', replace(files, recordings=(SECOND,)).command('diagnose'))
+        return ('Look at that place on the machine. Repeat the motion and diagnose both '
+                'recordings: an error that repeats is the machine', both)
     if diagnosis.verdict == 'ambiguous':
-        return ('Record a motion that tells the candidates apart; this designs it',
+        if all(_need_another_load(names) for names in diagnosis.indistinguishable):
+            return ('Repeat the motion with another load: only friction by load grows with it. '
+                    'Diagnose that recording with the load in the model', other)
+        return ('Record a motion that separates the candidates; this command designs it',
                 files.command('next-experiment', '--output', 'next.csv'))
-    if diagnosis.unconfirmed and not diagnosis.effects:
-        if diagnosis.since is None and diagnosis.model.is_described and any(
-                effect.objection for effect in diagnosis.unconfirmed):
-            # What no machine can have says that the model is of another: no motion mends that.
+    if diagnosis.unconfirmed and not effects:
+        if not is_change and diagnosis.model.is_described and any(
+                effect.objection and not effect.is_only_refuted
+                for effect in diagnosis.unconfirmed):
+            # An impossible effect means that the model is of another machine.
             return first_step(diagnosis.model, files)
-        names = listed([effect.name for effect in diagnosis.unconfirmed])
-        return (f'Do not add {names} on this evidence. Record another motion, and '
-                'diagnose both recordings', repeat)
-    if len(diagnosis.effects) == 1:
-        found = diagnosis.effects[0]
-        step = 'set it anew, or take it out' if found.in_model else 'add it'
-        return (f'Confirm it on the machine, then {step}', files.command(
-            'adopt', found.name, '--output',
-            files.output(f'with_{found.name}.yaml'), held_out=True))
-    if diagnosis.effects:
+        return (f'Do not add {listed([effect.name for effect in diagnosis.unconfirmed])}. Record '
+                'another motion, and diagnose both recordings', both)
+    if len(effects) == 1:
+        name = effects[0].name
+        step = 'set it to the new values, or remove it' if effects[0].in_model else 'add it'
+        return f'Confirm it on the machine, then {step}', files.command(
+            'adopt', name, '--output', files.output(f'with_{name}.yaml'), held_out=True)
+    if effects:
         return ('Confirm them on the machine, then add them', files.command(
             'diagnose', '--adopt-all', '--output', files.output('better.yaml'), held_out=True))
     if diagnosis.suspects:
-        return ('Repeat the recording: what comes back is the machine, what does not was noise',
-                repeat)
-    return ('Nothing to add. Another motion may show what this one does not excite',
-            replace(files, recordings=(SECOND,)).command('diagnose'))
+        return 'Repeat the recording: an error that repeats is the machine', both
+    return 'Nothing to add. Another motion may excite other effects', other
 
 
 def _need_another_load(names: Sequence[str]) -> bool:

@@ -13,8 +13,7 @@ from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import FittedEffect, RivalEffect
 from pprs_dynamics.inference.diagnosis.statements import UNITS
-from pprs_dynamics.inference.residuals.bins import bin_edges, bin_of
-from pprs_dynamics.inference.residuals.profiles import Profile, error_profile
+from pprs_dynamics.inference.residuals.profiles import Profile, bin_edges, bin_of, error_profile
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
 # The model's own numbers that move without changing the error by this share are no step.

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a diagnosis found, in plain sentences; terminal and page only lay them out."""
+"""A diagnosis in plain sentences; terminal and page only lay them out."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from math import isnan
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
 from pprs_dynamics.inference.diagnosis.found_effects import (
+    Drives,
     FittedEffect,
     FoundEffect,
-    RankedEffect,
     RankedSet,
     RivalEffect,
 )
@@ -39,39 +39,36 @@ from pprs_dynamics.inference.diagnosis.statements import (
     place_of,
     place_on,
 )
-from pprs_dynamics.inference.search.candidates import SINCE
-from pprs_dynamics.inference.search.cost_terms import CostTerms
+from pprs_dynamics.inference.search.candidates import SINCE, CostTerms
 from pprs_dynamics.inference.search.estimates import Calibration, Estimate
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
 
-MOST_CHANGED = 4  # values of an effect of the model that a sentence sets against the recordings'
+MOST_CHANGED = 4  # values of an effect of the input model that a sentence compares
 MOST_LISTED = 2  # drives whose parameters a sentence gives one by one
-TOLD_COST = 0.05  # of a term of a cost, that one digit shows
-VAGUE = 0.1  # of a mass, an uncertainty beyond which its first moment is told as well, if surer
-MOSTLY = 0.95  # of a recording, from which on a reference knows its states
-# Times the speed of a reference, or one over it, beyond which what lags shows: at half the speed a
-# real arm is told delays of up to 70 ms that it has not; a program repeats its own to hundredths.
+LEAST_TERM = 0.05  # of a cost, that one digit shows
+VAGUE = 0.1  # relative uncertainty of a mass, beyond which its first moment is given if surer
+MOSTLY = 0.95  # of a recording, from which on a reference covers its states
+# Ratio of speeds beyond which lags depend on the speed: at half the speed a real arm shows delays
+# of up to 70 ms that it has not; a program repeats its own speeds to hundredths.
 ALIKE_PACE = 1.25
-# Of which one line says what would have been seen.
-COMMON = ('payload_mass', 'coulomb_friction', 'viscous_friction')
+COMMON = ('payload_mass', 'coulomb_friction', 'viscous_friction')  # named as detectable
 AT_NOISE = 1.05  # an error up to this multiple of the noise is the noise
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was found.
+    """One finding in words.
 
     Parameters
     ----------
     title : str
     what, why, cause, confirm : str
-        What is missing, why we think so, what could have caused it, how to confirm it.
+        What is missing, the evidence, possible causes, how to confirm it.
     mark : str
         How it shows in the error.
     remarks : tuple of str
-        What else must be known.
     """
 
     title: str
@@ -85,7 +82,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class FittedValue:
-    """A fitted parameter of an effect; `drive` is '' for none, `given` what the model says."""
+    """A fitted parameter of an effect; `drive` may be '', `given` is the input model's value."""
 
     effect: str
     drive: str
@@ -95,12 +92,12 @@ class FittedValue:
 
     @property
     def size(self) -> float:
-        """The larger of both values, which decides how they are read."""
+        """The larger of both values, which decides their unit."""
         return max(abs(self.estimate.value), abs(self.given or 0.0))
 
     @property
     def text(self) -> str:
-        """Value with uncertainty and unit as people read it; none where it may be anything."""
+        """Value with uncertainty and unit."""
         return as_fitted(self.estimate.value, self.estimate.std, self.estimate.unit,
                          self.parameter.scale, self.size)
 
@@ -112,18 +109,14 @@ class Sentences:
     Parameters
     ----------
     headline : str
-        The verdict.
-    effects : tuple of Finding
-        In the order of `Diagnosis.effects`.
-    rivals : tuple of Finding
-        In the order of those given to `word_diagnosis`.
-    unexplained : tuple of Finding
-        In the order of `unexplained_groups`.
+        The verdict, at most two sentences.
+    effects, rivals, unexplained : tuple of Finding
+        In the order of `Diagnosis.effects`, of the given rivals, and of `unexplained_groups`.
     suspects, barred, calibrated, warnings : tuple of str
     following, command : str
         What to do next, in words and for a shell.
     reference : tuple of str
-        How far what has changed since a reference run can be told; none without one.
+        What a reference run covers; none without one.
     """
 
     headline: str
@@ -147,27 +140,28 @@ def word_diagnosis(diagnosis: Diagnosis, files: GivenFiles = PLACEHOLDERS,
     ----------
     diagnosis : Diagnosis
     files : GivenFiles, optional
-        For the command to go on with.
+        For the next command.
     rivals : sequence of RivalEffect, optional
-        As `rival_effects` finds them.
+        As `rival_effects` returns them.
     """
     following, command = next_step(diagnosis, files)
+    since = f'Since {listed(diagnosis.since.recordings)}: ' if diagnosis.since else ''
     return Sentences(
-        _since(diagnosis) + _headline(diagnosis),
-        tuple(_effect(diagnosis, effect, k == 0) for k, effect in enumerate(diagnosis.effects)),
+        since + _headline(diagnosis),
+        tuple(_effect(diagnosis, effect) for effect in diagnosis.effects),
         tuple(_rival(diagnosis, rival) for rival in rivals),
-        tuple(Finding(*describe_unexplained(group, bool(diagnosis.effects)))
-              for group in unexplained_groups(diagnosis)),
-        tuple(_suspect(diagnosis, suspect) for suspect in diagnosis.suspects),
-        tuple(f'{_set(diagnosis, ranked)} is excluded: {ranked.barred}. It '
-              f'{_cost(ranked)}' for ranked in diagnosis.barred),
+        tuple(Finding(*describe_unexplained(group)) for group in unexplained_groups(diagnosis)),
+        tuple(f'{_placed(diagnosis, suspect.name, suspect.drives)}: possible, but slow noise '
+              f'explains the data as well (evidence {suspect.evidence:.0f}, threshold 0). '
+              'Repeat the recording' for suspect in diagnosis.suspects),
+        tuple(f'{_set(diagnosis, ranked)} is excluded: {ranked.barred}. It {_cost(ranked)}'
+              for ranked in diagnosis.barred),
         tuple(_calibrated(diagnosis, number) for number in diagnosis.calibrated),
-        diagnosis.warnings, following, command,
-        word_reference(diagnosis.since))
+        diagnosis.warnings, following, command, word_reference(diagnosis.since))
 
 
 def unexplained_groups(diagnosis: Diagnosis) -> list[tuple[Statement, ...]]:
-    """Return the statements on what no effect explains, those of one pattern together."""
+    """Return the unexplained statements, those of one pattern together."""
     groups: dict[object, list[Statement]] = {}
     for statement in diagnosis.depends_on:
         key = (statement.variable, statement.kind, statement.range)
@@ -176,18 +170,12 @@ def unexplained_groups(diagnosis: Diagnosis) -> list[tuple[Statement, ...]]:
 
 
 def fitted_values(diagnosis: Diagnosis) -> list[FittedValue]:
-    """Return all that was fitted and not left at zero, in the order of adoption and of drives."""
+    """Return all fitted parameters that are not 0, effect by effect, drive by drive."""
     return [value for effect in diagnosis.effects for value in _fitted(diagnosis, effect)]
 
 
-def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
-    """Return the best sets of effects in words, each with its cost above the best, and of what."""
-    return [(_set(diagnosis, fitted), f'{fitted.cost:+.1f}' if number else 'the best',
-             word_terms(fitted.terms)) for number, fitted in enumerate(diagnosis.sets)]
-
-
 def detectable_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
-    """Return from which size on other effects would have been told, on any drive or joint."""
+    """Return each effect that is not reported, with the size from which it would have been."""
     rows: dict[tuple[type[CatalogueEffect], Parameter, str], list[float]] = {}
     for detectable in diagnosis.detectable:
         key = (detectable.effect, detectable.parameter, detectable.unit)
@@ -198,170 +186,160 @@ def detectable_rows(diagnosis: Diagnosis) -> list[tuple[str, str]]:
 
 
 def word_detectable(diagnosis: Diagnosis) -> str:
-    """Return the same of some common effects as one sentence; '' for none."""
-    told = [f'{name} from {size}' for name, size in detectable_rows(diagnosis) if name in COMMON]
-    return f'Smallest effects that would have been seen: {", ".join(told)}' if told else ''
+    """Return the detectable sizes of some common effects as one sentence; '' for none."""
+    sizes = [f'{name} from {size}' for name, size in detectable_rows(diagnosis) if name in COMMON]
+    return f'Smallest effects that would have been seen: {", ".join(sizes)}' if sizes else ''
+
+
+# Sets of effects
+
+
+def _placed(diagnosis: Diagnosis, name: str, drives: Drives) -> str:
+    unknown, comma, variable = name.partition(', ')
+    name = f'a pattern {place_of(variable)}' if comma and unknown == 'unknown' else name
+    return with_drives(name, drives, diagnosis.residuals.drives)
 
 
 def _set(diagnosis: Diagnosis, ranked: RankedSet) -> str:
-    return ' and '.join(with_drives(_plain_name(name), drives, diagnosis.residuals.drives)
-                        for name, drives in ranked.names) or 'nothing missing'
+    return ' and '.join(_placed(diagnosis, *name) for name in ranked.names) or 'nothing missing'
+
+
+def set_rows(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
+    """Return the best sets of effects in words, each with its cost above the best, and terms."""
+    return [(_set(diagnosis, fitted), f'{fitted.cost:+.1f}' if number else 'the best',
+             word_terms(fitted.terms)) for number, fitted in enumerate(diagnosis.sets)]
 
 
 def word_terms(terms: CostTerms) -> str:
-    """Return the terms of a difference of costs, those that can be seen."""
+    """Return the visible terms of a difference of costs."""
     return ', '.join(f'{name} {"-" if value < 0 else "+"} {abs(value):.1f}'
-                     for name, value in terms.to_dict().items() if abs(value) >= TOLD_COST)
+                     for name, value in terms.to_dict().items() if abs(value) >= LEAST_TERM)
 
 
 def _cost(ranked: RankedSet) -> str:
-    """Return how much more a set costs, and of what."""
     why = word_terms(ranked.terms)
     return (f'costs {abs(ranked.cost):.1f} {"less" if ranked.cost < 0 else "more"}'
             + (f': {why}' if why else ''))
 
 
 def runner_up(diagnosis: Diagnosis) -> str:
-    """Return how the second best set differs from the best, and its costs; '' for none.
+    """Return how the second best set differs from the best, and its cost; '' for none.
 
-    Sets with other effects in place of the reported ones come before sets with more effects.
+    A set that lacks a reported effect comes before a set that has one more.
     """
-    sets = [(fitted, set(fitted.names)) for fitted in diagnosis.sets]
-    # What could stand instead says more than what could join.
-    differing = [(one, names) for one, names in sets[1:] if names != sets[0][1]]
-    following = next((pair for pair in differing if sets[0][1] - pair[1]),
-                     differing[0] if differing else None)
-    if following is None:
+    best = set(diagnosis.sets[0].names) if diagnosis.sets else set()
+    others = [ranked for ranked in diagnosis.sets[1:] if set(ranked.names) != best]
+    second = next((ranked for ranked in others if best - set(ranked.names)),
+                  others[0] if others else None)
+    if second is None:
         return ''
-    best, (second, others) = sets[0][1], following
-    missing, instead = best - others, others - best
-    moved = {name for name, _ in missing} & {name for name, _ in instead}
-    if len(missing | instead) <= 2:
-        moved = set()  # one on other drives: both are told
-    left, put = (listed([with_drives(_plain_name(name), drives, diagnosis.residuals.drives)
-                         for name, drives in one.names
-                         if (name, drives) in apart and name not in moved])
-                 for one, apart in ((diagnosis.sets[0], missing), (second, instead)))
-    words = [f'{put} instead of {left}' if put and left else f'{put} as well' if put
-             else f'without {left}' if left else '',
-             f'{listed(sorted(moved))} on other drives' if moved else '']
-    return f'{", ".join(filter(None, words))}: {_cost(second)}'
-
-
-def _since(diagnosis: Diagnosis) -> str:
-    """Return since when what follows has changed, for a headline; '' without a reference."""
-    return f'Since {listed(diagnosis.since.recordings)}: ' if diagnosis.since else ''
+    gone, new = (listed([_placed(diagnosis, *name) for name in of.names
+                         if name not in other.names])
+                 for of, other in ((diagnosis.sets[0], second), (second, diagnosis.sets[0])))
+    words = (f'{new} instead of {gone}' if new and gone else f'{new} as well' if new
+             else f'without {gone}')
+    return f'{words}: {_cost(second)}'
 
 
 def word_reference(since: SinceReference | None) -> tuple[str, ...]:
-    """Return how far a reference run can tell what has changed; nothing without one."""
+    """Return what a reference run covers and explains; nothing without one."""
     if since is None:
         return ()
     shares = listed([f'{share:.0%} on {drive}' for drive, share in since.explained.items()])
-    told: tuple[str, ...] = (
-        f'{listed(since.recordings)} covers {since.covered:.0%} of the states of this recording'
-        + ('' if since.covered > MOSTLY else '; elsewhere only the model is known')
-        + f'. It explains this share of the squared error: {shares}',
-        'a fault that was already in the reference cannot be seen')
+    words = [f'{listed(since.recordings)} covers {since.covered:.0%} of the states of this '
+             'recording' + ('' if since.covered > MOSTLY else '; elsewhere only the model is known')
+             + f'. It explains this share of the squared error: {shares}',
+             'a fault that was already in the reference cannot be seen']
     if not 1 / ALIKE_PACE < since.pace < ALIKE_PACE:
-        told += (f'this recording moves at {since.pace:.2g} times the speed of the reference: '
-                 'confirm a delay or a hysteresis with a reference of this speed',)
-    return (*told, since.note) if since.note else told
+        words.append(f'this recording moves at {since.pace:.2g} times the speed of the reference: '
+                     'confirm a delay or a hysteresis with a reference of this speed')
+    return (*words, since.note) if since.note else tuple(words)
+
+
+# The headline
 
 
 def _headline(diagnosis: Diagnosis) -> str:
-    held, unit = diagnosis.effects, diagnosis.residuals.unit
+    effects, unit = diagnosis.effects, diagnosis.residuals.unit
     if diagnosis.effort_looks_like:
-        told = dict.fromkeys(looks.what for looks in diagnosis.effort_looks_like.values())
-        return f'{" ".join(map(sentence, told))} No effect is reported.'
+        what = dict.fromkeys(looks.what for looks in diagnosis.effort_looks_like.values())
+        return f'{" ".join(map(sentence, what))} No effect is reported.'
     if diagnosis.stick_slip:
-        sticking = [f'{drive} at {slip.frequency:.3g} Hz'
-                    for drive, slip in diagnosis.stick_slip.items()]
-        return (f'Stick-slip on {listed(sticking)}. No missing effect can be identified in such a '
+        drives = [f'{drive} at {slip.frequency:.2g} Hz'
+                  for drive, slip in diagnosis.stick_slip.items()]
+        return (f'Stick-slip on {listed(drives)}. No missing effect can be identified in such a '
                 'motion.')
-    left = root_mean_square(diagnosis.remaining)
-    fall = '' if not held else (
-        f' With {"it" if len(held) == 1 else "them"} the error '
-        f'{change(root_mean_square(diagnosis.residuals.error), left, unit)}')
-    noise = in_unit(diagnosis.noise_floor, unit)
+    residual, noise = root_mean_square(diagnosis.remaining), in_unit(diagnosis.noise_floor, unit)
+    is_noise = residual <= AT_NOISE * diagnosis.noise_floor
+    fall = '' if not effects else (
+        f'With {"it" if len(effects) == 1 else "them"} the error '
+        f'{change(root_mean_square(diagnosis.residuals.error), residual, unit)}')
     if diagnosis.little:
-        little = word_little(diagnosis.little, ' with the reported effects' if held else '')
-        return (f'{little[:1].upper()}{little[1:]}. No effect of the catalogue explains the rest.')
-    if not held and not diagnosis.depends_on and diagnosis.unconfirmed:
-        above = (f' The error, {in_unit(left, unit)}, is more than the noise, {noise}.'
-                 if left > AT_NOISE * diagnosis.noise_floor else '')
-        return f'No effect is supported by held-out data.{above}'
-    if any(effect.course is not None and effect.course.kind != SINCE for effect in held):
-        return ('The error changes during the recording, most likely because '
-                f'{_lacking(diagnosis)}.{fall}.')
+        little = word_little(diagnosis.little, ' with the reported effects' if effects else '')
+        return f'{little[:1].upper()}{little[1:]}. No effect of the catalogue explains the rest.'
+    if diagnosis.unconfirmed and not effects and not diagnosis.depends_on:
+        return 'No effect is supported by held-out data.' + ('' if is_noise else (
+            f' The error, {in_unit(residual, unit)}, is more than the noise, {noise}.'))
+    if any(effect.course is not None and effect.course.kind != SINCE for effect in effects):
+        return (f'The error changes during the recording, most likely because '
+                f'{_lacking(diagnosis)}. {fall}.')
     if diagnosis.verdict == 'unknown':
         groups = unexplained_groups(diagnosis)
-        places = listed([place_on(group) for group in groups[:2]] or [
+        places = [place_on(group) for group in groups[:2]] or [
             f'the error of {drive} is {ratio:.1f} times its noise'
-            for drive, ratio in diagnosis.above_noise.items()])
-        more = len(groups) - 2
-        places += f' and in {more} more place{"s" * (more > 1)}' if more > 0 else ''
-        beside = f' In addition, {_lacking(diagnosis)}; w{fall.strip()[1:]}.' if held else ''
-        return f'An error remains that no effect of the catalogue explains: {places}.{beside}'
+            for drive, ratio in diagnosis.above_noise.items()]
+        if len(groups) > 2:
+            places.append(f'in {len(groups) - 2} more place{"s" * (len(groups) > 3)}')
+        more = f' In addition, {_lacking(diagnosis)}; w{fall[1:]}.' if effects else ''
+        return (f'An error remains that no effect of the catalogue explains: {listed(places)}.'
+                + more)
     unseen = ('The recording does not show how much of the error of '
               f'{listed(diagnosis.unseen_noise)} is noise.') if diagnosis.unseen_noise else ''
-    if diagnosis.verdict == 'adequate':
-        if diagnosis.since:
-            return (f'no effect has changed, the error is the noise, {noise} rms. Changes much '
-                    'weaker than the noise cannot be seen.')
-        if unseen:
-            return f'No effect stands out. {unseen}'
-        return (f'No effect is missing: the error is the noise, {noise} rms. Effects much weaker '
-                'than the noise cannot be seen.')
-    level = (f'. {unseen}' if unseen else ', which is the noise.'
-             if left <= AT_NOISE * diagnosis.noise_floor
-             else f'; the noise is {noise}.')
+    if not effects:
+        if unseen and not diagnosis.since:
+            return f'No effect is reported. {unseen}'
+        return (f'No effect {"has changed" if diagnosis.since else "is missing"}: the error is the '
+                f'noise, {noise} rms. Effects much weaker than the noise cannot be seen.')
     which = ' (the data do not separate these)' if any(
-        _rivals(diagnosis, effect) for effect in held) else ''
+        _rivals(diagnosis, effect) for effect in effects) else ''
+    level = (f'. {unseen}' if unseen else ', which is the noise.' if is_noise
+             else f'; the noise is {noise}.')
     missing = _lacking(diagnosis)
     begin = 'T' if missing.startswith('the model') else missing[:1]
-    return f'{begin}{missing[1:]}{which}.{fall}{level}'
+    return f'{begin}{missing[1:]}{which}. {fall}{level}'
 
 
 def _lacking(diagnosis: Diagnosis) -> str:
-    """Return what the model lacks, and what it has that is not as the recordings say."""
-    new = [_or_rivals(diagnosis, effect) for effect in diagnosis.effects if not effect.in_model]
-    told = [f'the model lacks {listed(new)}'] if new else []
-    return '; '.join([*told, *(_otherwise(diagnosis, effect)
-                               for effect in diagnosis.effects if effect.in_model)])
+    """Return which effects the model lacks, and which of its values the data contradict."""
+    several = len(diagnosis.effects) > 1
+    new = [listed([_title(diagnosis, effect), *_rivals(diagnosis, effect)], 'or')
+           + (f' ({percent(-effect.share)})' if several else '')
+           for effect in diagnosis.effects if not effect.in_model]
+    return '; '.join([*([f'the model lacks {listed(new)}'] if new else []), *(
+        _otherwise(diagnosis, effect) for effect in diagnosis.effects if effect.in_model)])
 
 
 def _otherwise(diagnosis: Diagnosis, effect: FoundEffect) -> str:
-    """Return what the model says of an effect that it has, and what the recordings say."""
+    """Return the input model's values of an effect and those of the recordings."""
     fitted = [value for value in _fitted(diagnosis, effect) if value.given is not None]
     several = len({value.drive for value in fitted}) > 1
-
-    def told(value: FittedValue, text: str) -> str:
-        symbol = f'{value.parameter.symbol} ' if len(effect.effect.parameters) > 1 else ''
-        return symbol + text + (f' on {value.drive}' if several else '')
-
-    fitted = fitted[:MOST_CHANGED]
-    given = ', '.join(
-        told(value, with_uncertainty(value.given, 0.0, value.estimate.unit, value.size))
-        for value in fitted if value.given is not None)
-    recorded = ', '.join(told(value, value.text) for value in fitted)
+    names = [(f'{value.parameter.symbol} ' if len(effect.effect.parameters) > 1 else '', (
+        f' on {value.drive}' if several else '')) for value in fitted[:MOST_CHANGED]]
+    given, found = (', '.join(f'{symbol}{text}{where}' for (symbol, where), text in zip(
+        names, texts, strict=False)) for texts in (
+            [with_uncertainty(value.given or 0.0, 0.0, value.estimate.unit, value.size)
+             for value in fitted], [value.text for value in fitted]))
     rivals = _rivals(diagnosis, effect)
     other = f' (or the model lacks {listed(rivals, "or")})' if rivals else ''
     return (f'{_title(diagnosis, effect)} is in the model with {given}, but this recording gives '
-            f'{recorded}{other}')
+            f'{found}{other}')
 
 
-def _or_rivals(diagnosis: Diagnosis, effect: FoundEffect) -> str:
-    # One number for each, in the order of which they stand.
-    several = f' ({percent(-effect.share)})' if len(diagnosis.effects) > 1 else ''
-    title, rivals = _title(diagnosis, effect), _rivals(diagnosis, effect)
-    if rivals and ' or ' in title:
-        return f'{title}; or {listed(rivals, "or")}{several}'
-    return listed([title, *rivals], 'or') + several
+# Findings
 
 
 def _title(diagnosis: Diagnosis, effect: FittedEffect) -> str:
-    """Return the effect and where it is, all links and joints that are alike among them."""
+    """Return the effect and where it is; of links that move alike all."""
     places = listed([listed(names, 'or') for names in effect.places])
     return (f'{effect.name} on {places}' if places else
             with_drives(effect.name, effect.drives, diagnosis.residuals.drives)) + effect.when
@@ -372,53 +350,58 @@ def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
             if names[0] == effect.name for name in names[1:]]
 
 
-def _effect(diagnosis: Diagnosis, effect: FoundEffect, is_first: bool) -> Finding:
-    card = effect.effect.card_in(diagnosis.model.kind)
-    title = _title(diagnosis, effect)
+def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> Finding:
+    card, unit = effect.effect.card_in(diagnosis.model.kind), diagnosis.residuals.unit
+    title, is_validated = _title(diagnosis, effect), diagnosis.held_out_on == 'validation'
     what = (_otherwise(diagnosis, effect) if effect.in_model else
             f'The model lacks {title}: {_parameters(diagnosis, effect)}')
     if issubclass(effect.effect, MeasurementEffect):
-        what += ('. It describes the sensor: it is used in comparisons and by the monitor, never '
-                 'in a command')
-    return Finding(
-        title, f'{what}.', _why(diagnosis, effect, is_first), sentence(card.causes),
-        sentence(card.confirm), sentence(card.looks_like),
-        tuple(_remarks(diagnosis, effect)))
+        what += '. It describes the sensor, and is never used in a command'
+    data = 'the --validate recordings' if is_validated else 'held-out blocks of the same recording'
+    why = (f'Its force removes {percent(effect.share)} of the error: with it the error '
+           f'{change(effect.error_before, effect.error_after, unit)}. On {data} it '
+           f'{change(effect.held_out_before, effect.held_out_after, unit)}'
+           f'{"" if is_validated else "; another motion with --validate is stronger evidence"}. '
+           f'Evidence {effect.evidence:.0f} (threshold 0).')
+    if effect.without is not None:
+        why += (f' The best set without it, {_set(diagnosis, effect.without)}, '
+                f'{_cost(effect.without)}.')
+    return Finding(title, f'{what}.', why, sentence(card.causes), sentence(card.confirm),
+                   sentence(card.looks_like), tuple(_remarks(diagnosis, effect)))
 
 
 def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
-    card = rival.effect.card_in(diagnosis.model.kind)
+    card, unit = rival.effect.card_in(diagnosis.model.kind), diagnosis.residuals.unit
     title = _title(diagnosis, rival)
     held_out = '' if isnan(rival.held_out_after) else (
-        f', and {in_unit(rival.held_out_after, diagnosis.residuals.unit)} on held-out data')
+        f', and {in_unit(rival.held_out_after, unit)} on held-out data')
     return Finding(
         f'or {title}', f'{title} explains the data about as well as {rival.of}: '
         f'{_parameters(diagnosis, rival)}.',
-        f'With it the error is {in_unit(rival.error_after, diagnosis.residuals.unit)}{held_out}. '
+        f'With it the error is {in_unit(rival.error_after, unit)}{held_out}. '
         f'The set costs {plain(rival.cost, 2)} more than the best one.', sentence(card.causes),
         sentence(card.confirm), sentence(card.looks_like))
 
 
 def _parameters(diagnosis: Diagnosis, effect: FittedEffect) -> str:
+    """Return the fitted values; of more than two drives the least and the largest."""
     fitted = _fitted(diagnosis, effect)
-    drives = {value.drive for value in fitted}
-    if len(drives) <= MOST_LISTED:
-        return ', '.join(
-            f'{value.parameter.description} ({value.parameter.symbol}) {value.text}'
-            + (f' on {value.drive}' if len(drives) > 1 else '') for value in fitted)
+    count = len({value.drive for value in fitted})
     phrases = []
-    for parameter in effect.effect.parameters:
-        mine = sorted((value for value in fitted if value.parameter is parameter),
-                      key=lambda one: one.estimate.value)
-        if mine:
-            ends = mine[:1] if len(mine) == 1 else [mine[0], mine[-1]]
-            phrases.append(f'{parameter.description} ({parameter.symbol}) '
-                           + ' to '.join(f'{one.text} ({one.drive})' for one in ends))
+    for parameter in dict.fromkeys(value.parameter for value in fitted):
+        mine = [value for value in fitted if value.parameter == parameter]
+        if count > MOST_LISTED and len(mine) > 1:
+            mine.sort(key=lambda value: value.estimate.value)
+            texts = ' to '.join(f'{value.text} ({value.drive})' for value in (mine[0], mine[-1]))
+        else:
+            texts = ', '.join(value.text + (f' on {value.drive}' if count > 1 else '')
+                              for value in mine)
+        phrases.append(f'{parameter.description} ({parameter.symbol}) {texts}')
     return ', '.join(phrases)
 
 
 def _fitted(diagnosis: Diagnosis, effect: FittedEffect) -> list[FittedValue]:
-    """Return what was fitted of an effect and not left at zero, in the order of drives."""
+    """Return the fitted parameters of an effect that are not 0, in the order of drives."""
     known = {parameter.name: parameter for parameter in effect.effect.parameters}
     order = ['', *diagnosis.residuals.drives]
     values = []
@@ -430,7 +413,7 @@ def _fitted(diagnosis: Diagnosis, effect: FittedEffect) -> list[FittedValue]:
     if isinstance(effect, FoundEffect):
         values += [FittedValue(effect.name, '', moment, effect.moments[moment.name])
                    for moment in sure_moments(effect.effect, effect.parameters, effect.moments)]
-    return sorted(values, key=lambda one: order.index(one.drive))
+    return sorted(values, key=lambda value: order.index(value.drive))
 
 
 def sure_moments(effect: type[CatalogueEffect], parameters: Mapping[str, Estimate],
@@ -449,26 +432,19 @@ def sure_moments(effect: type[CatalogueEffect], parameters: Mapping[str, Estimat
     return found
 
 
-def _why(diagnosis: Diagnosis, effect: FoundEffect, is_first: bool) -> str:
-    fresh, unit = diagnosis.held_out_on == 'validation', diagnosis.residuals.unit
-    held_out = ('On the --validate recordings it ' if fresh else
-                'On held-out blocks of the same recording it ')
-    held_out += change(effect.held_out_before, effect.held_out_after, unit)
-    if not fresh and is_first:
-        held_out += '; another motion with --validate is stronger evidence'
-    return (f'Its force alone removes {percent(effect.share)} of the error, each drive in units of '
-            'its noise. '
-            f'With it the error {change(effect.error_before, effect.error_after, unit)}. '
-            f'{held_out}. Evidence {effect.evidence:.0f} (threshold 0).'
-            + ('' if effect.without is None else
-               f' The best set without it, {_set(diagnosis, effect.without)}, '
-               f'{_cost(effect.without)}.'))
-
-
 def _remarks(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
     if rivals := _rivals(diagnosis, effect):
         yield f'The data do not separate {effect.name} from {listed(rivals, "or")}.'
-    yield from _negative(diagnosis, effect)
+    for value in _fitted(diagnosis, effect):
+        number, what = value.estimate, value.parameter.description
+        lowest = effect.effect.unphysical_below.get(value.parameter.name, -float('inf'))
+        if number.value < lowest:
+            doubt = ('' if number.value + INTERVAL * number.std < lowest else
+                     ', though zero is within its uncertainty')
+            kind = 'friction' if 'friction' in effect.name else what
+            yield (f'{_placed(diagnosis, effect.name, (value.drive,) if value.drive else None)}: '
+                   f'{what} is negative, {value.text}{doubt}. Negative {kind} is impossible: '
+                   'the model has too much of it, or another effect looks like it.')
     for names in effect.places:
         if len(names) > 1:
             yield (f'No motion separates {names[0]} from {listed(names[1:], "or")}, because they '
@@ -480,64 +456,31 @@ def _remarks(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
                'tried; the true one may be beyond.')
 
 
-def _negative(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
-    for one in _fitted(diagnosis, effect):
-        value, what = one.estimate.value, one.parameter.description
-        lowest = effect.effect.unphysical_below.get(one.parameter.name)
-        if lowest is None or value >= lowest:
-            continue
-        place = f'{effect.name} on {one.drive}' if one.drive else effect.name
-        kind = 'friction' if 'friction' in effect.name else what
-        doubt = ('' if value + INTERVAL * one.estimate.std < lowest else
-                 ', though zero is within its uncertainty')
-        yield (f'{place}: {what} is negative, {one.text}{doubt}. Negative {kind} is impossible: '
-               'the model has too much of it, or another effect looks like it.')
-
-
 def _two_in_one(diagnosis: Diagnosis, effect: FoundEffect) -> Iterator[str]:
-    """Tell how the dry part of asymmetric friction reads as two other effects."""
+    """Yield which two other effects are the same as the dry part of asymmetric friction."""
     forces: dict[str, dict[str, float]] = {}
     for value in _fitted(diagnosis, effect):
-        if value.parameter.name.startswith('force_'):
-            forces.setdefault(value.drive, {})[value.parameter.name] = value.estimate.value
+        forces.setdefault(value.drive, {})[value.parameter.name] = value.estimate.value
     for drive, values in forces.items():
-        unit = diagnosis.residuals.units_of(drive).effort
         forward, backward = (values.get(f'force_{way}', 0.0) for way in ('forward', 'backward'))
-        yield (f'{drive}: the dry part is the same as coulomb_friction of '
-               f'{in_unit((forward + backward) / 2, unit)} plus effort_offset of '
-               f'{in_unit((forward - backward) / 2, unit)}; data of moving drives cannot tell the '
-               'one from the two, a reading at rest can.')
-
-
-def _suspect(diagnosis: Diagnosis, ranked: RankedEffect) -> str:
-    return (f'{with_drives(ranked.name, ranked.drives, diagnosis.residuals.drives)}: possible, '
-            f'but slow noise explains the data as well (evidence {ranked.evidence:.0f}, threshold '
-            '0); repeat the recording')
-
-
-def _rounded(after: float, before: float) -> float:
-    """Return a width of reversal with two digits, or as many as show that it has moved.
-
-    Widths come without an uncertainty: no more digits than they can have.
-    """
-    return next((value for digits in range(2, 7)
-                 if (value := float(f'{after:.{digits}g}')) != before), after)
+        unit = diagnosis.residuals.units_of(drive).effort
+        if forward or backward:
+            yield (f'{drive}: the dry part equals coulomb_friction of '
+                   f'{in_unit((forward + backward) / 2, unit)} plus effort_offset of '
+                   f'{in_unit((forward - backward) / 2, unit)}. Only a reading at rest separates '
+                   'them.')
 
 
 def _calibrated(diagnosis: Diagnosis, number: Calibration) -> str:
-    after = with_uncertainty(number.after, number.std, number.unit) if number.std else (
-        f'about {with_uncertainty(_rounded(number.after, number.before), 0.0, number.unit)}')
+    # Widths of reversal have no uncertainty: two digits, or as many as show the change.
+    after = with_uncertainty(number.after, number.std, number.unit) if number.std else next(
+        f'about {with_uncertainty(value, 0.0, number.unit)}' for digits in range(2, 8)
+        if (value := float(f'{number.after:.{digits}g}')) != number.before or digits == 7)
     moved = f'{number.label}: {with_uncertainty(number.before, 0.0, number.unit)} becomes {after}'
     tolerance = diagnosis.model.values.get(f'tolerances.{number.key}')
     if not tolerance:
         return f'{moved}: calibrated'
-    change = abs(number.after - number.before)
-    within = change <= tolerance * abs(number.before) + INTERVAL * number.std
-    return (f'{moved}, within its tolerance of {tolerance:.2g} ({tolerance:.0%}): calibrated, not '
-            'an effect' if within else
-            f'{moved}, beyond its tolerance of {tolerance:.0%}: check that number first')
-
-
-def _plain_name(name: str) -> str:
-    unknown, comma, variable = name.partition(', ')
-    return f'a pattern {place_of(variable)}' if comma and unknown == 'unknown' else name
+    is_within = (abs(number.after - number.before)
+                 <= tolerance * abs(number.before) + INTERVAL * number.std)
+    return (f'{moved}, within its tolerance of {tolerance:.0%}: calibrated, not an effect'
+            if is_within else f'{moved}, beyond its tolerance of {tolerance:.0%}: check it first')

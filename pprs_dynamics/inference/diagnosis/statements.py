@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where a drive's error lies, in numbers and words, and what to look at if it stays unknown."""
+"""Statements about one drive's error: where it is, in numbers and words, with possible causes."""
 
 from __future__ import annotations
 
@@ -27,8 +27,7 @@ from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.measurement.motion.stick_slip import StickSlip
 
 STICK_SLIP = 'stick_slip'  # kind of statement
-# How a variable is called, and the unit it is read in: factor from SI, and name. Those of drives
-# that push, and of those that turn.
+# The unit in which a variable is read: factor from SI, and name; of linear and of rotary drives.
 UNITS = {
     'position': (1e3, 'mm'), 'velocity': (1e3, 'mm/s'), 'acceleration': (1.0, 'm/s²'),
     'load': (1.0, 'N'), 'rod_angle': (180 / np.pi, 'deg'), 'platform_x': (1e3, 'mm'),
@@ -37,49 +36,37 @@ UNITS = {
 }
 TURNING = {'position': (180 / np.pi, 'deg'), 'velocity': (1.0, 'rad/s'),
            'acceleration': (1.0, 'rad/s²'), 'load': (1.0, 'N m')}
-# What it could come from, and how to look, by what the error depends on.
+# Possible causes, and how to look, by what the error depends on.
 LEADS = {
-    'position': ('a dent, dirt or a joint in the guide or screw, something that catches or '
-                 'touches there',
-                 'creep over that place both ways: it must stay put; look and feel along the '
-                 'guide'),
-    'velocity': ('friction of another form than the catalogue\'s, a controller or amplifier that '
-                 'behaves otherwise at that speed',
+    'position': ('a dent, dirt or a joint in the guide or screw; something that touches there',
+                 'creep over that place both ways, look and feel along the guide'),
+    'velocity': ('friction of another form than the catalogue\'s; a controller or amplifier that '
+                 'behaves differently at that speed',
                  'run the drive alone at several constant speeds around there'),
     'direction': ('play, or friction of another form that differs by direction',
                   'approach one position from both sides and compare efforts and encoders'),
-    'acceleration': ('play or compliance between drive and load, a saturated amplifier',
-                     'repeat the motion at half the speed: what follows acceleration falls to a '
+    'acceleration': ('play or compliance between drive and load; a saturated amplifier',
+                     'repeat the motion at half the speed: an error by acceleration falls to a '
                      'quarter'),
-    'load': ('a guide or nut that gives or jams under load',
-             'repeat with a known weight more on the platform'),
+    'load': ('a guide or nut that gives or jams under load', 'repeat with a known extra weight'),
     'rod_angle': ('something that touches or binds in a passive joint at that angle',
                   'swing the uncoupled rod by hand through that angle'),
-    'time': ('something that happened once: a load taken up or put down, a touch, a loose part, a '
-             'sensor that jumped',
-             'repeat the recording: what comes at the same time belongs to the motion, what does '
-             'not happened once'),
-    'frequency': ('a vibration of the structure, a controller on the edge of stability, a '
-                  'neighbouring machine or the mains',
-                  'record at rest, and with other gains: a machine nearby does not care, the '
-                  'controller does'),
+    'time': ('a single event: a load taken up or put down, a touch, a loose part, a sensor that '
+             'jumped', 'repeat the recording: an error at the same time belongs to the motion'),
+    'frequency': ('a vibration of the structure, a controller near instability, a machine nearby '
+                  'or the mains', 'record at rest, and with other gains'),
     'platform': ('something that pulls at the platform or touches it in part of the workspace: a '
-                 'hose, a cable, a workpiece',
-                 'take away whatever touches the platform and repeat'),
+                 'hose, a cable, a workpiece', 'remove what touches the platform and repeat'),
     'drive': ('a coupling of the two drives: a shared cable chain or supply, a bending frame, '
-              'cross-talk between sensors',
-              'move that drive alone, with this one held still'),
+              'cross-talk between sensors', 'move that drive alone, with this one at rest'),
 }
 SHAPES = {
     'offset': 'a constant', 'range': 'a shift within a range',
-    'directed_range': 'a shift against or along the motion, within a range',
-    'growth': 'a curve from end to end',
-    'directed_growth': 'a curve from end to end that turns over with the direction of motion',
-    'one_way': 'a curve for one direction only', 'friction': 'a step where the motion reverses',
-    'fading': 'a step where the motion reverses, which fades with speed',
-    'fast': 'a curve that shows at speed',
-    'scatter': 'scatter larger than elsewhere, with no shift',
-    'bump': 'a bump', 'level': 'a slow drift without a pattern',
+    'directed_range': 'a shift in the direction of motion, within a range',
+    'growth': 'a curve', 'directed_growth': 'a curve that changes sign with the direction',
+    'one_way': 'a curve in one direction only', 'friction': 'a step at reversals',
+    'fading': 'a step at reversals that fades with speed', 'fast': 'a curve at high speed',
+    'scatter': 'a larger scatter', 'bump': 'a bump', 'level': 'a slow drift',
     'ripple': 'a wave', 'line': 'a vibration at one frequency',
 }
 
@@ -187,7 +174,7 @@ def word_statement(
     text = _sentence(variable, pattern, drive_patterns, signed, amplitude, share, time, shape)
     if other_variables:
         others = listed([in_words(name) for name in other_variables], 'or')
-        text += f'; {others} would explain it about as well'
+        text += f'; {others} explains it about as well'
     return Statement(drive, variable, limits, share, time, f'{drive}: {text}', evidence,
                      pattern.kind, amplitude, float(np.mean(shape ** 2)), other_variables)
 
@@ -209,37 +196,34 @@ def _sentence(
     variable: str, pattern: Pattern, drive_patterns: DrivePatterns, signed: float, amplitude: float,
     share: float, time: float, shape: Array,
 ) -> str:
-    kind, word = pattern.kind, in_words(variable)
-    residuals = drive_patterns.residuals
+    kind, residuals = pattern.kind, drive_patterns.residuals
     units = residuals.units_of(residuals.drives[drive_patterns.d])
-    effort = units.effort
+    effort, size = units.effort, plain(amplitude)
+    of = f'{share:.0%} of its squared error'
     if kind == 'offset':
-        return (f'its error has a mean of {with_sign(signed)} {effort} over the whole recording, '
-                f'{share:.0%} of its squared error')
+        return f'its mean error is {with_sign(signed)} {effort} ({of})'
     if kind == 'friction':
-        return (f'its error has the sign of the motion, {plain(amplitude)} {effort}: friction is '
-                f'too {"small" if signed > 0 else "large"} in the model; this is {share:.0%} of '
-                'its squared error')
+        much = 'little' if signed > 0 else 'much'
+        return (f'its error has the sign of the motion, {size} {effort} ({of}): the model has too '
+                f'{much} friction')
     if kind == 'ripple':
         factor, place = read_in('position', units)
-        return (f'its error repeats about every {plain(pattern.scale * factor)} {place} of '
-                f'position, {plain(amplitude)} {effort}; this is {share:.0%} of its squared error')
+        return (f'its error repeats every {plain(pattern.scale * factor)} {place} of position, '
+                f'{size} {effort} ({of})')
     if kind == 'line':
-        return (f'its error holds a vibration at {plain(pattern.scale, 4)} Hz of '
-                f'{plain(amplitude)} {effort}, {share:.0%} of its squared error')
+        return f'its error vibrates at {plain(pattern.scale, 4)} Hz, {size} {effort} ({of})'
     if kind in ('growth', 'directed_growth'):
         opposed = ' in the direction of motion' if kind == 'directed_growth' else ''
         low, high = _ends(drive_patterns, variable, shape, kind == 'directed_growth')
-        return (f'its error changes with {word}: {with_sign(low)} {effort} where it is lowest, '
-                f'{with_sign(high)} {effort} where it is highest{opposed}; this is '
-                f'{share:.0%} of its squared error')
+        return (f'its error changes with {in_words(variable)}, from {with_sign(low)} {effort} at '
+                f'the lowest to {with_sign(high)} {effort} at the highest{opposed} ({of})')
     place = _place(variable, pattern, drive_patterns)
-    where = f'{share:.0%} of its squared error lies {place}, in {time:.0%} of the time'
+    of += f' in {time:.0%} of the time'
     if kind == 'scatter':
-        return (f'{where}; it scatters there {plain(float(np.sqrt(pattern.scale)), 2)} times as '
-                'much as elsewhere')
+        ratio = plain(float(np.sqrt(pattern.scale)), 2)
+        return f'{place} its error scatters {ratio} times as much as elsewhere ({of})'
     along = ' in the direction of motion' if kind in ('directed_range', 'fading') else ''
-    return f'{where}; it is shifted there by {with_sign(signed)} {effort}{along}'
+    return f'{place} its error is shifted by {with_sign(signed)} {effort}{along} ({of})'
 
 
 def _place(variable: str, pattern: Pattern, drive_patterns: DrivePatterns) -> str:
@@ -279,14 +263,12 @@ def word_stick_slip(drive: str, slip: StickSlip, residuals: Residuals) -> Statem
     unit = residuals.units_of(drive).position
     return Statement(
         drive, 'frequency', (slip.frequency, slip.frequency), 1.0, slip.share,
-        f'{drive}: it sticks and slips {slip.frequency:.3g} times a second, by '
-        f'{slip.step:.2g} {unit}, at speeds up to {slip.speed:.2g} {unit}/s, in '
-        f'{percent(slip.share)} of the time', np.inf, STICK_SLIP, 0.0, 0.0)
+        f'{drive}: it sticks and slips at {slip.frequency:.2g} Hz in {percent(slip.share)} of the '
+        f'time, steps of {slip.step:.2g} {unit}, speeds up to {slip.speed:.2g} {unit}/s',
+        np.inf, STICK_SLIP, 0.0, 0.0)
 
 
-def describe_unexplained(
-    group: Sequence[Statement], beside_effects: bool,
-) -> tuple[str, str, str, str, str]:
+def describe_unexplained(group: Sequence[Statement]) -> tuple[str, str, str, str, str]:
     """Return title, what, why, cause and how to confirm, of one pattern on one or more drives."""
     first = group[0]
     drives = listed([statement.drive for statement in group])
@@ -295,21 +277,20 @@ def describe_unexplained(
         for statement in group)
     if first.kind == STICK_SLIP:
         return (f'stick_slip on {drives}', f'Stick-slip on {drives}: {texts}.',
-                'The drive stands while its effort builds up, and the effort falls while it slips, '
-                'over and over at one frequency.',
-                'Friction that falls with the speed (boundary lubrication, dry guides), a soft '
-                'transmission before it, and a controller that is slow or has little damping.',
-                'Move faster: above some speed it ends. Stiffer gains or another lubricant shift '
+                'The drive stands while its effort rises, slips while the effort falls, and '
+                'repeats this at one frequency.',
+                'Friction that falls with speed (boundary lubrication, dry guides), a soft '
+                'transmission, and a controller that is slow or has little damping.',
+                'Move faster: above some speed it ends. Stiffer gains or another lubricant change '
                 'that speed and the frequency.')
-    left = 'what the effects found leave' if beside_effects else 'the error'
-    what = (f'Something on {drives} that no effect of the catalogue explains, '
-            f'{place_of(first.variable)}. Its shape is '
-            f'{SHAPES.get(first.kind, "drawn in the report")}: in {left}, {texts}.')
+    shape = SHAPES.get(first.kind, 'drawn in the report')
+    what = (f'The error of {drives}, {place_of(first.variable)}, has the form of no effect of the '
+            f'catalogue. Its form is {shape}: {texts}.')
     evidence = max(statement.evidence for statement in group)
     why = ('Its noise is compared with that of the other drives, which move alike.'
            if first.kind == 'level' else
-           f'Noise like this one does not do that (evidence {evidence:.0f}, where 0 is '
-           'the threshold), and every effect of the catalogue explains it worse.')
+           f'Noise does not explain it (evidence {evidence:.0f}, threshold 0), and every effect '
+           'of the catalogue explains it worse.')
     cause, confirm = LEADS[_lead(first.variable)]
     return f'unknown {place_on(group)}', what, why, sentence(cause), sentence(confirm)
 

@@ -40,7 +40,8 @@ from pprs_dynamics.inference.search.body_centres import about_centre
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
-from pprs_dynamics.physics.model.force_model import ForceModel, Forces
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.forces import Forces
 
 HOMING_SAMPLES = 100  # of a motion, at which columns of wrong zeros are computed; they are slow
 Columns = Mapping[int, tuple[np.typing.NDArray[np.int_], Array]]
@@ -135,15 +136,15 @@ class ColumnPlan:
 
     Parameters
     ----------
-    given, model : ForceModel
+    given, model : DriveModel
         As the user has it; and around which forces are linear.
     base : tuple of BaseColumn
         As the design has them; their rows are those of the recordings, if any.
     terms : tuple of FittedTerm
     """
 
-    given: ForceModel
-    model: ForceModel
+    given: DriveModel
+    model: DriveModel
     base: tuple[BaseColumn, ...]
     terms: tuple[FittedTerm, ...]
 
@@ -184,13 +185,13 @@ class ColumnPlan:
         """Return all columns on the recordings of the design that the plan is of."""
         return self._by_drive([one.rows for one in self.base], design)
 
-    def on_motions(self, forces: Forces, time: Array, block: int = 1) -> list[Columns]:
-        """Return the columns of motions one after the other, each at the same times.
+    def on_motion(self, forces: Forces, time: Array, block: int = 1) -> Columns:
+        """Return the columns of a motion.
 
         Parameters
         ----------
         forces : Forces
-            Of the model, before its sensors; M motions of N samples.
+            Of the model, before its sensors.
         time : (N,) array
         block : int
             Samples that are averaged.
@@ -198,29 +199,25 @@ class ColumnPlan:
         samples = len(time)
         found = self._whole_columns(forces, samples)
         shared = dict(zip(self.numbers, found[NUMBERS], strict=True))
-        for k, one in enumerate(self.base):
-            if isinstance(one, ReversalShape):
-                shared[k] = found[OF_JOINTS if one.drive is None else OF_DRIVES][one.number]
+        for k, column in enumerate(self.base):
+            if isinstance(column, ReversalShape):
+                shared[k] = found[OF_JOINTS if column.drive is None else OF_DRIVES][column.number]
         treat = Treatment(np.arange(0, samples - samples % block or samples, block), samples)
-        result = []
-        for start in range(0, len(forces.total), samples):
-            part = slice(start, start + samples)
 
-            def by_drive(column: Array) -> dict[int, Array]:
-                return dict(enumerate(treat(column).T))
+        def by_drive(column: Array) -> dict[int, Array]:
+            return dict(enumerate(treat(column).T))
 
-            design = replace(
-                self._motion_design(forces, part, time, treat, block), structure=tuple(
-                    Term(effect, None, {}, {d: treat(found[effect.name][:, part, d].T).T
-                                            for d in range(len(self.model.drives))})
-                    for effect in self._wanted if issubclass(effect, StructureEffect)),
-                homing=tuple(by_drive(column[part]) for column in found.get(HOMING, ())),
-                inertia=tuple(by_drive(column[part]) for column in found.get(INERTIA, ())))
-            base = [design.present_rows(one) if isinstance(
-                        one, (PresentCoefficient, PresentShape))
-                    else _felt(one, by_drive(shared[k][part])) for k, one in enumerate(self.base)]
-            result.append(self._by_drive(base, design))
-        return result
+        design = replace(
+            self._motion_design(forces, time, treat, block), structure=tuple(
+                Term(effect, None, {}, {d: treat(found[effect.name][:, :, d].T).T
+                                        for d in range(len(self.model.drives))})
+                for effect in self._wanted if issubclass(effect, StructureEffect)),
+            homing=tuple(map(by_drive, found.get(HOMING, ()))),
+            inertia=tuple(map(by_drive, found.get(INERTIA, ()))))
+        base = [design.present_rows(column) if isinstance(
+                    column, (PresentCoefficient, PresentShape))
+                else _felt(column, by_drive(shared[k])) for k, column in enumerate(self.base)]
+        return self._by_drive(base, design)
 
     @property
     def _wanted(self) -> set[type[CatalogueEffect]]:
@@ -229,7 +226,7 @@ class ColumnPlan:
             one, (FittedTerm, PresentCoefficient, PresentShape))}
 
     def _whole_columns(self, forces: Any, samples: int) -> dict[str, Array]:
-        """Return the columns of all motions at full rate that do not need one motion alone.
+        """Return the columns of a motion at full rate that do not need its design.
 
         By name as `Sensitivities.columns`, those of an effect by its own, whether it is in the
         model or not.
@@ -243,12 +240,11 @@ class ColumnPlan:
         return {name.removeprefix(PRESENT): column
                 for name, column in sensitivities.columns(forces).items()}
 
-    def _motion_design(self, forces: Forces, part: slice, time: Array, treat: Treatment,
-                       block: int) -> Design:
-        s, total = forces.mechanism, forces.total[part]
-        full = FullRate(time, s.position[part], s.velocity[part], s.acceleration[part],
-                        s.direction[part], s.friction_load[part], s.transmitted[part], total, total,
-                        (slice(0, len(time)),), treat, float(time[0]), {})
+    def _motion_design(self, forces: Forces, time: Array, treat: Treatment, block: int) -> Design:
+        s, total = forces.mechanism, forces.total
+        full = FullRate(time, s.position, s.velocity, s.acceleration, s.direction,
+                        s.friction_load, s.transmitted, total, total, (slice(0, len(time)),),
+                        treat, float(time[0]), {})
         means = treat(total)
         residuals = Residuals(self.model.drives, treat(time), np.zeros(len(means), dtype=int),
                               means, means, period=float(time[1] - time[0]) * block)

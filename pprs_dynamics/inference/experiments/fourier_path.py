@@ -19,7 +19,6 @@ excitation).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -102,18 +101,6 @@ class FourierPath:
         c, s = np.cos(omega * t), np.sin(omega * t)
         return (np.sum(a * (c - 1) + b * s, axis=1), np.sum(omega * (b * c - a * s), axis=1),
                 -np.sum(omega ** 2 * (a * c + b * s), axis=1))
-
-
-def joined_motion(paths: Sequence[FourierPath], time: Array) -> PlatformMotion:
-    """Return motions of one duration one after the other, each at the same times [s]."""
-    motions = [path.motion(time) for path in paths]
-    pause = float(time[-1] - time[0]) + 1.0
-    position, orientation, v, omega, a, epsilon = (
-        np.concatenate([getattr(motion, name) for motion in motions]) for name in (
-            'position', 'orientation', 'linear_velocity', 'angular_velocity',
-            'linear_acceleration', 'angular_acceleration'))
-    times = np.concatenate([time + k * pause for k in range(len(paths))])
-    return PlatformMotion(position, orientation, v, omega, a, epsilon, times)
 
 
 def _quaternions(psi: Array, theta: Array, phi: Array) -> Array:

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import Forces
+from pprs_dynamics.physics.model.forces import Forces
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.passive_friction import IndependentChainsFriction
 
@@ -51,52 +50,47 @@ class MotionLimits:
         if not 0 <= self.margin <= 0.9:
             raise ModelError('margin', self.margin, 'lie between 0 and 0.9')
 
-    def uses(self, model: DriveModel, forces: Forces, samples: int) -> Array:
-        """Return how much of each limit, its margin taken off, motions use: 1 is all of it.
-
-        Parameters
-        ----------
-        model : DriveModel
-        forces : Forces
-            Of M motions one after the other.
-        samples : int
-            Of each motion.
-
-        Returns
-        -------
-        (M, L) array
-            In the order of `limit_names`.
-        """
-        state, limits, left = forces.mechanism, model.limits, 1 - self.margin
+    def uses(self, model: DriveModel, forces: Forces) -> dict[str, float]:
+        """Return how much of each limit, its margin taken off, a motion uses: 1 is all of it."""
+        state, bounds, left = forces.mechanism, model.robot.bounds, 1 - self.margin
+        limits, chains = model.limits, state.links.chains
         lower, upper = limits.strokes
-        sine = limits.rod_sine + self.margin * (1 - limits.rod_sine)
-        columns = [
-            np.abs(2 * state.position - lower - upper) / ((upper - lower) * left),
-            np.abs(state.velocity) / (self.velocity * left),
-            np.abs(state.acceleration) / (self.acceleration * left),
-            (np.abs(forces.total) + self.effort_reserve) / (limits.efforts * left),
-            ((1 - np.abs(state.chains.sin_u)) / (1 - sine)),
-            (state.motion.tilt / (self.tilt * left))[:, None],
-            (condition_number(model.robot.geometry, state.jacobians.J)
-             / (min(limits.condition_number, self.condition_number) * left))[:, None]]
-        if _needs_cosine(model):
-            cosine = limits.rod_cosine + self.margin * (1 - limits.rod_cosine)
-            columns.append((1 - np.abs(state.chains.cos_u)) / (1 - cosine))
-        every = np.concatenate(columns, axis=1)
-        largest: Array = every.reshape(-1, samples, every.shape[1]).max(axis=1)
-        return largest
+        sine = bounds.rod_sine + self.margin * (1 - bounds.rod_sine)
+        shares = {
+            'stroke': np.abs(2 * state.position - lower - upper) / ((upper - lower) * left),
+            'velocity': np.abs(state.velocity) / (self.velocity * left),
+            'acceleration': np.abs(state.acceleration) / (self.acceleration * left),
+            'effort': (np.abs(forces.total) + self.effort_reserve) / (limits.efforts * left)}
+        found = {f'{name} of {drive}': share[:, d] for name, share in shares.items()
+                 for d, drive in enumerate(DRIVES)}
+        angles = {'rod angle of chain': (1 - np.abs(chains.sin_u)) / (1 - sine)}
+        if any(isinstance(effect, IndependentChainsFriction) for effect in model.effects):
+            cosine = bounds.rod_cosine + self.margin * (1 - bounds.rod_cosine)
+            angles['cosine of rod angle'] = (1 - np.abs(chains.cos_u)) / (1 - cosine)
+        found |= {f'{name} {k + 1}': share[:, k] for name, share in angles.items()
+                  for k in range(3)}
+        found['tilt of the platform'] = state.motion.tilt / (self.tilt * left)
+        found['condition number'] = condition_number(
+            model.robot.geometry, state.links.jacobians.J) / (
+                min(bounds.condition_number, self.condition_number) * left)
+        return {name: float(share.max()) for name, share in found.items()}
 
 
-def limit_names(model: DriveModel) -> tuple[str, ...]:
-    """Return the names of the limits of a 3-PPRS, in order."""
-    names = [f'{what} of {drive}' for what in ('stroke', 'velocity', 'acceleration', 'effort')
-             for drive in DRIVES]
-    names += [f'rod angle of chain {chain}' for chain in (1, 2, 3)]
-    names += ['tilt of the platform', 'condition number']
-    if _needs_cosine(model):
-        names += [f'cosine of rod angle {chain}' for chain in (1, 2, 3)]
-    return tuple(names)
+@dataclass(frozen=True)
+class ArmLimits:
+    """Limits of a motion in addition to those of the URDF.
 
+    Parameters
+    ----------
+    velocity, acceleration : float
+        Of every joint [rad/s, rad/s^2, or m/s, m/s^2].
+    margin : float
+        Share of every limit that stays unused.
+    effort_reserve : float
+        Taken off the efforts for what the model does not know of [N m, N].
+    """
 
-def _needs_cosine(model: DriveModel) -> bool:
-    return any(isinstance(effect, IndependentChainsFriction) for effect in model.effects)
+    velocity: float = np.inf
+    acceleration: float = 5.0
+    margin: float = 0.1
+    effort_reserve: float = 0.0

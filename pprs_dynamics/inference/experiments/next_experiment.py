@@ -16,22 +16,27 @@ from scipy.special import ndtr
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.experiments.arm_motions import ArmLimits
 from pprs_dynamics.inference.experiments.columns import FittedTerm
-from pprs_dynamics.inference.experiments.criteria import Contest, Precision
-from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
+from pprs_dynamics.inference.experiments.criteria import Contest, Precision, misfits_of
+from pprs_dynamics.inference.experiments.motion_design import (
+    ArmMotions,
+    Motion,
+    PlatformMotions,
+    design,
+    limits_of,
+)
+from pprs_dynamics.inference.experiments.motion_limits import ArmLimits, MotionLimits
 from pprs_dynamics.inference.experiments.question import (
     Question,
     commissioning,
     precision_of,
     question_of,
 )
-from pprs_dynamics.inference.experiments.trajectory_search import ArmSearch, Found, TrajectorySearch
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel, Forces
+from pprs_dynamics.physics.model.forces import Forces
 
 PURPOSES = ('separate', 'commission')
 SURE = 0.9  # probability from which a design counts as separating
@@ -127,7 +132,7 @@ class Experiment:
         Times [s] -> PlatformMotion, or JointMotion of an arm.
     forces : callable
         Times [s] -> Forces.
-    model : ForceModel
+    model : DriveModel
     """
 
     kind: str
@@ -140,7 +145,7 @@ class Experiment:
     duration: float
     motion: Callable[[Array], Any]
     forces: Callable[[Array], Forces]
-    model: ForceModel
+    model: DriveModel
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -219,7 +224,7 @@ def _listed(pairs: Sequence[tuple[str, str]]) -> str:
 
 
 def next_experiment(
-    model: ForceModel, recordings: Sequence[Recording] = (),
+    model: DriveModel, recordings: Sequence[Recording] = (),
     purpose: str = 'separate',
     limits: MotionLimits | ArmLimits | None = None, duration: float = 20.0, seed: int = 0,
     noise: float = 0.05, progress: Callable[[float], None] | None = None,
@@ -242,17 +247,45 @@ def next_experiment(
     check_purpose(purpose, recordings)
     check_duration(duration)
     question = (commissioning(model, recordings, noise, decisions)
-                if purpose == 'commission' and isinstance(model, DriveModel) else
+                if purpose == 'commission' and not model.moves_joints else
                 question_of(model, recordings, lambda share: report(0.2 * share), decisions))
     limits = limits or (ArmLimits() if model.moves_joints else MotionLimits())
     limits = replace(limits, effort_reserve=max(
         limits.effort_reserve, RESERVE * question.noise_floor))
-    search: TrajectorySearch | ArmSearch = (
-        ArmSearch(question, limits, duration, seed) if isinstance(limits, ArmLimits) else
-        TrajectorySearch(question, limits, duration, seed))
-    found = search.run(lambda share: report(0.2 + 0.8 * share))
-    report(1.0)
-    return experiment_of(question, found)
+    return design_experiment(question, limits, duration, seed,
+                             lambda share: report(0.2 + 0.8 * share))
+
+
+def design_experiment(
+    question: Question, limits: MotionLimits | ArmLimits, duration: float, seed: int,
+    progress: Callable[[float], None] = lambda share: None,
+) -> Experiment:
+    """Return the motion that answers a question best."""
+    motions = (ArmMotions(question.model, limits, duration) if isinstance(limits, ArmLimits)
+               else PlatformMotions(question.model, limits, duration))
+    asked = question
+
+    def screened(drawn: list[Any]) -> Callable[[Any], float]:
+        nonlocal asked
+        asked = without_hopeless(question, [question.gram(motion) for motion in drawn])
+        return lambda motion: asked.worth(asked.gram(motion))
+
+    best = design(motions, lambda motion: 0.0, seed, progress, screened)
+    progress(1.0)
+    return experiment_of(asked, best, limits_of(motions, best))
+
+
+def without_hopeless(question: Question, grams: Sequence[Array]) -> Question:
+    """Return a question without the contests that none of some motions would decide."""
+    contests = question.contests
+    if not contests:
+        return question
+    known = question.known
+    gained = np.max([misfits_of(contests, known + gram) for gram in grams],
+                    axis=0) - misfits_of(contests, known)
+    hopeful = [contest for contest, more in zip(contests, gained, strict=True)
+               if contest.now + more > question.decisions.rival_margin]
+    return question.with_contests(hopeful) if hopeful else question
 
 
 def check_purpose(purpose: str, recordings: Sequence[object]) -> None:
@@ -272,9 +305,9 @@ def check_duration(duration: float) -> None:
                            f'{LONGEST:g} s')
 
 
-def experiment_of(question: Question, found: Found) -> Experiment:
-    """Return a motion with what it promises for a question."""
-    known, after = question.known, question.known + found.gram
+def experiment_of(question: Question, motion: Motion, limits: dict[str, float]) -> Experiment:
+    """Return a motion with what it promises for a question; `limits`: its use of them."""
+    known, after = question.known, question.known + question.gram(motion)
     contests = tuple(found for one in question.contests for found in _expected(
         one, known, after, question.decisions.rival_margin))
     decided = [one.expected for one in contests if one.probability >= SURE]
@@ -287,9 +320,8 @@ def experiment_of(question: Question, found: Found) -> Experiment:
         question.kind, tuple(dict.fromkeys(one.name for one in question.subjects)), contests,
         tuple(_accuracies(question, known, after)), expected,
         () if contests else tuple(name for name, one in evidences.items() if one <= 0),
-        dict(found.uses),
-        found.path.duration, found.path.motion,
-        lambda time: question.model.drive_forces(found.path.motion(time)), question.model)
+        limits, motion.duration, motion.motion,
+        lambda time: question.model.drive_forces(motion.motion(time)), question.model)
 
 
 def _expected(contest: Contest, known: Array, after: Array, margin: float,
@@ -340,7 +372,7 @@ def _known_to(labels: list[tuple[str, str, float]], precision: Precision, known:
             for (label, unit, scale), a, b in zip(labels, before, later, strict=True)]
 
 
-def _labels(term: FittedTerm, model: ForceModel) -> list[tuple[str, str, float]]:
+def _labels(term: FittedTerm, model: DriveModel) -> list[tuple[str, str, float]]:
     """Return name, unit and scale of each parameter of a term that is fitted."""
     prefix, unit = term.effect.name, DriveUnits()
     if term.drive is not None:

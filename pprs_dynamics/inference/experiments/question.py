@@ -24,6 +24,7 @@ from pprs_dynamics.inference.experiments.criteria import (
     Separation,
     free_of,
 )
+from pprs_dynamics.inference.experiments.motion_design import Motion, coarse_time
 from pprs_dynamics.inference.regression.base_columns import (
     BaseColumn,
     ModelNumber,
@@ -49,7 +50,6 @@ from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel, Forces
 from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
 
 HELD = 1e-3  # of a column's square may lie outside the span of another effect's
@@ -107,19 +107,11 @@ class Question:
         """Around which all is linear."""
         return self.plan.model
 
-    def grams(self, forces: Forces, time: Array, duration: float, block: int = 1) -> list[Array]:
-        """Return the information of motions of some duration, (P, P) each.
-
-        Parameters
-        ----------
-        forces, time, block
-            See `ColumnPlan.on_motions`.
-        duration : float
-            Of each motion [s].
-        """
-        information = Information(self.plan, self.noise)
-        return [information.of_motion(columns, duration)
-                for columns in self.plan.on_motions(forces, time, block)]
+    def gram(self, motion: Motion) -> Array:
+        """Return the information of a motion, (P, P)."""
+        time = coarse_time(motion)
+        columns = self.plan.on_motion(self.model.drive_forces(motion.motion(time)), time)
+        return Information(self.plan, self.noise).of_motion(columns, motion.duration)
 
     def worth(self, gram: Array) -> float:
         """Return the value of a motion in addition to what is known."""
@@ -130,7 +122,7 @@ class Question:
         return replace(self, contests=tuple(contests), criterion=Separation(tuple(contests)))
 
 
-def question_of(model: ForceModel, recordings: Sequence[Recording],
+def question_of(model: DriveModel, recordings: Sequence[Recording],
                 progress: Callable[[float], None], decisions: Decisions = DECISIONS) -> Question:
     """Return what recordings leave open; errors as `diagnose`."""
     table = tabulate(model, recordings, decisions, progress)

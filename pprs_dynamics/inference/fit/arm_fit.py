@@ -31,8 +31,8 @@ from pprs_dynamics.physics.mechanism.description import PARAMETERS
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.places import PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel, inertial_values
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.robot_block import inertial_values
 
 # Numbers of a joint beside those of its link, in this order.
 ARMATURE, VISCOUS, COULOMB, OFFSET = range(4)
@@ -73,12 +73,12 @@ class ArmColumns:
     reconstruction: Reconstruction
 
     @classmethod
-    def of(cls, model: MechanismModel, recording: Recording) -> ArmColumns:
+    def of(cls, model: DriveModel, recording: Recording) -> ArmColumns:
         """Return the columns of a recording; errors as `reconstruct`."""
         return cls.of_motion(model, reconstruct(model, recording))
 
     @classmethod
-    def of_motion(cls, model: MechanismModel, found: Reconstruction) -> ArmColumns:
+    def of_motion(cls, model: DriveModel, found: Reconstruction) -> ArmColumns:
         """Return the columns of a recording whose motion is known."""
         treat = found.treat
         total = treated_forces(model, found)['total']
@@ -105,7 +105,7 @@ class ArmColumns:
         return np.concatenate((self.motion, turning[..., None],
                                np.ones_like(turning)[..., None]), axis=-1)
 
-    def numbers(self, model: MechanismModel) -> Array:
+    def numbers(self, model: DriveModel) -> Array:
         """Return the columns of all numbers, (M, n, P): of links, passive joints, each drive."""
         found = self.reconstruction
         passive = np.empty((len(self.measured), len(model.drives), 2 * len(own_passive(model))))
@@ -131,14 +131,14 @@ class ArmColumns:
         return efforts
 
 
-def own_numbers(model: MechanismModel) -> Array:
+def own_numbers(model: DriveModel) -> Array:
     """Return armature, viscous and dry friction, and offset of each joint, (n, 4)."""
     values = model.values
     return np.column_stack([values[key] for key in (
         'robot.armature', 'friction.viscous', 'friction.coulomb', 'friction.offset')])
 
 
-def columns_of(model: MechanismModel, recordings: Sequence[Recording]) -> list[ArmColumns]:
+def columns_of(model: DriveModel, recordings: Sequence[Recording]) -> list[ArmColumns]:
     """Return the columns of recordings."""
     return [ArmColumns.of(model, recording) for recording in recordings]
 
@@ -149,7 +149,7 @@ class ArmFit:
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
     determined, total : int
         Combinations of the links' inertial parameters that the motion determines, and all.
     std : dict of str to (n,) array
@@ -160,7 +160,7 @@ class ArmFit:
         Joints that hardly move.
     """
 
-    model: MechanismModel
+    model: DriveModel
     determined: int
     total: int
     std: dict[str, Array]
@@ -168,12 +168,12 @@ class ArmFit:
     standing: tuple[str, ...]
 
 
-def fit_arm(model: MechanismModel, columns: Sequence[ArmColumns]) -> ArmFit:
+def fit_arm(model: DriveModel, columns: Sequence[ArmColumns]) -> ArmFit:
     """Return the model fitted to recordings.
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
         As described; its added effects stay as they are.
     columns : sequence of ArmColumns
         Of that model.
@@ -210,7 +210,7 @@ def fit_arm(model: MechanismModel, columns: Sequence[ArmColumns]) -> ArmFit:
         tuple(names[~moving].tolist()))
 
 
-def _with(model: MechanismModel, inertial: Array, own: Array, width: Array) -> MechanismModel:
+def _with(model: DriveModel, inertial: Array, own: Array, width: Array) -> DriveModel:
     """Return the model with fitted numbers, rounded as files have them."""
     def numbers(values: Array) -> tuple[float, ...]:
         return tuple(rounded(float(value)) for value in values)
@@ -222,12 +222,10 @@ def _with(model: MechanismModel, inertial: Array, own: Array, width: Array) -> M
         'friction.viscous': numbers(own[:, VISCOUS]),
         'friction.coulomb': numbers(own[:, COULOMB]), 'friction.offset': numbers(own[:, OFFSET]),
         'friction.reversal_velocities': numbers(width)}
-    fitted = build_model(values, model.source)
-    assert isinstance(fitted, MechanismModel)
-    return fitted
+    return DriveModel.from_parameters(values, model.source)
 
 
-def numbers_at(model: MechanismModel, motion: JointMotion) -> Array:
+def numbers_at(model: DriveModel, motion: JointMotion) -> Array:
     """Return the columns of all numbers in a motion, (M, n, P), as `ArmColumns.numbers`."""
     position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
     width = model.reversal.widths(len(model.drives))
@@ -238,7 +236,7 @@ def numbers_at(model: MechanismModel, motion: JointMotion) -> Array:
     return numbers
 
 
-def own_passive(model: MechanismModel) -> tuple[PassiveJoint, ...]:
+def own_passive(model: DriveModel) -> tuple[PassiveJoint, ...]:
     """Return the passive joints of loops whose friction is not that of another joint.
 
     Of those that are alike the first; none that goes as a drive does.
@@ -249,7 +247,7 @@ def own_passive(model: MechanismModel) -> tuple[PassiveJoint, ...]:
     return tuple(one for one in model.robot.passive_joints if one.name not in others)
 
 
-def of_passive(model: MechanismModel, motion: JointMotion) -> Array:
+def of_passive(model: DriveModel, motion: JointMotion) -> Array:
     """Return the columns of viscous and dry friction of `own_passive`, (N, n, 2 K)."""
     joints = own_passive(model)
     columns = np.zeros((len(motion), len(model.drives), 2 * len(joints)))
@@ -287,7 +285,7 @@ def own_spread(efforts: Array, columns: Array) -> Array:
     return spread
 
 
-def base_prior(model: MechanismModel, efforts: Array, numbers: Array) -> Array:
+def base_prior(model: DriveModel, efforts: Array, numbers: Array) -> Array:
     """Return directions of unit variance of a base's numbers, (P, P).
 
     Of what is expected before any recording, about the model as it is. Passive joints may rub as
@@ -295,7 +293,7 @@ def base_prior(model: MechanismModel, efforts: Array, numbers: Array) -> Array:
 
     Parameters
     ----------
-    model : MechanismModel
+    model : DriveModel
     efforts : (M, n) array
         NaN where they were not measured.
     numbers : (M, n, P) array

@@ -24,12 +24,10 @@ from pprs_dynamics.inference.search.explained_effort import (
     explained_shares,
     little_explained,
 )
-from pprs_dynamics.inference.search.fitted_model import fitted_model
+from pprs_dynamics.inference.search.fitted_model import fitted_model, linearised
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.relinearisation import relinearised
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.system.numbers import finite
 
 RECORDINGS, HALVES, VALIDATION = 'recordings', 'halves', 'validation'
@@ -66,7 +64,7 @@ class BaseFit:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     numbers : tuple of FittedNumber
     told : tuple of str
         What the motion determines and what it does not, as sentences.
@@ -81,7 +79,7 @@ class BaseFit:
         Drives of whose effort the fitted model explains little, with the shares.
     """
 
-    model: ForceModel
+    model: DriveModel
     numbers: tuple[FittedNumber, ...]
     told: tuple[str, ...]
     before: dict[str, float]
@@ -102,14 +100,14 @@ class BaseFit:
                 'explained': {name: finite(one) for name, one in self.explained.items()}}
 
 
-def fit_base(model: ForceModel, recordings: Sequence[Recording],
+def fit_base(model: DriveModel, recordings: Sequence[Recording],
              validate: Sequence[Recording] = (),
              progress: Callable[[float], None] | None = None) -> BaseFit:
     """Return the base model that fits recordings best.
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
         Of an arm all inertia and friction is fitted; of the others what `tolerances` leave open.
     recordings : sequence of Recording
         Of free motion.
@@ -145,14 +143,14 @@ def fit_base(model: ForceModel, recordings: Sequence[Recording],
                    little_explained(fitted, after))
 
 
-def require_open_numbers(model: ForceModel) -> None:
+def require_open_numbers(model: DriveModel) -> None:
     """Raise FitError where a model has nothing that a fit may move."""
     if not _is_fitted_whole(model) and not model_numbers(model):
         raise FitError('tolerances: the model gives none, must name the numbers that are to be '
                        'fitted, e.g. masses.payload: 0.05')
 
 
-def _is_fitted_whole(model: ForceModel) -> bool:
+def _is_fitted_whole(model: DriveModel) -> bool:
     """Return whether all numbers are fitted, and not those alone that tolerances leave open."""
     return model.is_described
 
@@ -171,37 +169,36 @@ def halves(recording: Recording) -> list[Recording]:
             for found in (first, second)]
 
 
-def errors_of(model: ForceModel, recordings: Sequence[Recording]) -> dict[str, float]:
+def errors_of(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, float]:
     """Return the rms error by drive on recordings."""
     return _rms(model, _squares(model, recordings))
 
 
-def _squares(model: ForceModel, recordings: Sequence[Recording]) -> Array:
+def _squares(model: DriveModel, recordings: Sequence[Recording]) -> Array:
     return measure_residuals(model, recordings)[0].error ** 2
 
 
-def _rms(model: ForceModel, squares: Array) -> dict[str, float]:
+def _rms(model: DriveModel, squares: Array) -> dict[str, float]:
     known = np.isfinite(squares).sum(axis=0)
     return {drive: float(np.sqrt(np.nanmean(squares[:, d]))) for d, drive in
             enumerate(model.drives) if known[d]}
 
 
-def _fitted(model: ForceModel, recordings: Sequence[Recording],
-            ) -> tuple[ForceModel, tuple[FittedNumber, ...], tuple[str, ...]]:
+def _fitted(model: DriveModel, recordings: Sequence[Recording],
+            ) -> tuple[DriveModel, tuple[FittedNumber, ...], tuple[str, ...]]:
     if _is_fitted_whole(model):
-        assert isinstance(model, MechanismModel)
         fit = fit_arm(model, columns_of(model, recordings))
         return fit.model, _numbers(model, fit), _told(model, fit)
     # As in a diagnosis without any effect: the tolerance is the prior, and how friction turns over
     # is left free.
     fits = FittedSets(Design.of(model, recordings), DECISIONS)
-    fits, found = relinearised(fits, fits.evaluate(()))
+    fits, found = linearised(fits, fits.evaluate(()))
     return fitted_model(fits, found), tuple(
         FittedNumber(one.label, '', one.before, one.after, one.std, one.unit)
         for one in calibrations(fits, found, {})), ()
 
 
-def _numbers(model: MechanismModel, fit: ArmFit) -> tuple[FittedNumber, ...]:
+def _numbers(model: DriveModel, fit: ArmFit) -> tuple[FittedNumber, ...]:
     """Return what was fitted of each joint; links are told in `_told`."""
     found = []
     widths = {'friction.reversal_velocities': np.full(len(model.drives), np.inf)}
@@ -216,7 +213,7 @@ def _numbers(model: MechanismModel, fit: ArmFit) -> tuple[FittedNumber, ...]:
     return tuple(found)
 
 
-def _told(model: MechanismModel, fit: ArmFit) -> tuple[str, ...]:
+def _told(model: DriveModel, fit: ArmFit) -> tuple[str, ...]:
     before, after = (float(np.sum(one)) for one in (model.robot.masses, fit.model.robot.masses))
     told = [f'all links together have {after:.4g} kg, {before:.4g} kg in the description',
             f'the motion determines {fit.determined} combinations of the {fit.total} inertial '
@@ -253,7 +250,7 @@ class Refit:
         return {**self.fit.to_dict(), 'taken': self.taken, 'reason': self.reason}
 
 
-def refit_base(model: ForceModel, recordings: Sequence[Recording],
+def refit_base(model: DriveModel, recordings: Sequence[Recording],
                validate: Sequence[Recording] = (),
                progress: Callable[[float], None] | None = None) -> Refit:
     """Return the base model fitted again beside its effects, which stay as they are.
@@ -263,7 +260,7 @@ def refit_base(model: ForceModel, recordings: Sequence[Recording],
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
         With effects.
     recordings : sequence of Recording
         To fit to.

@@ -46,8 +46,11 @@ from pprs_dynamics.inference.fit.repeating_forces import (
     Waves,
     motion_of,
 )
-from pprs_dynamics.inference.regression.base_columns import BaseColumn, ReferenceDirection
-from pprs_dynamics.inference.regression.carried_over import CarriedOver
+from pprs_dynamics.inference.regression.base_columns import (
+    BaseColumn,
+    CarriedOver,
+    ReferenceDirection,
+)
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.residuals.bands import LEAST_OPEN, DriveSeries, OpenForces
@@ -62,8 +65,7 @@ from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.reference_keys import DIRECTIONS, RESIDUAL
 from pprs_dynamics.system.plain_text import displayed
 
@@ -95,7 +97,7 @@ class Reference:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings : tuple of Recording
     processes : tuple of Process or Waves
         That over all drives, then those over the state of each, waves of each.
@@ -113,7 +115,7 @@ class Reference:
     decisions : Decisions
     """
 
-    model: ForceModel
+    model: DriveModel
     recordings: tuple[Recording, ...]
     processes: tuple[Process | Waves, ...]
     size: Array
@@ -127,12 +129,12 @@ class Reference:
     decisions: Decisions = DECISIONS
 
     @classmethod
-    def of(cls, model: ForceModel, recordings: Sequence[Recording], kept: str = '') -> Reference:
+    def of(cls, model: DriveModel, recordings: Sequence[Recording], kept: str = '') -> Reference:
         """Return the fit of recordings.
 
         Parameters
         ----------
-        model : ForceModel
+        model : DriveModel
         recordings : sequence of Recording
         kept : str, optional
             What other recordings, to which the model was fitted, left of its numbers' uncertainty;
@@ -152,7 +154,7 @@ class Reference:
                            tuple(recordings))
 
     @classmethod
-    def of_residual(cls, model: ForceModel, text: str, kept: str = '') -> Reference:
+    def of_residual(cls, model: DriveModel, text: str, kept: str = '') -> Reference:
         """Return the fit of what a model file keeps of its reference runs; errors as `of`."""
         count = len(model.drives)
         content = _as_array(text, RESIDUAL).T
@@ -165,11 +167,11 @@ class Reference:
         residuals = Residuals(model.drives, time, record, measured, measured - error, {}, motion,
                               float(np.median(content[1:, 0])), model.units)
         numbers = numbers_at(model, JointMotion(*(motion[name] for name in MOTION))) if (
-            isinstance(model, MechanismModel) and model.is_described) else None
+            model.is_described) else None
         return cls._fitted(model, residuals, numbers, kept, (displayed(model.source),), ())
 
     @classmethod
-    def _fitted(cls, model: ForceModel, residuals: Residuals, numbers: Array | None, kept: str,
+    def _fitted(cls, model: DriveModel, residuals: Residuals, numbers: Array | None, kept: str,
                 named: tuple[str, ...], recordings: tuple[Recording, ...]) -> Reference:
         names = ', '.join(named)
         if len(residuals) < LEAST_LENGTH:
@@ -371,7 +373,7 @@ def _sizes(size: Array, features: Sequence[Array]) -> Array:
     return np.repeat(size, [one.shape[1] for one in features])
 
 
-def _require_same_robot(model: ForceModel, residuals: Residuals, columns: Array, fit: JointFit,
+def _require_same_robot(model: DriveModel, residuals: Residuals, columns: Array, fit: JointFit,
                         names: str) -> None:
     """Raise ReferenceRunError where a model, as far as it may be otherwise, explains little."""
     explained = residuals.model + columns @ fit.coefficients[:columns.shape[2]]
@@ -405,12 +407,11 @@ def _as_array(text: str, key: str) -> Array:
                                 'fit the model again') from None
 
 
-def _base(model: ForceModel, numbers: Array | None, residuals: Residuals, kept: str,
+def _base(model: DriveModel, numbers: Array | None, residuals: Residuals, kept: str,
           ) -> tuple[Array, Array, int]:
     """Return columns (M, D, P) of determined directions of the base, all directions, and P."""
     if numbers is None:
         return np.zeros((len(residuals), len(residuals.drives), 0)), np.zeros((0, 0)), 0
-    assert isinstance(model, MechanismModel)
     prior = base_prior(model, residuals.measured, numbers)
     if kept:
         told_before = _as_array(kept, DIRECTIONS)
@@ -429,15 +430,14 @@ def _base(model: ForceModel, numbers: Array | None, residuals: Residuals, kept: 
     return columns @ axes[:, :told], prior @ axes, told
 
 
-def _measured(model: ForceModel, recordings: Sequence[Recording],
+def _measured(model: DriveModel, recordings: Sequence[Recording],
               ) -> tuple[list[Reconstruction], Residuals]:
     found = [reconstruct(model, one) for one in recordings]
     return found, join_tables(model, [treated_table(model, one) for one in found])
 
 
-def _numbers(model: ForceModel, found: Reconstruction) -> Array:
+def _numbers(model: DriveModel, found: Reconstruction) -> Array:
     """Return the columns of a base's numbers on a recording, (M, n, P)."""
-    assert isinstance(model, MechanismModel)
     return ArmColumns.of_motion(model, found).numbers(model)
 
 

@@ -17,9 +17,8 @@ from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_me
 from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import values_before_changes
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.reference_keys import (
     DIRECTIONS,
     HASHES,
@@ -34,7 +33,7 @@ RunFile = str | PathLike[str] | Recording
 OTHER = 'a reference must be another run than what is diagnosed'
 
 
-def read_reference(model: ForceModel, files: Sequence[RunFile] = (),
+def read_reference(model: DriveModel, files: Sequence[RunFile] = (),
                    diagnosed: Sequence[Recording] = (), as_it_is: bool = False) -> Reference:
     """Return the fit of reference runs; without any, of those that the model's file names.
 
@@ -42,7 +41,7 @@ def read_reference(model: ForceModel, files: Sequence[RunFile] = (),
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     files : sequence of path or Recording, optional
     diagnosed : sequence of Recording, optional
         Which none of them may be.
@@ -62,7 +61,7 @@ def read_reference(model: ForceModel, files: Sequence[RunFile] = (),
     """
     then = values_before_changes(model.values)
     if then != dict(model.values):
-        model = replace(build_model(then), source=model.source)
+        model = replace(DriveModel.from_parameters(then), source=model.source)
     kept_run = str(model.values.get(RESIDUAL, ''))
     if not files and kept_run:
         return Reference.of_residual(model, kept_run)
@@ -81,7 +80,7 @@ def read_reference(model: ForceModel, files: Sequence[RunFile] = (),
     return Reference.of(model, runs, kept)
 
 
-def _own(model: ForceModel) -> tuple[ReferenceFile, ...]:
+def _own(model: DriveModel) -> tuple[ReferenceFile, ...]:
     name = displayed(model.source or 'the model')
     found = reference_files(model.values, model.source)
     if not found:
@@ -99,8 +98,8 @@ def _own(model: ForceModel) -> tuple[ReferenceFile, ...]:
     return found
 
 
-def with_own_reference(model: ForceModel, recordings: Sequence[Recording],
-                       paths: Sequence[Path], keep_residual: bool = False) -> ForceModel:
+def with_own_reference(model: DriveModel, recordings: Sequence[Recording],
+                       paths: Sequence[Path], keep_residual: bool = False) -> DriveModel:
     """Return a model that names the files it was fitted to, with what they left uncertain.
 
     Where they are no reference, as they are too short, the model unchanged. With `keep_residual`
@@ -111,6 +110,6 @@ def with_own_reference(model: ForceModel, recordings: Sequence[Recording],
     except ReferenceRunError:
         return model
     files = [ReferenceFile(path.absolute(), fingerprint(path)) for path in paths]
-    return build_model(with_reference(
+    return DriveModel.from_parameters(with_reference(
         model.values, files, reference.directions, reference.residual if keep_residual else ''),
         model.source)

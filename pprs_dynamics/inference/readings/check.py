@@ -42,7 +42,7 @@ from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Defect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.recorded_names import CURRENT
 
 
@@ -74,7 +74,7 @@ class Fit:
         return not np.all(np.isin(self.scales, table.SCALES))
 
 
-def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False) -> Recording:
+def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False) -> Recording:
     """Return a recording with its mistakes among its findings.
 
     Raises
@@ -91,12 +91,12 @@ def with_mistakes(model: ForceModel, recording: Recording, refuse: bool = False)
     return replace(recording, findings=(*mistakes, *recording.findings))
 
 
-def find_mistakes(model: ForceModel, recording: Recording) -> tuple[Defect, ...]:
+def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]:
     """Return where a recording is read better otherwise than its names and units say.
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recording : Recording
         Of the model's drives.
     """
@@ -141,12 +141,12 @@ class Search:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     excerpts : dict of float to Excerpt
         Of the recording, by the unit of its times [s].
     """
 
-    def __init__(self, model: ForceModel, excerpts: dict[float, Excerpt]) -> None:
+    def __init__(self, model: DriveModel, excerpts: dict[float, Excerpt]) -> None:
         self.model, self.excerpts = model, excerpts
         # Of currents without a known gain no force is known: masses say nothing.
         self.masses = np.inf if model.effort_kind == CURRENT and not model.knows_currents else (
@@ -369,7 +369,7 @@ def _time_units(recording: Recording) -> list[float]:
 # --------------------------------------------------------------------------------- sentences
 
 
-def _of_fit(model: ForceModel, fit: Fit) -> Iterator[OtherReading]:
+def _of_fit(model: DriveModel, fit: Fit) -> Iterator[OtherReading]:
     """Yield the mistakes of times, of positions and order, and of efforts."""
     drives, units = model.drives, model.units
     if fit.time_unit != 1.0:
@@ -403,7 +403,7 @@ def _of_fit(model: ForceModel, fit: Fit) -> Iterator[OtherReading]:
                               scales=effort_scales(model, group, np.full(len(drives), 1 / scale)))
 
 
-def position_scales(model: ForceModel, reading: Reading) -> Scales:
+def position_scales(model: DriveModel, reading: Reading) -> Scales:
     """Return the factors and offsets below `columns` with which positions are read so."""
     found = []
     offset = np.zeros(len(model.drives)) + reading.offset
@@ -420,7 +420,7 @@ def position_scales(model: ForceModel, reading: Reading) -> Scales:
     return () if reading.kind == 'drive_order' else tuple(found)
 
 
-def _of_strokes(model: ForceModel, recording: Recording, strokes: tuple[Array, Array],
+def _of_strokes(model: DriveModel, recording: Recording, strokes: tuple[Array, Array],
                 with_angles: bool) -> Iterator[Defect]:
     """Yield positions far beyond the strokes, which no effort is needed to recognise."""
     lower, upper = strokes
@@ -445,7 +445,7 @@ def _of_strokes(model: ForceModel, recording: Recording, strokes: tuple[Array, A
             scales=() if unit == 1.0 else position_scales(model, scale))
 
 
-def _of_velocities(model: ForceModel, recording: Recording, excerpt: Excerpt | None,
+def _of_velocities(model: DriveModel, recording: Recording, excerpt: Excerpt | None,
                    ) -> Iterator[Defect]:
     """Yield recorded velocities that are not the derivatives of positions."""
     if excerpt is None or excerpt.velocity is None:

@@ -23,7 +23,7 @@ from pprs_dynamics.inference.residuals.excerpt import Excerpt, forces_on
 from pprs_dynamics.measurement.files.recording import Recording, signed
 from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.model import recorded_names
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.recorded_names import EFFORT_KIND
 
 KINDS = {recorded_names.COMMANDED: (table.COMMAND, 'commands'),
@@ -32,7 +32,7 @@ KINDS = {recorded_names.COMMANDED: (table.COMMAND, 'commands'),
 # -------------------------------------------------------------------------------------- units
 
 
-def find_scales(model: ForceModel, contents: Mapping[str, Shares]) -> list[OtherReading]:
+def find_scales(model: DriveModel, contents: Mapping[str, Shares]) -> list[OtherReading]:
     """Return the unit of the efforts, by the factors of inertia and gravity over the model's."""
     factors = {k: contents[drive].scale for k, drive in enumerate(model.drives)
                if drive in contents}
@@ -93,13 +93,13 @@ def gain_line(scales: Sequence[float]) -> str:
             + ', '.join('1.0' if scale == 1 else f'{1 / scale:.3g}' for scale in scales) + ']')
 
 
-def _unit(model: ForceModel, what: str, factors: Array) -> OtherReading:
+def _unit(model: DriveModel, what: str, factors: Array) -> OtherReading:
     every = tuple(range(len(model.drives)))
     return OtherReading.of('effort_unit', model.drives, every, what,
                            scales=effort_scales(model, every, factors))
 
 
-def effort_scales(model: ForceModel, group: Sequence[int], factors: Array,
+def effort_scales(model: DriveModel, group: Sequence[int], factors: Array,
                   ) -> tuple[tuple[str, str, float], ...]:
     """Return the factors below `columns` with which efforts are multiplied by others, (D,)."""
     before = model.recorded.columns
@@ -132,7 +132,7 @@ def find_sign_bit(recording: Recording) -> Iterator[Defect]:
 # ------------------------------------------------------------- signs and units in one part
 
 
-def find_changed_efforts(model: ForceModel, recording: Recording, excerpt: Excerpt | None,
+def find_changed_efforts(model: DriveModel, recording: Recording, excerpt: Excerpt | None,
                          ) -> Iterator[OtherReading]:
     """Yield efforts without their sign, and units or signs that are others from a time on."""
     forces = None if excerpt is None else forces_on(model, excerpt.motion, excerpt.time)
@@ -235,13 +235,13 @@ def find_changed_positions(recording: Recording) -> Iterator[OtherReading]:
 # ------------------------------------------------------------------------------- measurements
 
 
-def find_no_measurements(model: ForceModel, contents: Mapping[str, Shares],
+def find_no_measurements(model: DriveModel, contents: Mapping[str, Shares],
                          ) -> tuple[NoMeasurement, ...]:
     """Return what efforts look like that are no measurement, a finding for each kind.
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     contents : mapping of str to Shares
         By drive; of a recording in the units and signs that it says.
     """
@@ -263,7 +263,7 @@ def find_no_measurements(model: ForceModel, contents: Mapping[str, Shares],
                  for kind in dict.fromkeys(kinds.values()) if kind)
 
 
-def looks_like(model: ForceModel, recordings: Sequence[Recording]) -> dict[str, NoMeasurement]:
+def looks_like(model: DriveModel, recordings: Sequence[Recording]) -> dict[str, NoMeasurement]:
     """Return the finding for each drive whose effort is no measurement in one of the recordings."""
     found: dict[str, NoMeasurement] = {}
     for recording in recordings:
@@ -277,7 +277,7 @@ def kinds_of(findings: Mapping[str, NoMeasurement]) -> dict[str, str] | None:
     return {drive: finding.kind for drive, finding in findings.items()} or None
 
 
-def _finding(model: ForceModel, contents: Mapping[str, Shares], drives: Sequence[str],
+def _finding(model: DriveModel, contents: Mapping[str, Shares], drives: Sequence[str],
              kind: str) -> NoMeasurement:
     group = tuple(model.drives.index(drive) for drive in drives)
     content = contents[drives[0]]

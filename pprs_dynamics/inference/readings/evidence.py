@@ -24,7 +24,8 @@ from pprs_dynamics.measurement.motion.drive_motion import DriveMotion
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.model.force_model import RIGID_BODY, ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.forces import RIGID_BODY
 
 CONDITION = 1e-6  # of a column beside others: less is rounding
 
@@ -45,7 +46,7 @@ class Parts:
             self.inertia, self.gravity, self.others, self.velocity, self.direction)))
 
 
-def parts_of(model: ForceModel, excerpt: Excerpt, reading: Reading, in_pieces: bool = False,
+def parts_of(model: DriveModel, excerpt: Excerpt, reading: Reading, in_pieces: bool = False,
              ) -> Parts | None:
     """Return a model's forces on an excerpt in a reading; None where it cannot follow at all."""
     motion = read_motion(excerpt.motion, reading)
@@ -85,7 +86,7 @@ def _taken(motion: DriveMotion, part: slice) -> DriveMotion:
                    segments=segments)
 
 
-def _forces(model: ForceModel, motion: DriveMotion, time: Array) -> Array:
+def _forces(model: DriveModel, motion: DriveMotion, time: Array) -> Array:
     """Return forces by inertia, by gravity and by all else, (3, N, D)."""
     bodies = {RIGID_BODY, DriveInertia.name, *(
         effect.name for effect in model.effects if isinstance(effect, BodyEffect))}
@@ -267,7 +268,7 @@ class Shares:
         return table.NOISE_FREE if is_exact else ''
 
 
-def effort_contents(model: ForceModel, recording: Recording, excerpt: Excerpt | None = None,
+def effort_contents(model: DriveModel, recording: Recording, excerpt: Excerpt | None = None,
                     ) -> dict[str, Shares]:
     """Return the shares of the efforts of drives that move and have enough samples."""
     excerpt = excerpt or excerpt_of(recording, stretches=table.STRETCHES)

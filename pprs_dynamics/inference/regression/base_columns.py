@@ -9,7 +9,7 @@ coefficient means for the model's values.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -18,14 +18,18 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.inference.regression.sensitivities import Number
+from pprs_dynamics.inference.regression.terms import FullRate
+from pprs_dynamics.inference.residuals.bands import OpenForces
+from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import set_number
 
 DIGITS = 6  # significant, of fitted values
 LARGEST_SHAPE_MOVE = 0.5  # of a shape parameter in one fit, as an amount of movement
+MOVED = 1e-4  # [m, rad], for derivatives of what is carried over by positions
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,7 @@ class ReversalShape(BaseColumn):
 
 @dataclass(frozen=True)
 class ReferenceDirection(BaseColumn):
-    """A principal direction of what a reference run leaves unknown, of unit prior."""
+    """A principal direction of the uncertainty of a reference run, of unit prior."""
 
     in_model = False
 
@@ -118,7 +122,7 @@ def within(parameter: Parameter, value: float, units: DriveUnits) -> float:
     return float(min(max(rounded(value), bounded.lower), bounded.upper))
 
 
-def units_of(model: ForceModel, drive: str | int | None) -> DriveUnits:
+def units_of(model: DriveModel, drive: str | int | None) -> DriveUnits:
     """Return the units of a drive by name or number; those that push for the structure."""
     if drive is None:
         return DriveUnits()
@@ -132,7 +136,7 @@ def move_numbers(values: dict[str, Any], base: Sequence[BaseColumn], coefficient
             set_number(values, column.number.key, column.number.element, column.value(float(c)))
 
 
-def move_present(values: dict[str, Any], given: ForceModel, base: Sequence[BaseColumn],
+def move_present(values: dict[str, Any], given: DriveModel, base: Sequence[BaseColumn],
                  coefficients: Array) -> None:
     """Put the given model's effects as coefficients have them into a model's values."""
     moves: dict[tuple[type[CatalogueEffect], str | None],
@@ -215,3 +219,55 @@ def present_columns(effect: CatalogueEffect, known: Mapping[str, float],
                 amount = p.amount(std, present_values(effect, drive)[p.name])
                 found.append(PresentShape({}, amount ** -2, kind, drive, p))
     return found
+
+
+@dataclass(frozen=True)
+class CarriedOver:
+    """What a reference run says of recordings; see `pprs_dynamics.inference.fit.reference`.
+
+    Parameters
+    ----------
+    of_base : (M, D) array
+        Forces that the model lacks there as well by the numbers of its base [N].
+    repeating : callable
+        Gives those that no number explains, (N, D), of positions and velocities (N, D) and the
+        time over which they are means [s].
+    directions : tuple of ReferenceDirection
+        In which they are uncertain most.
+    open_forces : mapping of drive to OpenForces
+        In which they are uncertain beyond.
+    covered : float
+        Share of the samples whose states the reference knows.
+    """
+
+    of_base: Array
+    repeating: Callable[[Array, Array, float], Array]
+    directions: tuple[ReferenceDirection, ...]
+    open_forces: Mapping[int, OpenForces]
+    covered: float
+
+    def shown(self, residuals: Residuals) -> Array:
+        """Return the forces that the model lacks there as well, (M, D) [N].
+
+        Of residuals of the same samples, whose positions may be read otherwise.
+        """
+        q, v = (residuals.variables[name] for name in ('position', 'velocity'))
+        return self.of_base + self.repeating(q, v, residuals.period)
+
+    def per_position(self, residuals: Residuals) -> Array:
+        """Return how the forces change with the position of each drive, (D, M, D) [N/m]."""
+        q, v = (residuals.variables[name] for name in ('position', 'velocity'))
+        return np.stack([
+            (self.repeating(q + step, v, residuals.period)
+             - self.repeating(q - step, v, residuals.period)) / (2 * MOVED)
+            for step in MOVED * np.eye(q.shape[1])])
+
+    def at_full_rate(self, recordings: Sequence[FullRate], time: Array) -> list[Array]:
+        """Return the forces at every sample of recordings, (N, D) [N]; `time` (M,) of means."""
+        found, end = [], 0
+        for recording in recordings:
+            part = slice(end, end := end + len(recording.treat))
+            of_base = [np.interp(recording.time, time[part], row) for row in self.of_base[part].T]
+            found.append(self.repeating(recording.position, recording.velocity, 0.0)
+                         + np.stack(of_base, axis=1))
+        return found

@@ -83,17 +83,15 @@ def conditioned(mean: Array, covariance: Array, A: Array, b: Array) -> Constrain
     A : (n, P) array
     b : (n,) array
     """
-    scale, L = _root(covariance)
-    G = (A * scale) @ L
-    size = np.maximum(np.linalg.norm(G, axis=1), 1e-300)
-    G, wanted = G / size[:, None], (b - A @ mean) / size
-    left, values, right = np.linalg.svd(G, full_matrices=False)
-    kept = values > 1e-10 * max(values[0], 1e-300) if len(values) else np.zeros(0, dtype=bool)
-    right = right[kept]
-    u = right.T @ ((left[:, kept].T @ wanted) / values[kept])
-    across = L - (L @ right.T) @ right  # the root of the conditioned covariance
-    return Constrained(mean + scale * (L @ u), np.outer(scale, scale) * (across @ across.T),
-                       float(u @ u), Inequalities(A, b))
+    across = covariance @ A.T
+    among = A @ across
+    size = np.sqrt(np.maximum(np.diag(among), 1e-300))
+    inverse = np.linalg.pinv(among / np.outer(size, size), 1e-12, hermitian=True)
+    inverse /= np.outer(size, size)
+    missing = b - A @ mean
+    return Constrained(mean + across @ (inverse @ missing),
+                       covariance - across @ inverse @ across.T,
+                       float(missing @ inverse @ missing), Inequalities(A, b))
 
 
 def constrained(mean: Array, covariance: Array, inequalities: Inequalities) -> Constrained | None:

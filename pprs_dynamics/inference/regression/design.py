@@ -6,8 +6,8 @@
 Model and columns are computed at full rate from one motion and then averaged in blocks, as the
 measured effort is; were one side treated otherwise, each reversal would look like friction.
 
-Forces are linear around an operating point: the model as given at first, and later one that has
-what was found. There the error is extrapolated back to the given model (Gauss-Newton), so that
+Forces are linear around an operating point: the input model at first, and later one with the
+reported effects. There the error is extrapolated back to the given model (Gauss-Newton), so that
 coefficients, priors and costs always mean the same.
 """
 
@@ -23,6 +23,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import (
     BaseColumn,
+    CarriedOver,
     ModelNumber,
     PresentCoefficient,
     PresentShape,
@@ -31,13 +32,7 @@ from pprs_dynamics.inference.regression.base_columns import (
     present_columns,
     present_values,
 )
-from pprs_dynamics.inference.regression.carried_over import CarriedOver
-from pprs_dynamics.inference.regression.collecting import (
-    ColumnCollector,
-    stacked_columns,
-)
-from pprs_dynamics.inference.regression.drive_ranges import drive_range
-from pprs_dynamics.inference.regression.second_encoders import SecondEncoders
+from pprs_dynamics.inference.regression.drive_ranges import SecondEncoders, drive_range
 from pprs_dynamics.inference.regression.sensitivities import (
     BARE,
     HOMING,
@@ -46,7 +41,9 @@ from pprs_dynamics.inference.regression.sensitivities import (
     OF_DRIVES,
     OF_JOINTS,
     PRESENT,
+    ColumnCollector,
     Sensitivities,
+    stacked_columns,
 )
 from pprs_dynamics.inference.regression.terms import FullRate, OperatingPoint, Term
 from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
@@ -71,7 +68,7 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
 from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 
@@ -89,7 +86,7 @@ class Design:
 
     Parameters
     ----------
-    given, model : ForceModel
+    given, model : DriveModel
         As the user has it; and around which forces are linear.
     residuals : Residuals
         Whose error is that of the given model, extrapolated linearly from `model`.
@@ -111,8 +108,8 @@ class Design:
         Its mean is taken from what was measured, its directions are columns of every fit.
     """
 
-    given: ForceModel
-    model: ForceModel
+    given: DriveModel
+    model: DriveModel
     residuals: Residuals
     recordings: tuple[FullRate, ...]
     base: tuple[BaseColumn, ...]
@@ -140,14 +137,14 @@ class Design:
 
     @classmethod
     def of(
-        cls, model: ForceModel, recordings: Sequence[Recording],
+        cls, model: DriveModel, recordings: Sequence[Recording],
         progress: Callable[[float], None] | None = None,
     ) -> Design:
         """Evaluate a model and its sensitivities on recordings; errors as `measure_residuals`.
 
         Parameters
         ----------
-        model : ForceModel
+        model : DriveModel
         recordings : sequence of Recording
         progress : callable, optional
             Called with the share that is done.
@@ -194,7 +191,7 @@ class Design:
         return replace(design, residuals=residuals, point=point)
 
     def beside(self, carried: CarriedOver | None) -> Design:
-        """Return this with what a reference says of the recordings, or as it is for None."""
+        """Return this with what a reference says of the recordings, or unchanged for None."""
         if carried is None:
             return self
         forces = carried.shown(self.residuals)
@@ -241,8 +238,8 @@ class Design:
                     forces[:, d] += c * row
         return forces
 
-    def reconstructed(self, model: ForceModel) -> tuple[Reconstruction, ...]:
-        """Return the motion of the recordings as a model's encoders tell it."""
+    def reconstructed(self, model: DriveModel) -> tuple[Reconstruction, ...]:
+        """Return the motion of the recordings by a model's encoders."""
         if model.misreadings == self.model.misreadings:
             return self.reconstructions
         key = tuple((misreading.name, repr(misreading.drives)) for misreading in model.misreadings)
@@ -253,7 +250,7 @@ class Design:
         return self._moved[key]
 
     @classmethod
-    def _evaluated(cls, model: ForceModel, given: ForceModel,
+    def _evaluated(cls, model: DriveModel, given: DriveModel,
                    reconstructions: tuple[Reconstruction, ...],
                    progress: Callable[[float], None] | None,
                    effects: Container[type[CatalogueEffect]] | None = None,
@@ -319,7 +316,7 @@ class Design:
 
     @cached_property
     def second_encoders(self) -> SecondEncoders:
-        """What encoders behind the gears tell of the drives that have one."""
+        """Wind-up and clearance of the drives with an encoder behind the gear."""
         return SecondEncoders.of(self.recordings, self.reconstructions)
 
     def moving(self, drive: int) -> np.typing.NDArray[np.bool_]:
@@ -443,9 +440,9 @@ class Design:
                       shape: Mapping[str, float]) -> dict[int, Array]:
         """Return what positions of a drive that are measured wrong do to all, (k, M) by drive.
 
-        What a play does is not in proportion to it. Around a model that has the effect it is told
-        by steps of `SHARE` of what it has; else, of what the effect is `not_linear_in`, by the one
-        of `SIZES` that alone would explain most of the drive's error.
+        The force is not in proportion to a play. Around a model that has the effect it is taken
+        at steps of `SHARE` of its size. Else, for coefficients in `not_linear_in`, it is taken at
+        the one of `SIZES` that alone explains most of the drive's error.
         """
         name = self.drives[drive]
         there = next((one for one in self.model.effects

@@ -1,23 +1,31 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What drives did in recordings: strokes, speeds, delays, and what was measured beside."""
+"""What drives did in recordings: strokes, speeds, delays, further channels and encoders."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import fft
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.terms import FullRate
-from pprs_dynamics.physics.effects.drive_effect import DriveRange
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.inference.residuals.reconstruction import Reconstruction
+from pprs_dynamics.physics.effects.drive_effect import (
+    Clearance,
+    DriveRange,
+    Windup,
+)
+from pprs_dynamics.physics.effects.laws.elastic_joint import told_by_windup
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 LONGEST_DELAY = 0.3  # [s], that a recording may show at once
 
 
-def drive_range(model: ForceModel, recordings: Sequence[FullRate], drive: int) -> DriveRange:
+def drive_range(model: DriveModel, recordings: Sequence[FullRate], drive: int) -> DriveRange:
     """Return what a drive of a model did in recordings."""
     position = np.concatenate([recording.position[:, drive] for recording in recordings])
     velocity = np.concatenate([recording.velocity[:, drive] for recording in recordings])
@@ -32,7 +40,7 @@ def drive_range(model: ForceModel, recordings: Sequence[FullRate], drive: int) -
 
 
 def _channels(recordings: Sequence[FullRate], drive: int) -> dict[str, tuple[float, float]]:
-    """Return the ranges of what was measured of a drive beside motion and effort."""
+    """Return the ranges of further channels of a drive."""
     found = {}
     for name in {name for recording in recordings for name in recording.channels}:
         values = np.concatenate([recording.channels[name][:, drive] for recording in recordings
@@ -69,3 +77,49 @@ def _delay(recording: FullRate, drive: int) -> float:
     explained = np.einsum('kl,km,ml->l', alike[:, lags], np.linalg.pinv(columns @ columns.T),
                           alike[:, lags])
     return float(lags[np.argmax(explained)] * step)
+
+
+@dataclass(frozen=True)
+class SecondEncoders:
+    """Wind-up and clearance of the drives with an encoder behind the gear.
+
+    Parameters
+    ----------
+    windups : mapping of drive to Windup
+        Of drives that wind up under their loads.
+    clearances : mapping of drive to Clearance
+        Of drives that lead their links by one of two distances.
+    """
+
+    windups: Mapping[int, Windup]
+    clearances: Mapping[int, Clearance]
+
+    @classmethod
+    def of(cls, recordings: Sequence[FullRate], reconstructions: Sequence[Reconstruction],
+           ) -> SecondEncoders:
+        """Return it for recordings and their motion as it was read."""
+        read = [(one.transmitted, one.direction, found.windup) for one, found in zip(
+            recordings, reconstructions, strict=False) if found.windup is not None]
+        windups, clearances = {}, {}
+        for d in range(read[0][0].shape[1] if read else 0):
+            load, direction = (np.concatenate([one[k][:, d] for one in read]) for k in (0, 1))
+            lead = np.concatenate([one[:, :, d] for *_, one in read], axis=1)
+            if not np.any(lead):
+                continue
+            if np.ptp(load):
+                stiffness, damping, windup = told_by_windup(load, lead)
+                if stiffness > 0:
+                    windups[d] = Windup(1 / stiffness, damping / stiffness,
+                                        float(np.var(windup) / np.var(load)))
+            clearances[d] = max(
+                _clearance(lead[0], direction, 'motion'),
+                _clearance(lead[0], np.sign(load), 'load'), key=lambda one: one.explained)
+        return cls(windups, clearances)
+
+
+def _clearance(lead: Array, side: Array, of: str) -> Clearance:
+    """Return by how much a drive leads its link on either side, (N,)."""
+    lead, side = lead - lead.mean(), side - side.mean()
+    size = float(side @ lead / max(float(side @ side), 1e-300))
+    left = float(np.var(lead - size * side))
+    return Clearance(2 * size, of, 1 - left / max(float(np.var(lead)), 1e-300))

@@ -35,7 +35,7 @@ class Prior(NamedTuple):
     Parameters
     ----------
     mean, std : float
-        An infinite `std` stands for the g-prior of `Regression.block` about 0.
+        An infinite `std` means the g-prior of `Regression.block` about 0.
     lower, upper : float
     """
 
@@ -75,7 +75,7 @@ class ColumnsFit:
 
 def fit(y: Array, columns: Mapping[str, Array], prior: Mapping[str, Prior] | None = None,
         noise: float | None = None, period: float = 1.0) -> ColumnsFit:
-    """Return the fit of columns to one or several series, with the noise fitted beside them.
+    """Return the fit of columns to one or several series, with the noise fitted as well.
 
     Parameters
     ----------

@@ -43,8 +43,8 @@ CERTAIN = 1e14
 LEAST_SAMPLES = 100  # measured on a drive, below which it takes no part
 # The fit has converged when the next round would change the deviance by less than the first, the
 # last one having changed it by less than the second; rounds are bounded.
-CONVERGED, NEARLY, MOST_ROUNDS = 0.01, 0.1, 40
-NOISE_STEPS = 3  # of the noise in a round: fitted to its end, rounds take a quarter longer
+CONVERGED, NEARLY, MOST_ROUNDS = 0.1, 0.5, 40
+NOISE_STEPS = 2  # of the noise in a round
 MOST_CROSSES = 60  # products of columns with blocks that are kept: those of a search's best sets
 MOST_PRODUCTS = 4000  # products of blocks on a drive that are kept: some 10 kB each
 MOST_EQUATIONS = 100  # of drives that are kept: some 0.2 to 1 MB each
@@ -67,7 +67,7 @@ class JointFit:
     deviance : float
         See the module.
     squares : (D, B) array
-        Sums of squares that are left in the bands [N^2].
+        Sums of squares of the residual in the bands [N^2].
     """
 
     blocks: tuple[Block, ...]
@@ -103,7 +103,7 @@ class Regression:
         Force that priors of effects allow [N], so that costs of two designs mean the same; by
         default the rms of the error.
     open_forces : mapping of drive to OpenForces, optional
-        That drives have beside their noise.
+        That drives have in addition to their noise.
 
     Raises
     ------
@@ -149,9 +149,9 @@ class Regression:
               mean: Array | None = None) -> Block:
         """Return a block of rows in time, (k, M) by drive, by default with the g-prior.
 
-        The g-prior lets the force of any combination of the rows be of the size of the error
-        that the drives show: its determinant is ln of the number of samples that a coefficient
-        is worth, so that what slow noise could be as well is cheap and weak by itself.
+        By the g-prior the force of any combination of the rows has the size of the drives' error.
+        Its determinant is ln of the number of samples that a coefficient is worth. What slow
+        noise explains as well is cheap and weak.
         """
         return self.transformed_block(
             {d: self.series[d].transform(np.atleast_2d(values)) for d, values in rows.items()
@@ -234,7 +234,7 @@ class Regression:
         self._products.clear()
 
     def fit(self, blocks: Sequence[Block], start: Array | None = None) -> JointFit:
-        """Return the fit of blocks beside the base columns, the noise fitted with it.
+        """Return the fit of blocks with the base columns and the noise.
 
         Parameters
         ----------
@@ -273,7 +273,7 @@ class Regression:
                         spectra, solution.deviance, solution.squares, system.places)
 
     def stated(self, fit: JointFit, blocks: Sequence[Block] = ()) -> JointFit:
-        """Return a fit, or one with further blocks at its noise, its covariance as it is told.
+        """Return a fit, or one with further blocks at its noise, with the reported covariance.
 
         See `NormalEquations.uncertainty`.
         """
@@ -317,7 +317,7 @@ class Regression:
                 for k, d in enumerate(self.drives)}
 
     def left(self, fit: JointFit) -> Array:
-        """Return the root of the mean square that a fit leaves on each drive, (D,) [N]."""
+        """Return the root of the mean square of the residual of each drive, (D,) [N]."""
         found: Array = np.sqrt(fit.squares.sum(axis=1) / self.counts.sum(axis=1))
         return found
 
@@ -344,7 +344,7 @@ class Regression:
         return self._in_time(fit, d, self.series[d].transform(rows))
 
     def innovations(self, fit: JointFit, d: int) -> Array:
-        """Return what a fit leaves on a drive in time, (n,), of unit spectrum under its noise."""
+        """Return the residual of a drive in time, (n,), of unit spectrum under its noise."""
         return self._in_time(fit, d, self.remaining(fit, d))
 
     def _in_time(self, fit: JointFit, d: int, transformed: Array) -> Array:
@@ -357,7 +357,7 @@ class Regression:
         return np.concatenate((self.base_index[d], fit.index_of(acting))), acting
 
     def remaining(self, fit: JointFit, d: int) -> Array:
-        """Return the DCT coefficients of what a fit leaves on a drive, (n,) [N]."""
+        """Return the DCT coefficients of the residual of a drive, (n,) [N]."""
         rest: Array = (self.base[d][-1]
                        - fit.coefficients[self.base_index[d]] @ self.base[d][:-1])
         for block in fit.blocks:
@@ -372,11 +372,11 @@ class Regression:
         return float(term_gains(S[None], b[None], block.precision[None], mean[None])[0])
 
     def own_information(self, fit: JointFit, block: Block) -> Array:
-        """Return the information on a block's coefficients that a fit leaves, (k, k)."""
+        """Return the information on a block's coefficients beyond those of a fit, (k, k)."""
         return self._beside(fit, block)[0]
 
     def _beside(self, fit: JointFit, block: Block) -> tuple[Array, Array, Array]:
-        """Return own sums of products, those with what is left, and full products of a block."""
+        """Return own sums of products, those with the residual, and full products of a block."""
         taken, b = Columns(self, block.rows).projected(fit)
         S = np.sum([np.tensordot(self.weights(fit, d), self.products(block, [block], d)[0], 1)
                     for d in block.rows], axis=0)
@@ -414,7 +414,7 @@ class Columns:
         return self._crosses[key]
 
     def projected(self, fit: JointFit) -> tuple[Array, Array]:
-        """Return whitened products with all columns of a fit, (R, P), and with what it leaves.
+        """Return whitened products with all columns of a fit, (R, P), and with its residual.
 
         What the fit can take of products of the rows with each other is T C T^T, with its
         covariance C (Schur's complement).

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -51,6 +52,11 @@ class Block:
         """Number of coefficients."""
         return len(self.precision)
 
+    @cached_property
+    def log_det(self) -> float:
+        """Of the precision."""
+        return float(np.linalg.slogdet(self.precision)[1])
+
 
 def term_gains(S: Array, b: Array, precision: Array, mean: Array) -> Array:
     """Return by how much the deviance falls with each of n terms, (n,).
@@ -60,7 +66,7 @@ def term_gains(S: Array, b: Array, precision: Array, mean: Array) -> Array:
     S : (n, k, k) array
         Whitened sums of products of the rows, less what is fitted already.
     b : (n, k) array
-        Whitened sums of products with what is left.
+        Whitened sums of products with the residual.
     precision : (n, k, k) array
         Of the prior.
     mean : (n, k) array
@@ -110,18 +116,18 @@ class Prior:
     @classmethod
     def of(cls, columns: Sequence[BaseColumn], blocks: Sequence[Block]) -> Prior:
         """Return the prior of base columns, then of blocks in order."""
-        parts = [np.diag([column.precision for column in columns]),
-                 *(block.precision for block in blocks)]
-        count = sum(map(len, parts))
-        precision, mean, at, log_det = np.zeros((count, count)), np.zeros(count), 0, 0.0
-        for part, block in zip(parts, (None, *blocks), strict=True):
-            place = slice(at, at + len(part))
-            precision[place, place] = part
-            if block is not None and block.mean is not None:
+        first = np.array([column.precision for column in columns])
+        at = len(first)
+        count = at + sum(block.size for block in blocks)
+        precision, mean = np.zeros((count, count)), np.zeros(count)
+        precision[np.arange(at), np.arange(at)] = first
+        log_det = float(np.log(first).sum()) + sum(block.log_det for block in blocks)
+        for block in blocks:
+            place = slice(at, at + block.size)
+            precision[place, place] = block.precision
+            if block.mean is not None:
                 mean[place] = block.mean
-            if len(part):
-                log_det += float(np.linalg.slogdet(part)[1])
-            at += len(part)
+            at += block.size
         limited = np.zeros(count, dtype=bool)
         limited[:len(columns)] = [isinstance(column, ModelNumber) for column in columns]
         return cls(precision, mean, log_det, limited)
@@ -312,7 +318,7 @@ class NormalEquations:
         return gram, side
 
     def uncertainty(self, spectra: Array) -> Array:
-        """Return the covariance (P, P) that is told of coefficients, under noise spectra (D, B).
+        """Return the reported covariance (P, P) of coefficients, under noise spectra (D, B).
 
         A tolerance +-a says nothing of where within it a number lies: a variance of a^2 / 3 (Guide
         to the Expression of Uncertainty in Measurement, 4.3.7). The fit takes less, so that few

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Nuisance columns: what the form of an effect leaves open, in proportion to its force.
+"""Nuisance columns: the uncertainty of the form of an effect, in proportion to its force.
 
 Friction turns over at reversals in a width that nobody knows, and real effects depart from the
 catalogue's forms in ways that the effect declares (`DriveEffect.deviations`). Each gives a column
@@ -30,7 +30,7 @@ from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 
 
 def nuisance_rows(design: Design, term: Term, coefficients: Array) -> Array:
-    """Return what a term's form leaves open, (w, M) [N]; (0, M) for nothing.
+    """Return the uncertainty of a term's form, (w, M) [N]; (0, M) for none.
 
     Parameters
     ----------

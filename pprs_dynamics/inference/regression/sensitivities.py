@@ -12,24 +12,22 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.inference.regression.terms import FullRate
+from pprs_dynamics.inference.residuals.reconstruction import Reconstruction
 from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect, StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.model.force_model import (
-    ACTIVE_FRICTION,
-    PASSIVE_FRICTION,
-    ForceModel,
-)
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.forces import ACTIVE_FRICTION, PASSIVE_FRICTION, Forces
 from pprs_dynamics.physics.model.keys import GAIN
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.system.parallel import each
 
 # A number is moved by this share of itself: rounding and curvature are both below 1e-6 then.
@@ -77,7 +75,7 @@ class Number:
         return self.key if self.element is None else f'{self.key}[{self.element + 1}]'
 
 
-def model_numbers(model: ForceModel) -> tuple[Number, ...]:
+def model_numbers(model: DriveModel) -> tuple[Number, ...]:
     """Return the model's numbers that its `tolerances` leave open.
 
     A tolerance is a limit: 2.5 standard deviations.
@@ -94,7 +92,7 @@ def model_numbers(model: ForceModel) -> tuple[Number, ...]:
     return tuple(found)
 
 
-def _unit(model: ForceModel, key: str, element: int | None) -> str:
+def _unit(model: DriveModel, key: str, element: int | None) -> str:
     """Return the unit of a number; of a joint's, that of its kind."""
     turning, *pushing = model.keys[key].unit.split(', ')
     turns = element is None or element >= len(model.drives) or model.units[element].turns
@@ -109,9 +107,9 @@ class Sensitivities:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
         Around which forces are linear.
-    given : ForceModel
+    given : DriveModel
         As the user gave it: what it has already is no candidate, and its numbers are those that
         tolerances are about.
 
@@ -128,7 +126,7 @@ class Sensitivities:
         Samples between those at which it is; 0: those within `HOMING_TIME`.
     """
 
-    def __init__(self, model: ForceModel, given: ForceModel) -> None:
+    def __init__(self, model: DriveModel, given: DriveModel) -> None:
         self.model, self.given = model, given
         self.each: Callable[..., Iterable[Any]] = each if model.takes_long else map
         self.numbers = model_numbers(given)
@@ -151,13 +149,17 @@ class Sensitivities:
     def columns(self, forces: Any) -> dict[str, Array]:
         """Return columns by name, (K, N, D) each.
 
-        `NUMBERS` per standard deviation by which each number grows away from 0; `OF_DRIVES` what
-        other widths of turning over would change in every drive, and last a part that is alike
-        in both directions; `OF_JOINTS` the former in all passive joints; `HOMING` per metre that
-        each drive is measured too far, `INERTIA` per acceleration that it is measured too much;
-        the coefficients of each effect of `searched` by its name, and after `BARE` as they were if
-        friction did not follow the loads; those of effects that the given model has by their names
-        after `PRESENT`. What a kind of model does not have is left out.
+        What a kind of model does not have is missing.
+
+        - `NUMBERS`: per standard deviation by which each number grows away from 0.
+        - `OF_DRIVES`: other widths of reversal in every drive, and a part that is the same in
+          both directions.
+        - `OF_JOINTS`: other widths of reversal in all passive joints.
+        - `HOMING`: per metre that each drive is measured too far.
+        - `INERTIA`: per acceleration that each drive is measured too much.
+        - Names of `searched`: the coefficients of each effect.
+        - `BARE` + name: the same with friction that does not follow the loads.
+        - `PRESENT` + name: the coefficients of effects that the given model has.
 
         Parameters
         ----------
@@ -206,7 +208,7 @@ class Sensitivities:
             stride = max(1, round(HOMING_TIME / step))
         samples = every[min(stride // 2, len(every) - 1)::stride]
         there, seldom = state[samples], state[samples[::SLOWER]]
-        step = there.position_step
+        step = there.robot.position_step
 
         def efforts(drive: int, move: float) -> Array:
             return self._efforts(self.model, self._at(self.model, there.perturbed(drive, move)))
@@ -234,7 +236,7 @@ class Sensitivities:
     def _sensed_each(self, columns: Iterable[Array], state: Any) -> Array:
         return np.stack([self.sensed(column, state) for column in columns])
 
-    def _efforts(self, model: ForceModel, state: Any) -> Array:
+    def _efforts(self, model: DriveModel, state: Any) -> Array:
         """Return efforts at a state, without effects that know their past."""
         total: Array = state.rigid_force + sum(
             effect.force(state) for effect in following(model))
@@ -260,12 +262,12 @@ class Sensitivities:
         return [number.element] if number.key in PER_DRIVE or number.key == GAIN else None
 
     @cached_property
-    def _moved(self) -> dict[Number, ForceModel]:
+    def _moved(self) -> dict[Number, DriveModel]:
         """The model with numbers away from 0 by `RELATIVE_STEP` of the given ones.
 
         Made once, not chunk by chunk; numbers of a list that act on drives of their own share one.
         """
-        models: dict[tuple[str, int | None], ForceModel] = {}
+        models: dict[tuple[str, int | None], DriveModel] = {}
         found = {}
         for number in self.numbers:
             alone = None if self.drives_of(number) else number.element
@@ -278,7 +280,7 @@ class Sensitivities:
                         in enumerate(zip(value, self.given.values[number.key], strict=True)))
                 else:
                     value += RELATIVE_STEP * number.value
-                models[place] = build_model({**self.model.values, number.key: value})
+                models[place] = DriveModel.from_parameters({**self.model.values, number.key: value})
             found[number] = models[place]
         return found
 
@@ -340,7 +342,7 @@ class Sensitivities:
         return np.stack(full), np.stack(bare)
 
 
-def following(model: ForceModel) -> list[Effect]:
+def following(model: DriveModel) -> list[Effect]:
     """Return the effects whose forces follow from a state: no bodies, sensors or memories."""
     return [effect for effect in model.effects
             if not effect.is_measurement and not isinstance(effect, BodyEffect)
@@ -379,3 +381,53 @@ def passive_reversal_columns(friction: Effect, state: Any) -> Array:
         state.reversal, rate=factor * state.reversal.rate,
         slide=factor * state.reversal.slide))) - before
         for factor in PASSIVE_WIDTHS])
+
+
+class Column(NamedTuple):
+    """Key of columns in a table, next to parts and variables."""
+
+    name: str
+
+
+def stacked_columns(tables: list[dict[Any, Array]]) -> dict[str, Array]:
+    """Take the columns out of tables, (k, D, M) each by name."""
+    stacked: dict[str, Array] = {}
+    for key in [key for key in tables[0] if isinstance(key, Column)]:
+        stacked[key.name] = np.concatenate([table.pop(key) for table in tables]).transpose(1, 2, 0)
+    return stacked
+
+
+class ColumnCollector:
+    """Called chunk by chunk: gives columns to be treated, and keeps what drives did."""
+
+    def __init__(self, sensitivities: Sensitivities, reconstruction: Reconstruction) -> None:
+        self.sensitivities = sensitivities
+        # A gain changes nothing of efforts that were not recorded as currents.
+        self.without_gain = [k for k, number in enumerate(sensitivities.numbers)
+                             if number.key == GAIN
+                             and np.isnan(reconstruction.gain[number.element])]
+        self.share = reconstruction.recorded_share(sensitivities.model)
+        self.sensors = [effect.name for effect in sensitivities.model.effects
+                        if isinstance(effect, MeasurementEffect)]
+        self.kept: list[tuple[Array, ...]] = []
+
+    def __call__(self, forces: Forces) -> dict[Column, Array]:
+        s: Any = forces.mechanism
+        effort = forces.total - sum((forces.parts[name] for name in self.sensors),
+                                    np.zeros_like(forces.total))
+        self.kept.append((s.velocity, s.acceleration, s.direction, s.friction_load,
+                          s.transmitted, effort))
+        columns = self.sensitivities.columns(forces)
+        columns[NUMBERS][self.without_gain] = 0.0
+        # Views: copies of all columns at full rate would take longer than their means.
+        return {Column(name): (column if np.all(self.share == 1) else self.share * column)
+                .transpose(1, 0, 2) for name, column in columns.items()}
+
+    def full_rate(self, reconstruction: Reconstruction) -> FullRate:
+        """Return what the drives did, with positions as the mechanism has them."""
+        velocity, acceleration, direction, load, transmitted, effort = (
+            np.concatenate(arrays) for arrays in zip(*self.kept, strict=True))
+        return FullRate(
+            reconstruction.time, reconstruction.position, velocity, acceleration, direction, load,
+            transmitted, effort, reconstruction.effort, reconstruction.segments,
+            reconstruction.treat, reconstruction.start, reconstruction.channels)

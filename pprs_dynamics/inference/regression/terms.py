@@ -14,7 +14,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import DriveSamples
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 Rows = Mapping[int, Array]
 """Columns by drive, (k, M) each; drives that are not in it feel nothing."""
@@ -76,8 +76,8 @@ class FullRate:
     """What the drives did at every sample of a recording, in segments; (N, D) arrays.
 
     `effort` is what the model's drives apply, before any sensor; `effort_measured` the
-    recording's; `start` the time at which the recording began [s]; `channels` what was measured
-    beside.
+    recording's; `start` the time at which the recording began [s]; `channels` further
+    measurements.
     """
 
     time: Array
@@ -122,13 +122,13 @@ class OperatingPoint:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     base : (P,) array
         Coefficients of the base columns; those of reversals are 0.
     effects : tuple of PlacedEffect
-        What it has beside the given model, or otherwise.
+        That it has in addition to the given model, or with other values.
     """
 
-    model: ForceModel
+    model: DriveModel
     base: Array
     effects: tuple[PlacedEffect, ...] = ()

@@ -97,7 +97,7 @@ def _records(residuals: Residuals, drive: int) -> list[list[slice]]:
 
 @dataclass(frozen=True)
 class OpenForces:
-    """Forces on a drive that are not known, beside its noise: Gaussian, of few directions.
+    """Unknown forces on a drive in addition to its noise: Gaussian, of few directions.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ class DriveSeries:
 
     Over a stretch the k-th coefficient of the DCT has the frequency k / (2 T) of its length T, and
     the one of k = 0 is its mean. In a record of several stretches, through the gaps between which
-    slow noise goes on, the R means are no constants: they tell what is slower than a stretch.
+    slow noise goes on, the R means are no constants: they show what is slower than a stretch.
     They are rotated by an orthonormal basis, made of cos(k pi t / T) at the stretches for
     k = 0 .. R - 1 with the length T of the record; the k-th has the frequency k / (2 T), and only
     that of k = 0 is the constant.
@@ -124,9 +124,10 @@ class DriveSeries:
     Only what was measured counts. Within a stretch samples follow each other as if the few that
     are missing were not: the transform stays orthonormal, so that white noise is white.
 
-    Where forces are open, with covariance Z^T Z beside the noise S, coefficients are multiplied by
-    S^1/2 (1 + S^-1/2 Z^T Z S^-1/2)^-1/2 S^-1/2: noise and open forces together are then as the
-    noise alone is without. What lies along open forces counts the less, the larger they may be.
+    Where forces are open, with covariance Z^T Z in addition to the noise S, coefficients are
+    multiplied by S^1/2 (1 + S^-1/2 Z^T Z S^-1/2)^-1/2 S^-1/2: noise and open forces together are
+    then as the noise alone is without. What lies along open forces counts the less, the larger they
+    may be.
 
     Parameters
     ----------
@@ -204,7 +205,7 @@ class DriveSeries:
         return found if self._open is None else self._open.narrowed(found)
 
     def open_forces(self, values: Array) -> Array:
-        """Return what open forces most likely are, (M,), of what is left of an error (M,) [N]."""
+        """Return the most likely open forces, (M,), given the residual (M,) of a fit [N]."""
         return np.zeros_like(values) if self._open is None else self._open.expected(
             self.cosines(values))
 
@@ -257,7 +258,7 @@ class DriveSeries:
 
 @dataclass(frozen=True)
 class _Narrowing:
-    """Open forces along their principal directions beside the noise.
+    """Open forces along their principal directions, in units of the noise.
 
     Parameters
     ----------

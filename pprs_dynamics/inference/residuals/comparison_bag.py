@@ -22,14 +22,14 @@ from pprs_dynamics.inference.residuals.reconstruction import (
 from pprs_dynamics.measurement.files.bag_files import write_bag
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Samples
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MEASURED, MODEL, RESIDUAL, PARTS = '/measured', '/model', '/residual', '/parts'
 FINDINGS = '/findings'
 
 
 def write_comparison(
-    path: Path, model: ForceModel, recordings: Sequence[Recording],
+    path: Path, model: DriveModel, recordings: Sequence[Recording],
     findings: Sequence[str], progress: Callable[[float], None] = lambda share: None,
 ) -> int:
     """Write joint states of measured and modelled efforts, and return how many samples.
@@ -38,7 +38,7 @@ def write_comparison(
     ----------
     path : Path
         .mcap, .db3, or without an ending a folder.
-    model : ForceModel
+    model : DriveModel
     recordings : sequence of Recording
         One after the other, at their own stamps.
     findings : sequence of str
@@ -65,7 +65,7 @@ def write_comparison(
     return sum(len(part.time) for part in found[MEASURED])
 
 
-def _efforts(model: ForceModel, reconstruction: Reconstruction) -> dict[str, Array]:
+def _efforts(model: DriveModel, reconstruction: Reconstruction) -> dict[str, Array]:
     """Return efforts by topic, (N, D); NaN where there is none."""
     shape = reconstruction.effort.shape
     efforts: dict[str, Array] = {}

@@ -15,7 +15,7 @@ from pprs_dynamics.inference.residuals.reconstruction import follow
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.drive_motion import DriveMotion, smooth_drives
 from pprs_dynamics.measurement.motion.treatment import Treatment
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 STRETCHES = 3  # at the start, in the middle, at the end
 LONGEST = 2000  # samples of a stretch that are smoothed: 4 s at 500 Hz
@@ -91,7 +91,7 @@ def excerpt_of(recording: Recording, time_unit: float = 1.0, stretches: int = ST
                    means(recording.effort[smooth.index]), velocity)
 
 
-def forces_on(model: ForceModel, motion: DriveMotion, time: Array) -> Array | None:
+def forces_on(model: DriveModel, motion: DriveMotion, time: Array) -> Array | None:
     """Return the model's forces on a motion of the drives, (N, D) [N]; None where it has none.
 
     That the mechanism cannot follow a motion says as much as its forces: nothing is raised.

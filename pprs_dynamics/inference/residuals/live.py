@@ -17,7 +17,7 @@ from pprs_dynamics.measurement.files.samples import Mask
 from pprs_dynamics.measurement.motion.differentiation import ORDER, LocalPolynomial
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction, LiveSample
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 WINDOW = 0.12  # [s] of the smoothing that gives velocity and acceleration
 # Arms move ten times as slowly as the 3-PPRS, and their joints carry ten times the inertia.
@@ -63,14 +63,14 @@ class LiveComparison:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     window : float, optional
         Duration of the smoothing window [s]; that of the kind of model where it is not given.
     span : float
         Duration over which the running error is taken [s].
     """
 
-    def __init__(self, model: ForceModel, window: float | None = None, span: float = ERROR_SPAN,
+    def __init__(self, model: DriveModel, window: float | None = None, span: float = ERROR_SPAN,
                  ) -> None:
         self._window = window or (ARM_WINDOW if model.moves_joints else WINDOW)
         self._span = span
@@ -82,7 +82,7 @@ class LiveComparison:
         self._model, self._state = model, model.initial_state()
         self.use_model(model)
 
-    def use_model(self, model: ForceModel) -> None:
+    def use_model(self, model: DriveModel) -> None:
         """Compare with another model from the next sample on; the running error starts afresh."""
         self._state = model.continued_state(self._model, self._state)
         self._model = model
@@ -100,7 +100,7 @@ class LiveComparison:
         return self._bridged_before + (0 if self._live is None else self._live.bridged)
 
     def push(self, time: float, position: ArrayLike, effort: ArrayLike) -> None:
-        """Take one sample, drives in order, as it is recorded; effort NaN means no measurement."""
+        """Take one recorded sample, drives in order; effort NaN means no measurement."""
         if self._live is None:
             self._learn(time, position, effort)
             return
@@ -205,7 +205,7 @@ class LiveComparison:
 
     def _followed(self, position: Array, velocity: Array, acceleration: Array) -> Any:
         """Return what the drives move."""
-        found = self._model.motion_of_drives(position, velocity, acceleration, self._seed)
+        found = self._model.robot.motion_of_drives(position, velocity, acceleration, self._seed)
         self._seed = found[-1:]
         return found
 

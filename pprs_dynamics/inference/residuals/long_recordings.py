@@ -4,10 +4,9 @@
 """Excerpts of recordings that are longer than what a search can hold in memory.
 
 A search keeps some thousands of columns, a number each for every block of every drive: an hour
-would take tens of gigabytes and as many minutes. Stretches keep all frequencies up to the
-blocks' own, which longer blocks would not, and what many minutes more would tell is a smaller
-uncertainty alone. Where a robot does the same for hours they are chosen by how much it moves,
-never by how it errs.
+would take tens of gigabytes and as many minutes. Stretches contain all frequencies up to that of
+the blocks, unlike longer blocks. More minutes would only reduce the uncertainty. Where a robot does
+the same for hours they are chosen by how much it moves, never by how it errs.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.measurement.motion.drive_motion import smooth_drives
 from pprs_dynamics.measurement.motion.rests import GLANCE
 from pprs_dynamics.measurement.motion.treatment import block_length
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 TOO_LONG = 'too_long'
 # Blocks of all recordings together. A search takes 50 to 150 kB for each, with six drives: as many
@@ -36,10 +35,10 @@ MOST_WHOLE, MOST_BLOCKS = 16_000, 9_000
 STRETCHES, SHORTEST_STRETCH = 12, 5.0
 
 
-def excerpts_within_memory(model: ForceModel, recordings: Sequence[Recording]) -> list[Recording]:
+def excerpts_within_memory(model: DriveModel, recordings: Sequence[Recording]) -> list[Recording]:
     """Return recordings of which no more is used than a search can hold.
 
-    What is left out is among their findings. Those that are short enough stay as they are, and so
+    Their findings name the omitted part. Those that are short enough stay as they are, and so
     do excerpts.
     """
     whole = [recording for recording in recordings if not _is_excerpt(recording)]
@@ -72,7 +71,7 @@ def _blocks(recording: Recording, times: int) -> float:
     return _used(recording) / (times * block_length(_step(recording)))
 
 
-def _block(model: ForceModel, recording: Recording) -> int:
+def _block(model: DriveModel, recording: Recording) -> int:
     """Return how many usual blocks make one of a model whose blocks follow the motion."""
     if not recording.segments:
         return 1
@@ -113,7 +112,7 @@ def _excerpt(recording: Recording, share: float) -> Recording:
 
 
 def _pieces(recording: Recording, length: int) -> list[slice]:
-    """Return the segments in pieces of a length; what is left of one and half as long is one."""
+    """Return the segments in pieces of a length; a remainder of half that length is one."""
     pieces = []
     for part in recording.segments:
         starts = list(range(part.start, part.stop, length))

@@ -19,7 +19,7 @@ from pprs_dynamics.inference.residuals.reconstruction import (
 )
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MOTION = ('position', 'velocity', 'acceleration')
 # Between recordings [s], so that times of all together increase.
@@ -34,14 +34,14 @@ class Variable:
 
 
 def measure_residuals(
-    model: ForceModel, recordings: Sequence[Recording],
+    model: DriveModel, recordings: Sequence[Recording],
     progress: Callable[[float, float], None] | None = None,
 ) -> tuple[Residuals, tuple[str, ...]]:
     """Return measured and modelled efforts of recordings side by side, and how, in words.
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings : sequence of Recording
         One after the other, with a pause between; each segment stays one of its own.
     progress : callable, optional
@@ -78,7 +78,7 @@ def measure_residuals(
 
 
 def treated_table(
-    model: ForceModel, reconstruction: Reconstruction,
+    model: DriveModel, reconstruction: Reconstruction,
     progress: Callable[[int, int], None] | None = None,
     more: Callable[[Any], Mapping[Any, Array]] = lambda forces: {},
 ) -> dict[Any, Array]:
@@ -86,7 +86,7 @@ def treated_table(
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     reconstruction : Reconstruction
     progress : callable, optional
     more : callable, optional
@@ -94,7 +94,7 @@ def treated_table(
     """
     def variables(forces: Any) -> dict[Variable, Array]:
         return {Variable(name): values
-                for name, values in model.variables(forces.mechanism).items()}
+                for name, values in model.robot.variables(forces.mechanism).items()}
 
     treat = reconstruction.treat
     table = treated_forces(model, reconstruction, progress,
@@ -108,7 +108,7 @@ def treated_table(
     return table
 
 
-def join_tables(model: ForceModel, tables: list[dict[Any, Array]]) -> Residuals:
+def join_tables(model: DriveModel, tables: list[dict[Any, Array]]) -> Residuals:
     """Return the residuals of a model on recordings one after the other, from their tables."""
     start, segments = 0.0, 0.0
     for number, table in enumerate(tables):

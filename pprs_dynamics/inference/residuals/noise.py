@@ -6,11 +6,10 @@ r"""Power spectrum of the noise of each drive: smooth and falling.
 .. math:: S(f) = a_0 + \sum_j \frac{a_j}{1 + (f / f_j)^2}, \qquad a_j \ge 0,
 
 with corners f_j one octave apart, from 1 / (4 T) to half the Nyquist frequency: wide enough for
-white noise, AR(1) noise of any correlation and nearly 1/f noise. No resonance is possible, so a
-vibration stands out. The noise of a constant (k = 0) is what the slope of the lowest frequencies
-leads to below them: a constant force stands out of white and of AR(1) noise, and of 1/f noise,
-which goes on rising, where it is larger than that. The level is that of the drive, and its slope
-is at least the median of all drives.
+white noise, AR(1) noise of any correlation and nearly 1/f noise. No resonance is possible: a
+vibration is no noise. The noise of a constant (k = 0) is extrapolated along the slope of the lowest
+frequencies. It is low for white and AR(1) noise, and high for 1/f noise. The level is that of the
+drive, and its slope is at least the median of all drives.
 
 The amplitudes maximise Whittle's restricted likelihood: with squares r^2 and leverage h of a
 regression, by Fisher scoring, each step of which is a least squares problem with amplitudes that
@@ -112,7 +111,7 @@ class NoiseShapes:
         amplitudes : (D, J + 1) array
             To start from [N^2].
         squares : (D, B) array
-            Sums of squares that a regression leaves in the bands [N^2].
+            Sums of squares of the residual in the bands [N^2].
         counts : (D, B) array
             Coefficients in the bands.
         leverage : (D, B) array

@@ -34,9 +34,9 @@ from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.laws.elastic_joint import LINK_POSITION
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.three_pprs.forward_motion import find_pose_jumps, solve_forward_motion
-from pprs_dynamics.physics.three_pprs.robot import Geometry
+from pprs_dynamics.physics.three_pprs.geometry import Geometry
 
 if TYPE_CHECKING:
     from pprs_dynamics.measurement.files.recording import Recording
@@ -54,7 +54,7 @@ class FollowedMotion(NamedTuple):
     jumps: np.ndarray
 
     def notes(self, time: Array) -> list[str]:
-        """Return what was found, in words; time (N,) [s]."""
+        """Return the findings as sentences; time (N,) [s]."""
         notes = []
         if np.any(self.near_branch):
             notes.append(
@@ -101,7 +101,8 @@ class Reconstruction(DriveMotion):
     motion : PlatformMotion or JointMotion
         Without times, which need not increase from segment to segment; `chunks` has them.
     effort : (N, D) array
-        As measured [N]; NaN where it was not, and where a drive stands that tells nothing then.
+        As measured [N]; NaN where it was not, and where a drive stands whose effort then means
+        nothing.
     treat : Treatment
         What effort and model both get: values (N, k) -> (M, k).
     near_branch : (N,) bool array
@@ -115,8 +116,8 @@ class Reconstruction(DriveMotion):
     start : float
         Time of the recording's first sample, which may be dropped here [s].
     channels : mapping of str to (N, D) array
-        What was measured of the drives beside, between its samples by straight lines; NaN in drives
-        where it never was.
+        Further channels of the drives, interpolated by straight lines; NaN in drives that lack
+        them.
     recorded : Recording
         What it is of.
     read : DriveMotion
@@ -143,7 +144,7 @@ class Reconstruction(DriveMotion):
     def __len__(self) -> int:
         return len(self.time)
 
-    def recorded_share(self, model: ForceModel) -> Array:
+    def recorded_share(self, model: DriveModel) -> Array:
         """Return by what a model's efforts are multiplied to be those of the recording, (D,).
 
         1, but for currents that another gain than the model's made efforts of.
@@ -171,13 +172,13 @@ class Reconstruction(DriveMotion):
                 first = last
 
 
-def follow(model: ForceModel | Geometry, time: Array, drives: DriveMotion,
+def follow(model: DriveModel | Geometry, time: Array, drives: DriveMotion,
            progress: Progress | None = None) -> FollowedMotion:
     """Return the motion that belongs to the drives': of an axis and an arm it is the same.
 
     Parameters
     ----------
-    model : ForceModel or Geometry
+    model : DriveModel or Geometry
         Of any kind, or the geometry of a 3-PPRS.
     time : (N,) array
         [s].
@@ -190,7 +191,7 @@ def follow(model: ForceModel | Geometry, time: Array, drives: DriveMotion,
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    if isinstance(model, ForceModel) and model.moves_joints:
+    if isinstance(model, DriveModel) and model.moves_joints:
         return FollowedMotion(JointMotion(drives.position, drives.velocity, drives.acceleration),
                               np.zeros(len(time), dtype=bool), np.zeros(0, dtype=int))
     geometry = model if isinstance(model, Geometry) else model.robot.geometry
@@ -241,14 +242,14 @@ def _jumps(motion: PlatformMotion, time: Array, segments: Sequence[slice]) -> np
 
 
 def reconstruct(
-    model: ForceModel | Geometry, recording: Recording, progress: Progress | None = None,
+    model: DriveModel | Geometry, recording: Recording, progress: Progress | None = None,
     window: float | None = None,
 ) -> Reconstruction:
     """Return the motion and effort behind a recording.
 
     Parameters
     ----------
-    model : ForceModel or Geometry
+    model : DriveModel or Geometry
         Whose kinematics to use.
     recording : Recording
         Or anything with its arrays and segments.
@@ -264,12 +265,12 @@ def reconstruct(
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    names = model.drives if isinstance(model, ForceModel) else DRIVES
+    names = model.drives if isinstance(model, DriveModel) else DRIVES
     if tuple(recording.drives) != names:
         order = ', in this order' if len(names) > 1 else ''
         raise MotionError('drives', f'they are {", ".join(recording.drives)}',
                           f'be {", ".join(names)}{order}', 'shape')
-    if isinstance(model, ForceModel):
+    if isinstance(model, DriveModel):
         unit = 'rad' if all(units.turns for units in model.units) else 'm'
         drives = smooth_drives(recording, window, model.blocks_per_period, unit)
     else:
@@ -297,7 +298,7 @@ def reconstruct(
         recorded=recording, read=read, windup=windup)
 
 
-def read_by(reconstruction: Reconstruction, model: ForceModel) -> Reconstruction:
+def read_by(reconstruction: Reconstruction, model: DriveModel) -> Reconstruction:
     """Return the same reconstruction with the drives where another model's encoders are.
 
     Blocks do not depend on them.
@@ -347,11 +348,11 @@ def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recordin
 
 
 def _followed_rightly(
-    model: ForceModel | Geometry, recording: Recording, read: DriveMotion, time: Array,
+    model: DriveModel | Geometry, recording: Recording, read: DriveMotion, time: Array,
     windup: Array | None, progress: Progress | None = None,
 ) -> tuple[DriveMotion, FollowedMotion]:
     """Return the true motion of the drives, and of what they move, behind that which was read."""
-    if not isinstance(model, ForceModel) or not model.misreadings:
+    if not isinstance(model, DriveModel) or not model.misreadings:
         return read, follow(model, time, read, progress)
     q, q_dot, q_ddot = misread(model.misreadings, model.drives, recording, read)
     drives = replace(read, position=read.position - q, velocity=read.velocity - q_dot,
@@ -390,7 +391,7 @@ def _applied_gain(recording: Recording) -> Array:
 
 
 def _channels(recording: Recording, index: Array) -> dict[str, Array]:
-    """Return what was measured beside motion and effort, at some samples, (N, D) by name."""
+    """Return further channels at some samples, (N, D) by name."""
     found = {}
     for name, values in recording.channels.items():
         filled = np.full((len(index), values.shape[1]), np.nan)
@@ -402,13 +403,13 @@ def _channels(recording: Recording, index: Array) -> dict[str, Array]:
     return found
 
 
-def _efforts(model: ForceModel | Geometry, recording: Recording) -> Array:
+def _efforts(model: DriveModel | Geometry, recording: Recording) -> Array:
     """Return the efforts of a recording, NaN where a drive stands between motions.
 
     Where poses are held throughout, their efforts count: they show gravity and offsets.
     """
     effort = recording.effort
-    if isinstance(model, ForceModel) and model.rest_speed and not are_held_poses(
+    if isinstance(model, DriveModel) and model.rest_speed and not are_held_poses(
             recording.position, recording.segments):
         effort = effort.copy()
         for part in recording.segments:
@@ -420,7 +421,7 @@ def _efforts(model: ForceModel | Geometry, recording: Recording) -> Array:
 
 
 def sensed_forces(
-    model: ForceModel, reconstruction: Reconstruction,
+    model: DriveModel, reconstruction: Reconstruction,
 ) -> Iterator[tuple[Chunk, Any, dict[str, Array]]]:
     """Yield chunk by chunk what the model returns, and its efforts as the sensors would see them.
 
@@ -437,14 +438,14 @@ def sensed_forces(
 
 
 def treated_forces(
-    model: ForceModel, reconstruction: Reconstruction, progress: Progress | None = None,
+    model: DriveModel, reconstruction: Reconstruction, progress: Progress | None = None,
     more: Callable[[Any], Mapping[Any, Array]] = lambda forces: {},
 ) -> dict[Any, Array]:
     """Return the model's forces on a reconstruction, treated: parts and their 'total', (M, D) [N].
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     reconstruction : Reconstruction
     progress : callable, optional
         Called with (samples done, all) now and then.

@@ -26,7 +26,7 @@ class ResidualsError(PprsError, ValueError):
     Parameters
     ----------
     quantity, found, rule : str
-        What is wrong, what was found, and what is required ("it must ...").
+        The quantity, its value, and the rule ("it must ...").
     """
 
     def __init__(self, quantity: str, found: str, rule: str) -> None:

@@ -23,7 +23,7 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 if TYPE_CHECKING:
     from pprs_dynamics.physics.mechanism.mechanism import Mechanism
-    from pprs_dynamics.physics.model.force_model import ForceModel
+    from pprs_dynamics.physics.model.drive_model import DriveModel
 
 REACH = 4.0  # of the mechanism's size, the mean distance of its joints: what hangs on it is within
 CLOSE = 1e-4  # of the reach, at which a search for a centre ends: columns move with it afterwards
@@ -48,7 +48,7 @@ def about_centre(term: Term, mass: str, centre: tuple[float, ...]) -> Term:
 
 
 def centre_of(effect: type[CatalogueEffect], names: tuple[str, ...], c: Array,
-              model: ForceModel) -> tuple[float, ...]:
+              model: DriveModel) -> tuple[float, ...]:
     """Return where a body of these coefficients is, within the reach."""
     size = reach_of(model.robot)
     known = dict(zip(names, c.tolist(), strict=True))
@@ -59,7 +59,7 @@ def centre_of(effect: type[CatalogueEffect], names: tuple[str, ...], c: Array,
 
 
 def find_centre(term: Term, mass: str, error: Array, scale: Mapping[int, float],
-                model: ForceModel) -> tuple[float, ...]:
+                model: DriveModel) -> tuple[float, ...]:
     """Return the centre of the point mass that explains an error best, from its place [m].
 
     Parameters
@@ -71,7 +71,7 @@ def find_centre(term: Term, mass: str, error: Array, scale: Mapping[int, float],
     error : (M, D) array
     scale : mapping of drive to float
         Of each drive's error.
-    model : ForceModel
+    model : DriveModel
     """
     size = reach_of(model.robot)
     prefix = mass.removesuffix('mass')

@@ -9,6 +9,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import comb, inf, log, log1p
+from operator import add, sub
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,16 +19,67 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
-from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.patterns import Family, Pattern
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE, catalogue
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 RowKey = frozenset[tuple[str, str]]  # names with their place, and kinds of courses
 COURSE_TIMES = 200  # beginnings that are tried, evenly over the recordings
 SINCE, DURING, DRIFT = 'since', 'during', 'drift'  # kinds of courses
+
+
+@dataclass(frozen=True)
+class CostTerms:
+    """Terms of a cost, each -2 ln of a probability but for a constant; they add up to it.
+
+    Parameters
+    ----------
+    fit : float
+        The residual in units of its noise, and ln of the noise.
+    coefficients : float
+        The prior of the coefficients: how far they are from its mean, and how much narrower than
+        it they are known.
+    names : float
+        Of what is claimed, with the odds of one more effect, of a zero, a gain or a pattern.
+    drives : float
+        How many, and which.
+    shapes : float
+        Variants and shapes, among those tried.
+    signs : float
+        Less than nothing for physical ones.
+    feasibility : float
+        By how much possible bodies, and friction and inertia that are not negative, fit worse
+        than those of the least squares.
+    linearisation : float
+        By how much the exact forces of its own fitted model fit worse than the linear ones; 0
+        where that was not computed.
+    """
+
+    fit: float = 0.0
+    coefficients: float = 0.0
+    names: float = 0.0
+    drives: float = 0.0
+    shapes: float = 0.0
+    signs: float = 0.0
+    feasibility: float = 0.0
+    linearisation: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """The cost."""
+        return float(sum(vars(self).values()))
+
+    def __add__(self, other: CostTerms) -> CostTerms:
+        return CostTerms(*map(add, vars(self).values(), vars(other).values()))
+
+    def __sub__(self, other: CostTerms) -> CostTerms:
+        return CostTerms(*map(sub, vars(self).values(), vars(other).values()))
+
+    def to_dict(self) -> dict[str, float]:
+        """Return the terms by name."""
+        return dict(vars(self))
 
 
 @dataclass(frozen=True)
@@ -227,7 +279,7 @@ class UnknownCandidate:
 
     @property
     def name(self) -> str:
-        """What stands for it among the names of effects."""
+        """In lists of names of effects."""
         return f'unknown, {self.family.variable}'
 
     @property
@@ -269,8 +321,8 @@ class CandidateSet:
     nuisance : mapping of Component to tuple of Block
         Columns for what the components leave open, fitted with them.
     barred : str
-        Why it may not be: a body cannot be, a value is beyond its bounds, or a pattern may be the
-        lack of fit of the effects beside it; '' where it may.
+        Why it is inadmissible: no possible values come near, or a candidate may be the form error
+        of others; '' for an admissible set.
     """
 
     candidates: tuple[Candidate, ...]
@@ -347,7 +399,7 @@ def set_key(candidates: tuple[Candidate, ...]) -> Hashable:
     return frozenset(candidate.key for candidate in candidates)
 
 
-def names_of(model: ForceModel) -> int:
+def names_of(model: DriveModel) -> int:
     """Return how many effects the catalogue has for what a model is of."""
     return sum(map(model.offers, catalogue().values()))
 
@@ -373,7 +425,7 @@ class PriorCosts:
 
     @classmethod
     def of(cls, regression: Regression, decisions: Decisions,
-           model: ForceModel | None = None) -> PriorCosts:
+           model: DriveModel | None = None) -> PriorCosts:
         """Return the prior costs for the drives and samples of a regression, of a model's errors.
 
         Names are those of effects that can act in what it is a model of, those of other packages

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""All terms that the catalogue offers for a design, and what each would gain beside a fit."""
+"""All terms that the catalogue offers for a design, and the gain of each."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
     Component,
+    CostTerms,
     Course,
     PriorCosts,
     UnknownCandidate,
 )
-from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementEffect, Windup
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
@@ -267,7 +267,7 @@ class Components:
 
     @cached_property
     def windups(self) -> dict[int, Windup]:
-        """What second encoders tell of the drives whose wind-up follows their load."""
+        """Wind-up of the drives whose second encoder shows that it follows their load."""
         return {d: windup for d, windup in self.design.second_encoders.windups.items()
                 if windup.explained > self.prior_costs.decisions.explained}
 
@@ -309,7 +309,7 @@ class Components:
                 for d, values in term.bare.items() if d in self.regression.series}
 
     def nuisance_rows(self, component: Component) -> dict[int, Array]:
-        """Return what its form leaves open, by its coefficients, (k, w, n) by drive.
+        """Return the uncertainty of its form, by its coefficients, (k, w, n) by drive.
 
         How friction turns over where it knows no past, and the effect's own deviations.
         """
@@ -329,7 +329,7 @@ class Components:
         return self._nuisance[component]
 
     def leaves_open(self, component: Component) -> bool:
-        """Return whether there are columns for what a component's form leaves open."""
+        """Return whether there are columns for the uncertainty of a component's form."""
         return self.term(component).bare is not None or bool(self.nuisance_rows(component))
 
     def prior_cost(self, candidate: Candidate) -> CostTerms:
@@ -337,7 +337,7 @@ class Components:
         return self.prior_costs.of_candidate(candidate, self.component_prior_cost)
 
     def component_prior_cost(self, component: Component) -> CostTerms:
-        """Return the prior cost of a component beside that of its hypotheses and drives.
+        """Return the prior cost of a component without that of its hypotheses and drives.
 
         That an effect is usually small makes large values unlikely, and small ones no likelier:
         it costs by how much that narrows the prior, and the odds that it is otherwise at all, which

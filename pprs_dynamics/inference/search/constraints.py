@@ -45,8 +45,7 @@ from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 from pprs_dynamics.physics.effects.structure_effect import with_bodies
 from pprs_dynamics.physics.mechanism.description import body_at, inertial_in, pseudo_inertia
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import RIGID_BODY
+from pprs_dynamics.physics.model.forces import RIGID_BODY
 from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 
 if TYPE_CHECKING:
@@ -185,7 +184,7 @@ class Constraints:
         return Inequalities(np.concatenate(rows)[finite], b[finite])
 
     def _bounds_of(self, component: Component) -> Array:
-        """Return the least and largest of each coefficient beside the input model's, (2, k)."""
+        """Return the least and largest of each coefficient minus the input model's, (2, k)."""
         if component not in self._bounds:
             turns = units_of(self.design.given, component.drive).turns
             kinds = {p.name: p.of(turns) for p in (*component.effect.coefficients,
@@ -262,7 +261,7 @@ def own_total(design: Design, drive: int, of: str) -> float:
 def _own_inertia(design: Design, drive: int) -> float:
     """Return the largest inertia of a drive that moves alone [kg, kg m^2]."""
     model = design.given
-    if isinstance(model, DriveModel):  # at most all of its masses
+    if not model.moves_joints:  # at most all of its masses
         return float(sum(np.sum(model.values[key]) for key in MASSES))
     position = design.residuals.variables['position']
     still, pushed = np.zeros_like(position), np.zeros_like(position)

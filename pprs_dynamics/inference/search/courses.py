@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Effects that begin, end or grow within a recording, beside their constant form.
+"""Sets in which an effect begins, ends or grows within the recordings.
 
-A payload that is picked up in the middle is half of it throughout to a fit of constants, and a
-contact of some seconds a spring and a ripple. Before a constant form is believed, each effect is
-tried with a step in time, as a stretch, and as a drift.
+To a fit of constants a payload that is picked up in the middle is half of it throughout, and a
+contact of some seconds is a spring and a ripple. Where a score test of onsets passes, effects are
+refitted with an onset, as a stretch, and as a drift.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import numpy as np
 
 from pprs_dynamics.inference.regression.design import LEAST_MOVING
 from pprs_dynamics.inference.search.candidates import (
-    COURSE_TIMES,
     DRIFT,
     DURING,
     SINCE,
@@ -25,34 +24,28 @@ from pprs_dynamics.inference.search.candidates import (
     Course,
     EffectCandidate,
 )
-from pprs_dynamics.inference.search.fitted_sets import (
-    LEAST_IMPROVEMENT,
-    Candidates,
-    FittedSets,
-)
+from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
 from pprs_dynamics.inference.search.score_test import Entry, ScoreTest
 
-# Stretches that are tried: so many parts of the recordings, each of so many of them long.
-STRETCHES, STRETCH_LENGTHS = 40, (1, 2, 4, 8)
-COURSE_HALVINGS = 6  # of the step between them, around the best
-COURSE_TRIALS = 3  # candidates of a scan that are fitted
-FIRST_TIMES = 5  # parts of the recordings, between which effects that are not kept are tried first
+# Onsets that are tried, and stretches: so many parts of the recordings, each of so many of them
+# long. The best is refined to `COURSE_TIMES`.
+ONSETS, STRETCHES, STRETCH_LENGTHS = 50, 40, (1, 4)
+COURSE_HALVINGS = 8  # of the step between them, around the best
+COURSE_TRIALS = 6  # candidates of a scan that are fitted
+FIRST_TIMES = 5  # parts of the recordings, between which effects that are not reported are tested
+PRUNED = 6  # sets that are simplified
 MOST_COURSES = 3  # effects of one set that change within the recordings
 SINGLE = float(np.finfo(np.float32).eps)  # share of a force's squares that is rounding
+Alone = list[tuple[CandidateSet, EffectCandidate]]
 
 
 @dataclass(frozen=True)
 class _Offer:
-    """A candidate with a course, by how much it would lower the deviance at least, and where."""
+    """A candidate with a course, the least fall of the deviance with it, and its drives."""
 
     gain: float
     candidate: EffectCandidate
     drives: frozenset[int]
-
-    def is_worth_a_fit(self, fits: FittedSets) -> bool:
-        """Return whether its gain is more than its prior cost."""
-        course = self.candidate.course
-        return course is not None and self.gain > fits.prior_costs.of_course(course)
 
 
 def fit_courses(fits: FittedSets, reported: CandidateSet, alone: Sequence[CandidateSet],
@@ -71,71 +64,62 @@ def fit_courses(fits: FittedSets, reported: CandidateSet, alone: Sequence[Candid
         Around the input model, where the reported set is nonlinear: the search is repeated there,
         since a nonlinear constant effect may imitate an onset around its own model.
     """
-    if not _changing_drives(fits, reported, alone):
-        return
-    _fit(fits, reported, alone)
-    if first is not None:
-        _fit(first, first.evaluate(tuple(
-            candidate for candidate in reported.effects if not candidate.effect.nonlinear)), alone)
+    others = [(fitted, fitted.effects[0]) for fitted in alone if _is_new(fitted.effects[0])]
+    drives = _changing_drives(fits, reported, others)
+    if drives:
+        _fit(fits, reported, others, drives)
+        if first is not None:
+            plain = first.evaluate(tuple(
+                candidate for candidate in reported.effects if not candidate.effect.nonlinear))
+            _fit(first, plain, others, _changing_drives(first, plain, others))
 
 
-def _fit(fits: FittedSets, kept: CandidateSet, others: Sequence[CandidateSet]) -> None:
+def _fit(fits: FittedSets, reported: CandidateSet, alone: Alone, drives: set[int]) -> None:
     """Fit sets with onsets from a set without, as long as the cost falls."""
-    drives = _changing_drives(fits, kept, others)
-    if not drives:
-        return
-    constant = [(kept, candidate) for candidate in kept.effects if _is_new(candidate)]
-    best = kept
-    alternatives = [(other, candidate) for other, candidate in (
-        *((other, other.effects[0]) for other in others), *_alone_on_drives(fits, drives))
-        if _is_new(candidate)]
-    likely: list[EffectCandidate] = []
-    for _ in range(MOST_COURSES):
-        held = [(best, candidate) for candidate in best.effects
-                if not candidate.course and _is_new(candidate)]
+    best, alone = reported, [*alone, *_alone_on_drives(fits, drives)]
+    likely = {candidate.effect: candidate for candidate in reported.effects if _is_new(candidate)}
+    for _ in range(MOST_COURSES if drives else 0):
+        constant = [(best, candidate) for candidate in best.effects
+                    if not candidate.course and _is_new(candidate)]
         # Patterns of no catalogue imitate onsets: offers are beside effects alone.
         plain = fits.at_noise_of(best, best.effects) if best.unknowns else best
-        offered = _best_of_each(sorted(
-            _offers(fits, _bases(fits, plain), [*held, *alternatives], _courses(fits)),
-            key=lambda offer: -offer.gain))
-        likely += [offer.candidate for offer in offered]
-        found = best
-        for offer in offered:
-            for rest in _rests(best, offer.candidate):
-                # Its shape was that of an effect that is there all the time.
-                tried = fits.pruned(fits.refined(fits.evaluate((*rest, offer.candidate))))
-                found = min(found, tried, key=lambda fitted: fitted.cost)
+        offers = sorted(_offers(fits, _bases(fits, plain), [*constant, *alone], _courses(fits)),
+                        key=lambda offer: -offer.gain)
+        likely |= {offer.candidate.effect: offer.candidate for offer in _best_of_each(offers)}
+        # Its shape was that of an effect that is there all the time.
+        tried = sorted((fits.refined(fits.evaluate((*rest, offer.candidate)))
+                        for offer in _best_of_each(offers)
+                        for rest in _rests(best, offer.candidate)), key=lambda one: one.total)
+        found = min(map(fits.pruned, tried[:PRUNED]), key=lambda one: one.cost, default=best)
+        found = fits.refined(_refined(fits, found))
         if not found.cost < best.cost - LEAST_IMPROVEMENT:
             break
-        best = _refined(fits, found)
-    if best is not kept:
-        _simplest(fits, best, {candidate.effect: candidate for candidate in (
-            *(candidate for _, candidate in constant), *likely)}.values())
+        best = found
+    if best is not reported:
+        _simplest(fits, best, likely.values())
 
 
-def _changing_drives(fits: FittedSets, kept: CandidateSet, others: Iterable[CandidateSet],
-                     ) -> set[int]:
-    """Return drives on which something may begin, end or grow, or a pattern is left."""
-    constant = [(kept, candidate) for candidate in kept.effects if _is_new(candidate)]
-    alone = [(other, other.effects[0]) for other in others if _is_new(other.effects[0])]
-    begun = [*_offers(fits, [(kept, 0.0)], constant, _courses(fits)),
-             *_offers(fits, _bases(fits, kept), alone, _few_courses(fits))]
-    return {d for unknown in kept.unknowns for d in unknown.drives} | {
-        d for offer in begun if offer.is_worth_a_fit(fits) for d in offer.drives}
+def _changing_drives(fits: FittedSets, reported: CandidateSet, alone: Alone) -> set[int]:
+    """Return drives on which something may begin, end or grow, or that show a pattern."""
+    constant = [(reported, candidate) for candidate in reported.effects if _is_new(candidate)]
+    begun = [*_offers(fits, [(reported, 0.0)], constant, _courses(fits)),
+             *_offers(fits, _bases(fits, reported), alone, _few_courses(fits))]
+    return {d for unknown in reported.unknowns for d in unknown.drives} | {
+        d for offer in begun if offer.candidate.course is not None
+        and offer.gain > fits.prior_costs.of_course(offer.candidate.course) for d in offer.drives}
 
 
-def _alone_on_drives(fits: FittedSets, drives: Iterable[int],
-                     ) -> Iterator[tuple[CandidateSet, EffectCandidate]]:
-    """Yield all effects, each alone, on drives on which something changes or a pattern is left.
+def _alone_on_drives(fits: FittedSets, drives: Iterable[int]) -> Alone:
+    """Return all effects, each alone, on drives on which something changes.
 
-    What is there for a stretch is hardly seen by a fit of all the time, which need not have been
-    the search's to propose.
+    What is there for a stretch hardly shows in a fit of all the time: the search need not have
+    proposed it.
     """
     base = fits.evaluate(()).fit
-    for d in sorted(drives):
-        for component, _ in fits.components.local[d].offers(base).values():
-            candidate = EffectCandidate.of([component])
-            yield fits.evaluate((candidate,)), candidate
+    candidates = [EffectCandidate.of([component]) for d in sorted(drives)
+                  for component, _ in fits.components.local[d].offers(base).values()]
+    return [(fits.evaluate((candidate,)), candidate) for candidate in candidates
+            if _is_new(candidate)]
 
 
 def _is_new(candidate: EffectCandidate) -> bool:
@@ -153,7 +137,7 @@ def _few_courses(fits: FittedSets) -> Iterator[Course]:
 def _courses(fits: FittedSets) -> Iterator[Course]:
     first, last = fits.design.residuals.time[[0, -1]].tolist()
     yield Course(DRIFT, first, last)
-    for at in _amid_motion(fits, np.linspace(first, last, COURSE_TIMES + 1)[1:-1].tolist()):
+    for at in _amid_motion(fits, np.linspace(first, last, ONSETS + 1)[1:-1].tolist()):
         yield Course(SINCE, at, last)
     edges = np.linspace(first, last, STRETCHES + 1).tolist()
     for length in STRETCH_LENGTHS:
@@ -177,8 +161,8 @@ def _amid_motion(fits: FittedSets, times: Sequence[float]) -> list[float]:
 def _bases(fits: FittedSets, best: CandidateSet) -> list[tuple[CandidateSet, float]]:
     """Return a set and no set at all, with what each costs more than the set.
 
-    What a set of constant forms imitates is hardly seen beside it: an offer may have to make good
-    all that it does.
+    A set of constant forms may imitate an onset. Without it an onset has to explain all of its
+    force.
     """
     if not best.candidates:
         return [(best, 0.0)]
@@ -191,7 +175,7 @@ def _offers(fits: FittedSets, bases: Sequence[tuple[CandidateSet, float]],
             courses: Iterable[Course]) -> Iterator[_Offer]:
     """Yield effects with the course that lowers the deviance most, by the force that they had.
 
-    Beside each of the `bases`, less what that one costs.
+    With each of the `bases`, less its cost.
     """
     residuals, shape = fits.design.residuals, fits.design.residuals.measured.shape
     courses = list(courses)
@@ -228,11 +212,11 @@ def _best_of_each(offers: list[_Offer]) -> list[_Offer]:
     for offer in offers:
         assert offer.candidate.course is not None
         found.setdefault((offer.candidate.name, offer.candidate.course.kind), offer)
-    return list(found.values())[:2 * COURSE_TRIALS]
+    return list(found.values())[:COURSE_TRIALS]
 
 
 def _rests(base: CandidateSet, candidate: EffectCandidate) -> Iterator[Candidates]:
-    """Yield what may stand beside a candidate: all else, and all but what imitates it."""
+    """Yield the rest of a set with a candidate: all others, and all that cannot imitate it."""
     effects = tuple(effect for effect in base.effects if effect.effect is not candidate.effect)
     rests: list[Candidates] = [tuple(effect for effect in effects if effect.course), effects,
                                (*effects, *base.unknowns)]
@@ -257,7 +241,7 @@ def _refined(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
             continue
         rest = fitted.without(candidate)
         step = float(time[-1] - time[0]) / (
-            STRETCHES if course.kind == DURING else COURSE_TIMES)
+            STRETCHES if course.kind == DURING else ONSETS)
         best = fits.at_noise_of(fitted, fitted.candidates).total
         for _ in range(COURSE_HALVINGS):
             step /= 2
@@ -309,7 +293,7 @@ def _simplest(fits: FittedSets, fitted: CandidateSet, effects: Iterable[EffectCa
         best.setdefault((changing.name, changing.course.kind), other)
     # A change that is a hundredth of a second off costs more than patterns that make it good.
     offers = [fits.evaluate(_refined(fits, offer).candidates)
-              for offer in list(best.values())[:2 * COURSE_TRIALS]]
+              for offer in list(best.values())[:COURSE_TRIALS]]
     return _lasting(fits, min([fitted, *map(fits.pruned, offers)],
                               key=lambda fitted: fitted.cost))
 

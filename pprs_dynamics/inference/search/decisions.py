@@ -5,7 +5,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
+
+Decider = TypeVar('Decider', bound=Callable[..., object])
+OUTSIDE_COST: dict[str, str] = {}
+"""What changes an answer other than the cost: name of the function, and the rule."""
+
+
+def outside_cost(rule: str) -> Callable[[Decider], Decider]:
+    """Return a decorator that lists a function in `OUTSIDE_COST`."""
+    def listed(function: Decider) -> Decider:
+        OUTSIDE_COST[f'{function.__module__.rpartition(".")[2]}.{function.__qualname__}'] = rule
+        return function
+    return listed
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,7 @@ class Estimates:
         Those at the edge of the shapes that were tried.
     moments : dict of str to Estimate
         First moments of added bodies about the frames of their links, by the name of their
-        coefficient: what a slow motion tells where it does not tell mass and centre apart.
+        coefficient: a slow motion determines these, and not mass and centre.
     """
 
     parameters: dict[str, Estimate]
@@ -205,7 +205,7 @@ def averaged(reported: Estimates, others: Sequence[tuple[float, Estimates]]) -> 
 
 def _told_elsewhere(fits: FittedSets, fitted: CandidateSet, candidate: EffectCandidate,
                     ) -> list[Block]:
-    """Return an effect's columns on the drives that it was not found on, where these are told.
+    """Return an effect's columns on other drives whose coefficients are determined.
 
     That it is on some drives is a choice, and less certain than values given that choice: gains
     of some drives are known as well as those of the others are known to be none. Not where the
@@ -227,9 +227,9 @@ def _told_elsewhere(fits: FittedSets, fitted: CandidateSet, candidate: EffectCan
 
 def _left_out(fits: FittedSets, other: CandidateSet, candidate: EffectCandidate,
               ) -> dict[str, Estimate]:
-    """Return how well the numbers are known that a set leaves at 0, where they may be others.
+    """Return the deviations of an effect's parameters that are not fitted, and are 0.
 
-    Of links and joints only those that it is on are told, and of bodies what was found.
+    Of an effect on one link or joint, and of a body, only what was fitted is reported.
     """
     if candidate.effect.is_of_one_place or issubclass(candidate.effect, AddedBody):
         return {}

@@ -17,8 +17,8 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import LEAST_MOVING, TURNED
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions, outside_cost
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 CONSTANT = 1e-9  # of an effort's size, below which a change of it is rounding
 # Third differences of white noise have this many times its variance (1 + 9 + 9 + 1).
@@ -54,7 +54,8 @@ def explained_shares(residuals: Residuals, left: Array | None = None) -> dict[st
     return shares
 
 
-def little_explained(model: ForceModel, residuals: Residuals, left: Array | None = None,
+@outside_cost('the model explains less than half of the effort of a drive: `unknown`')
+def little_explained(model: DriveModel, residuals: Residuals, left: Array | None = None,
                      decisions: Decisions = DECISIONS,
                      noise: Mapping[str, float] = MappingProxyType({}),
                      ) -> dict[str, float]:
@@ -65,14 +66,14 @@ def little_explained(model: ForceModel, residuals: Residuals, left: Array | None
 
     Parameters
     ----------
-    model : ForceModel
-        Its width of reversal tells motion from rest.
+    model : DriveModel
+        Its width of reversal separates motion from rest.
     residuals : Residuals
     left : (M, D) array, optional
         See `explained_shares`.
     decisions : Decisions, optional
     noise : mapping of str to float, optional
-        Rms of the noise of the drives, as far as it is known [N]: no model explains it.
+        Rms of the noise of the drives, where it is known [N]: no model explains it.
     """
     little = {}
     for name, share in explained_shares(residuals, left).items():
@@ -89,7 +90,7 @@ def _beyond_noise(effort: Array, noise: float) -> float:
     return max(1 - noise ** 2 / max(float(np.nanvar(effort)), 1e-300), 0.0)
 
 
-def _can_be_explained(model: ForceModel, residuals: Residuals, d: int,
+def _can_be_explained(model: DriveModel, residuals: Residuals, d: int,
                       decisions: Decisions) -> bool:
     """Return whether a drive moves, and the variance of its effort is not mostly white noise."""
     velocity = residuals.variable('velocity', d)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The model that a fitted set stands for, and its forces: by the linear fit, and exactly."""
+"""The model of a fitted set, its linear and exact forces, and linearisation around it."""
 
 from __future__ import annotations
 
@@ -19,12 +19,14 @@ from pprs_dynamics.inference.regression.base_columns import (
     within,
 )
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.regression.terms import PlacedEffect
+from pprs_dynamics.inference.regression.terms import OperatingPoint, PlacedEffect
 from pprs_dynamics.inference.residuals.reconstruction import treated_forces
 from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
+
+LEAST_DIFFERENCE = 4.0  # whitened square by which the exact model may differ from the linear one
+MOST_STEPS, MOST_HALVINGS = 6, 4
 
 
 def parts_of(fits: FittedSets, fitted: CandidateSet) -> tuple[Array, tuple[PlacedEffect, ...]]:
@@ -41,7 +43,7 @@ def parts_of(fits: FittedSets, fitted: CandidateSet) -> tuple[Array, tuple[Place
     return base, tuple(effects)
 
 
-def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> ForceModel:
+def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> DriveModel:
     """Return the given model with its numbers as coefficients have them, and with effects.
 
     Raises
@@ -75,10 +77,10 @@ def model_at(design: Design, base: Array, effects: Sequence[PlacedEffect]) -> Fo
                 parameter, every[parameter.name], units_of(design.given, effect.drive))
     if names:
         values['effects.active'] = names
-    return replace(build_model(values), source=design.given.source)
+    return replace(DriveModel.from_parameters(values), source=design.given.source)
 
 
-def fitted_model(fits: FittedSets, fitted: CandidateSet) -> ForceModel:
+def fitted_model(fits: FittedSets, fitted: CandidateSet) -> DriveModel:
     """Return the given model with the effects of a set, and its numbers as the fit moves them.
 
     Raises
@@ -121,7 +123,7 @@ def linear_error(fits: FittedSets, fitted: CandidateSet) -> float:
     return root_mean_square(linear_residual(fits, fitted))
 
 
-def exact_forces(design: Design, model: ForceModel) -> Array:
+def exact_forces(design: Design, model: DriveModel) -> Array:
     """Return the treated forces of a model on the recordings of a design, (M, D) [N].
 
     Raises
@@ -131,3 +133,78 @@ def exact_forces(design: Design, model: ForceModel) -> Array:
     """
     return np.concatenate([treated_forces(model, table)['total']
                            for table in design.reconstructed(model)])
+
+
+def linearised(fits: FittedSets, fitted: CandidateSet) -> tuple[FittedSets, CandidateSet]:
+    """Return a set around its own fitted model, and the fitted sets that it is one of.
+
+    Gauss-Newton steps with the effects of the set, each halved until the exact error falls. The
+    arguments are returned where nothing changes.
+
+    Raises
+    ------
+    ModelError
+        For values that no model may have.
+    """
+    fitted = fits.refined(fitted)
+    for _ in range(MOST_STEPS):
+        point = next_operating_point(fits, fitted)
+        if point is None:
+            break
+        fits = FittedSets(fits.design.around(point, alone=True), fits.decisions,
+                          fits.regression.error_scale)
+        fitted = fits.refined(fits.evaluate(fitted.candidates))
+    return fits, fitted
+
+
+def next_operating_point(fits: FittedSets, fitted: CandidateSet) -> OperatingPoint | None:
+    """Return where to expand next: towards a set's fitted model, as far as the exact error falls.
+
+    None where no step lowers the exact error, or where the exact forces of the fitted model are
+    those of the linear fit and columns were computed with every nonlinear effect.
+    """
+    design = fits.design
+    base, effects = parts_of(fits, fitted)
+    linear = linear_prediction(fits, fitted)
+    measured = fits.regression.residuals.measured
+    target = model_at(design, base, effects)
+    exact = exact_forces(design, target)
+    before = design.point
+    if (squared(fits, fitted, exact - linear) < LEAST_DIFFERENCE
+            and _has_nonlinear(before, effects)):
+        return None
+    loss = squared(fits, fitted, measured - exact)
+    known = {(effect.effect, effect.drive): effect for effect in before.effects} if before else {}
+    if all((effect.effect, effect.drive) in known for effect in effects) and before is not None:
+        reached = squared(fits, fitted, measured - design.forces)
+        for _ in range(MOST_HALVINGS):
+            if loss < reached:
+                break
+            base = (base + before.base) / 2
+            effects = tuple(_between(known[effect.effect, effect.drive], effect)
+                            for effect in effects)
+            target = model_at(design, base, effects)
+            loss = squared(fits, fitted, measured - exact_forces(design, target))
+        else:
+            return None
+    return OperatingPoint(target, base, effects)
+
+
+def has_nonlinear(fits: FittedSets, fitted: CandidateSet) -> bool:
+    """Return whether the columns are around the nonlinear effects of a set."""
+    return _has_nonlinear(fits.design.point, parts_of(fits, fitted)[1])
+
+
+def _has_nonlinear(point: OperatingPoint | None, effects: Sequence[PlacedEffect]) -> bool:
+    """Return whether a point has the nonlinear ones of some effects, nearly of the same shapes."""
+    known = {(effect.effect, effect.drive): effect for effect in point.effects} if point else {}
+    return all((effect.effect, effect.drive) in known and all(
+        abs(effect.shape[p.name] - known[effect.effect, effect.drive].shape[p.name]) <= p.scale
+        for p in effect.effect.parameters if p.name in effect.shape)
+        for effect in effects if effect.effect.nonlinear)
+
+
+def _between(a: PlacedEffect, b: PlacedEffect) -> PlacedEffect:
+    return replace(b, coefficients={
+        name: (a.coefficients.get(name, 0.0) + value) / 2
+        for name, value in b.coefficients.items()})

@@ -22,6 +22,7 @@ from pprs_dynamics.inference.search.candidates import (
     Candidate,
     CandidateSet,
     Component,
+    CostTerms,
     EffectCandidate,
     PriorCosts,
     UnknownCandidate,
@@ -29,7 +30,6 @@ from pprs_dynamics.inference.search.candidates import (
 )
 from pprs_dynamics.inference.search.components import Components
 from pprs_dynamics.inference.search.constraints import Constraints
-from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.decisions import Decisions
 from pprs_dynamics.inference.search.form_error import FormErrors
 
@@ -225,7 +225,7 @@ class FittedSets:
                      + np.linalg.slogdet(block.precision)[1])
 
     def held(self, fitted: CandidateSet, index: Integers, values: Array) -> CandidateSet:
-        """Return a set with some coefficients (k,) as given, all else fitted beside them.
+        """Return a set with some coefficients (k,) as given, all else fitted with them.
 
         At the noise of the set, so that a bad value cannot hide in it.
         """

@@ -4,8 +4,8 @@
 """The predictive test: whether data that took no part in a fit are predicted better with it.
 
 The gain of a drive is by how much its squared error falls, whitened by the noise, so that newtons
-and newton metres can be added. The noise at each frequency is what the better of the two models
-leaves there. A force that one of them takes for slow noise is then not forgiven.
+and newton metres can be added. The noise at each frequency is the residual of the better
+model. A force that one of them takes for slow noise is then not forgiven.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The noise of every drive, beside all that the catalogue could explain: that of the largest fit.
+"""The noise of every drive of a recording: that of the largest fit.
 
-What is left beside a few columns is noise and whatever they lack. The variance of the noise is
-estimated beside all columns at once, as Mallows' C_p takes it of the largest model: what they
-spend of the degrees of freedom is counted by the restricted likelihood. Nothing is chosen, so that
-the noise does not depend on what a search finds.
+The noise is estimated with all columns at once, as Mallows' C_p takes the variance of the largest
+model: every effect of the catalogue, and a free curve over each drive's position. The restricted
+likelihood counts the degrees of freedom that they use. Nothing is chosen, so that the noise does
+not depend on what a search reports: all commands print the same number.
 
 References
 ----------
@@ -15,8 +15,7 @@ C. L. Mallows, Some comments on C_p, Technometrics 15 (1973) 661-675.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -31,49 +30,47 @@ from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 # Of all shapes of an effect: directions of their span with less than the share of the strongest
 # are left out, and all but the strongest few.
 LEAST_DIRECTION, MOST_DIRECTIONS = 0.03, 6
 # Shapes of an effect beyond these span no few directions: ripples of any period are any curve.
 MOST_SHAPES = 60
+CURVE = 24  # hat functions of a free curve over a drive's position
 
 
-def noise_floors(fits: FittedSets, patterns: Mapping[str, Sequence[Array]] = MappingProxyType({}),
-                 best: JointFit | None = None, period: float | None = None,
-                 ) -> dict[str, float]:
-    """Return the rms of the noise of the drives where it can be told [N].
+def noise_floors(fits: FittedSets, period: float | None = None) -> dict[str, float]:
+    """Return the rms of the noise of each drive [N], where the recordings determine it.
 
     Parameters
     ----------
     fits : FittedSets
-    patterns : mapping of str to sequence of (k, M) arrays, optional
-        Further columns by drive: what stands out, and is no noise. Those of as many samples as
-        the design has take part.
-    best : JointFit, optional
-        Of what was found. Its columns take part, and where its noise is, in frequency, columns have
-        to leave degrees of freedom, too: slow noise that all columns swallow leaves a fast one.
+        Around the input model.
     period : float, optional
-        Between the samples whose noise is told [s]; by default that of the design.
+        Between the samples of the noise [s]; by default that of the design.
     """
-    regression, drives = fits.regression, fits.design.drives
-    found = [regression.block({drives.index(name): rows}) for name, every in patterns.items()
-             for rows in every if rows.shape[-1] == len(fits.design.residuals)
-             and drives.index(name) in regression.drives]
-    every = tuple(dict.fromkeys((*catalogue_blocks(fits), *(best.blocks if best else ()), *found)))
-    fit = regression.fit(every, fits.evaluate(()).fit.amplitudes)
-    told = np.all([_shares_seen(fits, fit, one.amplitudes) >= fits.decisions.noise_seen
-                   for one in (fit, best) if one is not None], axis=0)
+    regression, residuals = fits.regression, fits.design.residuals
+    curves = [regression.block({d: _curve(residuals.variables['position'][:, d])})
+              for d in regression.drives if fits.design.moves(d)]
+    fit = regression.fit((*catalogue_blocks(fits), *curves), fits.evaluate(()).fit.amplitudes)
+    seen = _shares_seen(fits, fit, fit.amplitudes) >= fits.decisions.noise_seen
     # Means over longer blocks have less white noise, and as much of slower noise.
-    white = fit.amplitudes[:, 0] * (
-        fits.design.residuals.period / (period or fits.design.residuals.period) - 1)
-    return {drives[d]: float(np.sqrt(max(regression.noise_floor(fit, d) ** 2 + white[k], 0.0)))
-            for k, d in enumerate(regression.drives) if told[k]}
+    white = fit.amplitudes[:, 0] * (residuals.period / (period or residuals.period) - 1)
+    return {fits.design.drives[d]: float(np.sqrt(max(
+        regression.noise_floor(fit, d) ** 2 + white[k], 0.0)))
+        for k, d in enumerate(regression.drives) if seen[k]}
+
+
+def _curve(position: Array) -> Array:
+    """Return hat functions of a position, (CURVE, M)."""
+    place = (position - position.min()) / max(float(np.ptp(position)), 1e-12) * (CURVE - 1)
+    hats: Array = np.maximum(0.0, 1 - np.abs(place - np.arange(CURVE)[:, None]))
+    return hats[np.any(hats, axis=1)]
 
 
 def measure_columns(
-    model: ForceModel, recordings: Sequence[Recording],
+    model: DriveModel, recordings: Sequence[Recording],
     progress: Callable[[float], None] = lambda share: None, decisions: Decisions = DECISIONS,
 ) -> tuple[FittedSets | None, Residuals, tuple[str, ...]]:
     """Return what a largest fit needs, and what `measure_residuals` returns.
@@ -83,7 +80,7 @@ def measure_columns(
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings : sequence of Recording
     progress : callable, optional
         Called with the share of the work that is done.

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.residuals.bins import BINS, bin_edges, populated_edges
+from pprs_dynamics.inference.residuals.profiles import BINS, bin_edges, populated_edges
 from pprs_dynamics.inference.residuals.residuals import Residuals
 
 TIME_BINS = 16

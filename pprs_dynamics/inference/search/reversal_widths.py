@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The velocity within which each drive's friction turns over, from what a set leaves.
+"""The velocity within which each drive's friction turns over, from the residual of a set.
 
-Friction that turns over in another width than the model's is no effect that is missing, but it
-leaves an error at every reversal. In the fits it is carried by columns that span all widths; here
+Friction that turns over in another width than the model's is no missing effect, but it makes an
+error at every reversal. In the fits it is carried by columns that span all widths; here
 it becomes one number per drive.
 """
 
@@ -23,9 +23,8 @@ from pprs_dynamics.inference.search.candidates import CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples, MeasurementEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import set_number
-from pprs_dynamics.physics.model.model_file import build_model
 
 NARROWEST, WIDEST = 0.05, 20.0  # times the model's width
 TRIALS = 13
@@ -39,14 +38,14 @@ def place_of(design: Design, d: int) -> tuple[str, int | None]:
     return (KEY, d) if KEY in design.given.keys else (COMMON_KEY, None)
 
 
-def with_widths(model: ForceModel, design: Design, widths: Mapping[int, float]) -> ForceModel:
+def with_widths(model: DriveModel, design: Design, widths: Mapping[int, float]) -> DriveModel:
     """Return a model with other widths of reversal [m/s] on some of a design's drives."""
     if not widths:
         return model
     values = dict(model.values)
     for d, width in widths.items():
         set_number(values, *place_of(design, d), width)
-    return replace(build_model(values), source=model.source)
+    return replace(DriveModel.from_parameters(values), source=model.source)
 
 
 def estimate_widths(fits: FittedSets, fitted: CandidateSet) -> dict[int, float]:

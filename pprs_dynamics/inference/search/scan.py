@@ -121,7 +121,7 @@ def _by_place(effect: type[CatalogueEffect], found: Sequence[Scored]) -> list[Se
 
 
 def with_fast_noise(regression: Regression, fit: JointFit) -> JointFit:
-    """Return a fit under the noise that the higher frequencies alone would tell.
+    """Return a fit under the noise of the higher frequencies alone.
 
     The slow part of a noise spectrum may be what is missing. It only proposes.
     """

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Score tests: what each of many terms would gain beside a fit, all at once at its noise."""
+"""Score tests: the gain of each of many terms, all at once at the noise of a fit."""
 
 from __future__ import annotations
 

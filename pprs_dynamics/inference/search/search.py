@@ -15,19 +15,18 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
-import numpy as np
-
 from pprs_dynamics.inference.search.candidates import (
+    Candidate,
     CandidateSet,
+    Component,
     EffectCandidate,
     UnknownCandidate,
 )
+from pprs_dynamics.inference.search.components import placed
 from pprs_dynamics.inference.search.fitted_sets import LEAST_IMPROVEMENT, Candidates, FittedSets
-from pprs_dynamics.inference.search.neighbours import exchanged, simplified, with_instead
 from pprs_dynamics.inference.search.scan import Scan, with_fast_noise
 from pprs_dynamics.inference.search.unknown import DrivePatterns, Shared, best_patterns
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
 MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
 BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
@@ -65,7 +64,7 @@ class Search:
     def run(self, start: Candidates = (), until_nonlinear: bool = False) -> CandidateSet:
         """Return the best set that the search reaches, by effects alone at first.
 
-        A pattern of no catalogue stands only beside what effects explain. `until_nonlinear`: where
+        Patterns of no catalogue are added after effects. `until_nonlinear`: where
         a nonlinear effect joins the search ends before its end, since what would come next might
         only make good that columns do not show it.
         """
@@ -73,7 +72,7 @@ class Search:
         try:
             self.fits.evaluate(())
             if start:
-                self.rescanned(self.fits.evaluate(start))
+                self.fits.refined(self.fits.evaluate(start))
             self._descend(False, until_nonlinear)
             if not until_nonlinear or not self.best.is_nonlinear:
                 if self.patterns:
@@ -114,7 +113,6 @@ class Search:
         """Fit sets, and bring those that may be the best to where they cost least."""
         new = [self.fits.evaluate(candidates) for candidates in sets
                if not self.fits.has(candidates) and self._is_bounded(candidates)]
-        new += self._with_constants(new)
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
         shaped = [fitted for fitted in new if any(component.effect.shape or component.centre
                                                   for component in fitted.blocks)]
@@ -126,21 +124,6 @@ class Search:
         for fitted in new:
             if len(fitted.candidates) == len(fitted.effects) == 1:
                 simplified(self.fits, fitted)
-
-    def _with_constants(self, sets: Iterable[CandidateSet]) -> list[CandidateSet]:
-        """Return sets with one effect more, where they would be the best but for constants.
-
-        No noise takes a constant: what lacks nothing else is judged once it has it.
-        """
-        near = [fitted for fitted in sets if self._all_but_constants(fitted) < self.best.cost]
-        return [self.fits.evaluate(more) for fitted in near
-                for more in self.scan.proposals(fitted, 1) if self._is_bounded(more)]
-
-    def _all_but_constants(self, fitted: CandidateSet) -> float:
-        """Return the cost of a set if its drives' constants were what their noise expects."""
-        squares = fitted.fit.squares[:, 0] / fitted.fit.spectra[:, 0]
-        counts = self.fits.regression.counts[:, 0]
-        return fitted.cost - float(np.sum(np.maximum(squares - counts, 0)))
 
     @staticmethod
     def _is_bounded(candidates: Candidates) -> bool:
@@ -167,61 +150,8 @@ class Search:
                     found += [(*base.candidates, pattern) for pattern in patterns]
         return found
 
-    def best_of(self, effect: type[CatalogueEffect], drives: Sequence[int] | None,
-                ) -> CandidateSet | None:
-        """Return the best set of one effect alone, on some drives or where it pays.
-
-        None where the model has it everywhere already.
-        """
-        base = self.fits.evaluate(())
-        fast = replace(base, fit=with_fast_noise(self.fits.regression, base.fit))
-        for near in (base, fast):
-            found = self.scan.offers(near).get(effect, [])
-            if drives is None:
-                chosen = self.scan.best_drives(effect, found, None)[1] if found else []
-            else:
-                chosen = [component for _, component in found if component.drive in drives]
-            if chosen:
-                self.fits.refined(self.fits.evaluate((EffectCandidate.of(chosen),)))
-        while True:
-            alone = [fitted for fitted in self.fits.sets if fitted.candidates]
-            if not alone:
-                return None
-            best = min(alone, key=lambda fitted: fitted.cost)
-            for candidate in (*self._alternatives(best.effects[0]),
-                              *(self._variants(best.effects[0]))):
-                self.fits.evaluate((candidate,))
-            after = min((fitted for fitted in self.fits.sets if fitted.candidates),
-                        key=lambda fitted: fitted.cost)
-            if not after.cost < best.cost - LEAST_IMPROVEMENT:
-                return best
-            self.fits.refined(after)
-
-    def rescanned(self, fitted: CandidateSet) -> CandidateSet:
-        """Return the set on all drives where its effects pay, in shapes that scans find."""
-        for candidates in self.scan.proposals(fitted, effects={c.effect for c in fitted.effects}):
-            fitted = min(fitted, self.fits.evaluate(candidates), key=lambda fitted: fitted.cost)
-        for effect, d in [(component.effect, component.drive) for component in fitted.blocks
-                          if component.effect.shape and component.drive is not None]:
-            candidate = next(c for c in fitted.effects if c.effect is effect)
-            others = [component for component in candidate.components if component.drive != d]
-            rest = fitted.without(candidate)
-            less = (*rest, EffectCandidate.of(others)) if others else rest
-            offers = self.fits.components.local[d].offers(self.fits.at_noise_of(fitted, less).fit)
-            if effect.name in offers:
-                fitted = min(fitted, self.fits.evaluate((*rest, EffectCandidate.of(
-                    [*others, offers[effect.name][0]]))), key=lambda fitted: fitted.cost)
-        return self.fits.refined(fitted)
-
-    def _variants(self, candidate: EffectCandidate) -> Iterable[EffectCandidate]:
-        """Yield the candidate with other coefficients of one component."""
-        for component in candidate.components:
-            for other in self.fits.components.variants(component):
-                if other.names != component.names:
-                    yield with_instead(candidate, component, other)
-
     def _replacements(self, best: CandidateSet) -> Iterator[Candidates]:
-        """Yield sets in which something else stands for candidates, or for one on a drive.
+        """Yield sets in which something else replaces candidates, or one on a drive.
 
         Under the noise of the set, so that a replacement that explains as much is seen to.
         """
@@ -240,9 +170,9 @@ class Search:
 
     def _instead_on_a_drive(self, best: CandidateSet, candidate: EffectCandidate,
                             ) -> Iterator[Candidates]:
-        """Yield sets in which another effect stands for one on one of its drives.
+        """Yield sets in which another effect replaces one on one of its drives.
 
-        There it, or some of its coefficients, may stand for the other one.
+        There it, or some of its coefficients, may imitate the other one.
         """
         for component in candidate.components if len(candidate.components) > 1 else ():
             fewer = [(other,) for other in self.fits.components.variants(component)
@@ -259,7 +189,7 @@ class Search:
                                    RECOVERED * (base.total - best.total) - REPLACED)
 
     def _two_for(self, best: CandidateSet, gone: EffectCandidate) -> Iterable[Candidates]:
-        """Yield sets in which two other effects stand for one that is more than one hypothesis."""
+        """Yield sets in which two other effects replace one that is more than one hypothesis."""
         def with_another(candidates: Candidates) -> list[Candidates]:
             found = self.scan.proposals(self.fits.at_noise_of(best, candidates), REPLACEMENTS + 1)
             return [more for more in found if all(
@@ -285,3 +215,88 @@ def patterns_of(fits: FittedSets) -> list[DrivePatterns]:
     shared = Shared()
     return [DrivePatterns(fits.regression, fits.prior_costs, d, shared=shared)
             for d in fits.regression.drives]
+
+
+def with_instead(candidate: EffectCandidate, gone: Component, *instead: Component,
+                 ) -> EffectCandidate:
+    """Return the candidate with something else, or nothing, for one of its components."""
+    return EffectCandidate.of([*(component for component in candidate.components
+                                 if component is not gone),
+                               *instead])
+
+
+def exchanged(fitted: CandidateSet, old: Candidate, new: Candidate) -> Candidates:
+    """Return the candidates of a set with another one for one of them."""
+    return tuple(new if c is old else c for c in fitted.candidates)
+
+
+def simplified(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
+    """Return a set without candidates and drives, and in variants, as long as that costs less."""
+    return _descended(fits, fitted,
+                      lambda fitted: [*_with_fewer(fitted), *_otherwise(fits, fitted)])
+
+
+def of_same_names(fits: FittedSets, fitted: CandidateSet) -> CandidateSet:
+    """Return the set of least cost of the same effects: on other drives, in other variants.
+
+    Where it is barred, also without its patterns of no catalogue: around their own model its
+    effects may explain what these stood for. A pattern that may be there is not dropped here,
+    where no other may join for it: a bump came out as ripple at one scale of a robot and as none
+    at another.
+    """
+    return _descended(fits, fitted, lambda fitted: [
+        *_otherwise(fits, fitted), *_on_more_drives(fits, fitted),
+        *[fitted.effects] * bool(fitted.barred and fitted.unknowns)])
+
+
+def _descended(fits: FittedSets, fitted: CandidateSet,
+               neighbours: Callable[[CandidateSet], Iterable[Candidates]]) -> CandidateSet:
+    while True:
+        best = min(map(fits.evaluate, neighbours(fitted)), key=lambda fitted: fitted.cost,
+                   default=fitted)
+        if not best.cost < fitted.cost - LEAST_IMPROVEMENT:  # both may be inadmissible: inf
+            return fitted
+        fitted = fits.refined(best)
+
+
+def _on_more_drives(fits: FittedSets, fitted: CandidateSet) -> Iterator[Candidates]:
+    """Yield a set with an effect on one drive more, in the shape of its strongest drive."""
+    for candidate in fitted.effects:
+        if candidate.drives is None:
+            continue
+        strongest = max(candidate.components,
+                        key=lambda component: fits.drop_cost(fitted, component))
+        for d in fits.regression.drives:
+            if d not in candidate.drives and fits.design.acts_on(candidate.effect, d):
+                yield exchanged(fitted, candidate, EffectCandidate.of([
+                    *candidate.components, placed(fits.design, candidate.effect, d,
+                                                  strongest.parameters, strongest.names)]))
+
+
+def _with_fewer(best: CandidateSet) -> Iterator[Candidates]:
+    for candidate in best.candidates if len(best.candidates) > 1 else ():
+        yield best.without(candidate)
+
+
+def _otherwise(fits: FittedSets, best: CandidateSet) -> Iterator[Candidates]:
+    """Yield a set with one of its effects on fewer drives, or with other coefficients."""
+    for candidate in best.effects:
+        effect = candidate.effect
+        # The drives where it matters most; fewer of them may be better though one less is not.
+        strength = {component: fits.drop_cost(best, component)
+                    for component in candidate.components}
+        ranked = sorted(candidate.components, key=lambda component: -strength[component])
+        most = 3 * fits.decisions.rival_margin
+        for count in range(1, len(ranked)):
+            if sum(strength[component] for component in ranked[count:]) < most:
+                yield exchanged(best, candidate, EffectCandidate.of(ranked[:count]))
+        if len({component.names for component in candidate.components}) > 1:
+            for names in effect.variants:
+                yield exchanged(best, candidate, EffectCandidate.of(
+                    fits.components.variant(component, names)
+                    for component in candidate.components))
+        for component in candidate.components:
+            for other in fits.components.variants(component):
+                # The others take part in every scan.
+                if other.names != component.names and not set(other.names) <= set(effect.scanned):
+                    yield exchanged(best, candidate, with_instead(candidate, component, other))

@@ -17,31 +17,31 @@ from functools import cached_property
 import numpy as np
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.regression.carried_over import CarriedOver
+from pprs_dynamics.inference.regression.base_columns import CarriedOver
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import (
     DURING,
     Candidate,
     CandidateSet,
+    CostTerms,
     EffectCandidate,
     RowKey,
 )
-from pprs_dynamics.inference.search.cost_terms import CostTerms
 from pprs_dynamics.inference.search.courses import fit_courses
-from pprs_dynamics.inference.search.decisions import Decisions
+from pprs_dynamics.inference.search.decisions import Decisions, outside_cost
 from pprs_dynamics.inference.search.fitted_model import (
     exact_forces,
     fitted_model,
+    has_nonlinear,
     linear_prediction,
+    linearised,
     squared,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.neighbours import of_same_names
-from pprs_dynamics.inference.search.relinearisation import has_nonlinear, linearised
-from pprs_dynamics.inference.search.search import Search, patterns_of
+from pprs_dynamics.inference.search.search import Search, of_same_names, patterns_of
 from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 SAME = 1e-6  # share of a column's square outside a span, up to which it is inside
 MOST_STEPS = 6  # of relinearisation of one row
@@ -72,7 +72,7 @@ class Row:
         around, moved = fits, fitted
         try:
             for _ in range(MOST_STEPS):
-                around, moved = linearised(around, moved, alone=True)
+                around, moved = linearised(around, moved)
                 before, moved = moved, of_same_names(around, moved)
                 if moved is before:
                     break
@@ -229,6 +229,7 @@ class ModelTable:
                 rivals.append(Rival(row, tuple(missing), tuple(instead)))
         return rivals
 
+    @outside_cost('a freer form of the same friction is no rival')
     def _is_freer(self, row: Row, missing: Sequence[str], instead: Sequence[str]) -> bool:
         """Return whether friction of a row contains all that is missing, with more coefficients.
 
@@ -264,14 +265,14 @@ class ModelTable:
         return list(found.values())
 
 
-def tabulate(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
+def tabulate(model: DriveModel, recordings: Sequence[Recording], decisions: Decisions,
              progress: Callable[[float], None] | None = None,
              carry_over: Callable[[Design], CarriedOver] | None = None) -> ModelTable:
     """Return the table of all choices of effects that a search fits to recordings.
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     recordings : sequence of Recording
     decisions : Decisions
     progress : callable, optional
@@ -310,7 +311,7 @@ def tabulate(model: ForceModel, recordings: Sequence[Recording], decisions: Deci
     return _with_exact_best(table)
 
 
-def input_model_alone(model: ForceModel, recordings: Sequence[Recording], decisions: Decisions,
+def input_model_alone(model: DriveModel, recordings: Sequence[Recording], decisions: Decisions,
                       progress: Callable[[float], None] | None = None) -> ModelTable:
     """Return the table of the row without any effect; errors as `measure_residuals`."""
     fits = FittedSets(Design.of(model, recordings, progress), decisions)

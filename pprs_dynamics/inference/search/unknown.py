@@ -22,10 +22,9 @@ from scipy import fft
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.joint_fit import Columns, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block, term_gains
-from pprs_dynamics.inference.residuals.bins import LEAST_SHARE, MOST_SHARE
+from pprs_dynamics.inference.residuals.profiles import LEAST_SHARE, MOST_SHARE
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.inference.search.candidates import PriorCosts, UnknownCandidate
-from pprs_dynamics.inference.search.cost_terms import CostTerms
+from pprs_dynamics.inference.search.candidates import CostTerms, PriorCosts, UnknownCandidate
 from pprs_dynamics.inference.search.patterns import (
     Family,
     Pattern,
@@ -109,7 +108,7 @@ class _Scanned:
         return positive
 
     def gains(self, fit: JointFit, weights: Array) -> Array:
-        """Return by how much the deviance falls with each pattern beside a fit, (P,)."""
+        """Return by how much the deviance of a fit falls with each pattern, (P,)."""
         taken, side = self.columns.projected(fit)
         S = np.tensordot(weights, self.gram, 1) - taken @ fit.covariance @ taken.T
         b = side.reshape(-1, 2) if self.family.paired else (self.family.weights @ side)[:, None]
@@ -263,7 +262,7 @@ class DrivePatterns:
         return sorted(found, key=lambda scored: -scored[1])
 
     def line(self, fit: JointFit) -> UnknownCandidate | None:
-        """Return the strongest spectral line of what a fit leaves."""
+        """Return the strongest spectral line of the residual of a fit."""
         longest = max(self.series.stretches, key=lambda part: part.stop - part.start)
         white = self.regression.innovations(fit, self.d)[longest]
         at = self.series.index[longest] - self.series.index[longest.start]

@@ -86,8 +86,8 @@ class AddedBody(BodyEffect):
     """
 
     places: ClassVar[tuple[Place, ...]] = ()
-    has_extent: ClassVar[bool] = True
-    idealised: ClassVar[bool] = False
+    has_extent = True
+    idealised = False
 
     def __init__(self, values: Mapping[str, float]) -> None:
         super().__init__(values)

@@ -12,47 +12,15 @@ Another package offers an effect through the entry point group `pprs_dynamics.ef
 from __future__ import annotations
 
 import inspect
+import pkgutil
 import warnings
 from functools import cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from pprs_dynamics.physics.effects import laws
 from pprs_dynamics.physics.effects.effect import Card, CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.foreign_effects import guard
-from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
-from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
-from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
-from pprs_dynamics.physics.effects.laws.counterbalance import Counterbalance
-from pprs_dynamics.physics.effects.laws.coupled_drives import CoupledDrives
-from pprs_dynamics.physics.effects.laws.current_gain import CurrentGain
-from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
-from pprs_dynamics.physics.effects.laws.drive_spring import DriveSpring
-from pprs_dynamics.physics.effects.laws.eccentric_encoder import EccentricEncoder
-from pprs_dynamics.physics.effects.laws.effort_filter import EffortFilter
-from pprs_dynamics.physics.effects.laws.effort_gain import EffortGain
-from pprs_dynamics.physics.effects.laws.effort_offset import EffortOffset
-from pprs_dynamics.physics.effects.laws.elastic_joint import ElasticJoint
-from pprs_dynamics.physics.effects.laws.external_wrench import ExternalWrench
-from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
-from pprs_dynamics.physics.effects.laws.friction_drift import FrictionDrift
-from pprs_dynamics.physics.effects.laws.friction_temperature import FrictionTemperature
-from pprs_dynamics.physics.effects.laws.gear_efficiency import GearEfficiency
-from pprs_dynamics.physics.effects.laws.homing_error import HomingError
-from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
-from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
-from pprs_dynamics.physics.effects.laws.joint_spring import JointSpring
-from pprs_dynamics.physics.effects.laws.link_mass import LinkMass
-from pprs_dynamics.physics.effects.laws.load_friction import LoadFriction
-from pprs_dynamics.physics.effects.laws.lost_motion import LostMotion
-from pprs_dynamics.physics.effects.laws.measured_curve import MeasuredCurve
-from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
-from pprs_dynamics.physics.effects.laws.payload_offset import PayloadOffset
-from pprs_dynamics.physics.effects.laws.platform_inertia import PlatformInertia
-from pprs_dynamics.physics.effects.laws.quadratic_friction import QuadraticFriction
-from pprs_dynamics.physics.effects.laws.stop_contact import StopContact
-from pprs_dynamics.physics.effects.laws.stribeck_friction import StribeckFriction
-from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
-from pprs_dynamics.physics.effects.laws.tool_drag import ToolDrag
-from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
@@ -62,49 +30,21 @@ GROUP = 'pprs_dynamics.effects'
 # Parts of the drive forces and keys of the block `effects` that have these names already.
 RESERVED = ('active', 'active_friction', 'measured', 'offset', 'passive_friction', 'rigid_body')
 
-# What a diagnosis may name.
-CATALOGUE: dict[str, type[CatalogueEffect]] = {
-    effect.name: effect
-    for effect in (
-        AsymmetricFriction,
-        BaseTilt,
-        CoulombFriction,
-        Counterbalance,
-        CoupledDrives,
-        CurrentGain,
-        DriveInertia,
-        DriveSpring,
-        EccentricEncoder,
-        EffortFilter,
-        EffortGain,
-        EffortOffset,
-        ElasticJoint,
-        ExternalWrench,
-        ForceRipple,
-        FrictionDrift,
-        FrictionTemperature,
-        GearEfficiency,
-        HomingError,
-        Hysteresis,
-        JointFrictionEffect,
-        JointSpring,
-        LinkMass,
-        LoadFriction,
-        LostMotion,
-        PayloadMass,
-        PayloadOffset,
-        PlatformInertia,
-        QuadraticFriction,
-        StopContact,
-        StribeckFriction,
-        TimeDelay,
-        ToolDrag,
-        ViscousFriction,
-    )
-}
 
-# A measured curve is in models like any of them, but no cause.
-EFFECTS: dict[str, type[CatalogueEffect]] = {**CATALOGUE, MeasuredCurve.name: MeasuredCurve}
+def _laws() -> dict[str, type[CatalogueEffect]]:
+    """Return the effects of all files in `laws`, by name."""
+    found: dict[str, type[CatalogueEffect]] = {}
+    for _, name, _ in pkgutil.iter_modules(laws.__path__, f'{laws.__name__}.'):
+        for law in vars(import_module(name)).values():
+            if (inspect.isclass(law) and issubclass(law, CatalogueEffect)
+                    and law.__module__ == name and hasattr(law, 'name')):
+                found[law.name] = law
+    return found
+
+
+EFFECTS = _laws()
+# What a diagnosis may name: a measured curve is in models like any effect, but no cause.
+CATALOGUE = {name: effect for name, effect in EFFECTS.items() if name != 'measured_curve'}
 
 
 def find_effect(name: str) -> type[CatalogueEffect] | None:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, ClassVar, Self
@@ -15,19 +15,31 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, SINGLE_AXIS, CatalogueEffect, names
-from pprs_dynamics.physics.mechanism.drive_states import DriveStates
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, names
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM, SLIDE
+from pprs_dynamics.physics.mechanism.state import MechanismState
 
 ALONE = 'drive'  # name of one whose name does not matter
 
 
 @dataclass(frozen=True)
 class DriveSamples:
-    """Samples of one drive: all (N,); `time` is None where unknown, `direction` is sgn.
+    """Samples of one drive, (N,) each.
 
-    `friction_load` is what its guide or gear carries, without a sign; `transmitted` what its gear
-    or screw passes on to the mechanism, without friction, with the sign of the effort [N, N m];
-    `channels` has further measurements of the drive, such as `temperature` [degC].
+    Parameters
+    ----------
+    time : (N,) array or None
+        None where unknown [s].
+    position, velocity, acceleration : (N,) arrays
+    direction : (N,) array
+        sgn of the velocity.
+    friction_load : (N,) array
+        Load of its guide or gear, without a sign [N, N m].
+    transmitted : (N,) array
+        Load on the mechanism through gear or screw, without friction [N, N m].
+    memory : object, optional
+    channels : mapping of str to (N,) array
+        Further measurements, such as `temperature` [degC].
     """
 
     time: Array | None
@@ -41,7 +53,7 @@ class DriveSamples:
     channels: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, state: DriveStates, drive: int, memory: Any = None) -> DriveSamples:
+    def of(cls, state: MechanismState, drive: int, memory: Any = None) -> DriveSamples:
         """Return the samples of one drive of a state."""
         return cls(state.time, state.position[:, drive], state.velocity[:, drive],
                    state.acceleration[:, drive], state.direction[:, drive],
@@ -130,7 +142,7 @@ class DriveEffect(CatalogueEffect):
     linear (`shape`) enters the columns.
     """
 
-    acts_in = frozenset({PLATFORM, SINGLE_AXIS, ARM})
+    acts_in = frozenset({PLATFORM, SLIDE, MECHANISM})
 
     def __init__(self, drives: Mapping[str, Mapping[str, float]]) -> None:
         self.drives = {drive: dict(values) for drive, values in drives.items()}
@@ -228,7 +240,7 @@ class DriveEffect(CatalogueEffect):
                     p.of(drive in turning).check(f'effects.{cls.name}.{drive}.{p.name}',
                                                  block[p.name])
 
-    def force(self, state: DriveStates, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the effect's drive forces [N], (N, D)."""
         force = np.zeros_like(state.velocity)
         for name, values in self.drives.items():
@@ -317,6 +329,24 @@ class MeasurementEffect(DriveEffect):
         return bool(np.any(unit.position_error((ALONE,), np.zeros((1, 1))))
                     or np.any(unit.loaded_position_error((ALONE,), np.ones((1, 1)))))
 
+    def by_drive(self, drives: Sequence[str], values: Array,
+                 change: Callable[[Array, dict[str, float]], Array]) -> Array:
+        """Return changes of the values of the drives that have the effect, (N, D), else 0.
+
+        Parameters
+        ----------
+        drives : sequence of str
+        values : (N, D) array
+        change : callable
+            From values (N,) and parameters of a drive to its changes (N,).
+        """
+        found = np.zeros_like(values)
+        for name, parameters in self.drives.items():
+            if name in drives:
+                k = drives.index(name)
+                found[:, k] = change(values[:, k], parameters)
+        return found
+
     def position_error(self, drives: Sequence[str], position: Array) -> Array:
         """Return the errors of measured positions, to be subtracted, (N, D) [m, rad].
 
@@ -359,9 +389,21 @@ class MeasurementEffect(DriveEffect):
     def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
                memory: Any = None) -> Array:
         """Return the measured effort where the drives apply `effort`, (N, D) [N]."""
+        measured = effort.copy()
+        for name, parameters in self.drives.items():
+            k = drives.index(name)
+            measured[:, k] = self.drive_sensed(
+                effort[:, k], time, parameters,
+                self.drive_memory() if memory is None else memory[name])
+        return measured
+
+    @classmethod
+    def drive_sensed(cls, effort: Array, time: Array | None, parameters: Mapping[str, float],
+                     memory: Any) -> Array:
+        """Return the measured effort of one drive that applies `effort`, (N,) [N]."""
         return effort
 
-    def seen(self, effort: Array, state: DriveStates, memory: Any = None) -> Array:
+    def seen(self, effort: Array, state: MechanismState, memory: Any = None) -> Array:
         """Return the measured effort at a state; by default what `sensed` says, whatever it is."""
         return self.sensed(effort, state.time, state.drives, memory)
 
@@ -384,7 +426,7 @@ class GainEffect(MeasurementEffect):
             factor += coefficients[c.name] * share
         return factor
 
-    def seen(self, effort: Array, state: DriveStates, memory: Any = None) -> Array:
+    def seen(self, effort: Array, state: MechanismState, memory: Any = None) -> Array:
         """Return the efforts times their factors."""
         scaled = effort.copy()
         for name in self.drives:

@@ -10,13 +10,11 @@ import math
 from abc import ABC, ABCMeta, abstractmethod
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-
-# Kinds of models.
-PLATFORM, SINGLE_AXIS, ARM = 'platform', 'axis', 'arm'
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
 
 @dataclass(frozen=True)
@@ -175,6 +173,15 @@ class Card:
     reference: str
 
 
+class Wave(NamedTuple):
+    """Names of the amplitude and phase of a wave, and of its coefficients A cos phi, A sin phi."""
+
+    amplitude: str
+    phase: str
+    sine: str
+    cosine: str
+
+
 class EffectType(ABCMeta):
     """Type of the effects of the catalogue.
 
@@ -198,12 +205,12 @@ class CatalogueEffect(Effect, metaclass=EffectType):
 
     Class attributes
     ----------------
-    card, arm_card : Card
-        The latter where an arm needs other words.
+    card, mechanism_card : Card
+        The latter where a mechanism needs other words than a 3-PPRS.
     needs_several_drives : bool
         Whether a single drive feels it as it feels another effect, always.
-    acts_in : set of {'platform', 'axis', 'arm'}
-        The kinds of models in which it can act: a 3-PPRS, a single axis, a serial arm.
+    acts_in : set of {'platform', 'slide', 'mechanism'}
+        The kinds of robots on which it can act: a 3-PPRS, one slide alone, every other one.
     linear, shape : tuple of Parameter
     parameters : tuple of Parameter
         Both.
@@ -212,8 +219,10 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         Sets of coefficients that are tried, the others being zero; by default all at once.
     scanned : tuple of str
         Coefficients with which shapes are searched; by default all.
+    is_positive : bool
+        True where linear parameters below 0 are unphysical; of friction they always are.
     unphysical_below : mapping of str to float
-        Parameters that make the force unphysical below that value (negative friction).
+        Lowest values of parameters that make a physical force; by default as `is_positive` says.
     may_be_measurement : bool
         True where a model file may declare it a sensor's, in `effects.measured`.
     is_friction : bool
@@ -239,10 +248,12 @@ class CatalogueEffect(Effect, metaclass=EffectType):
         Name of the effect that does the same where the load of a drive does not vary.
     alike : tuple of tuple of str
         Groups of places at which the effect does the same in every motion.
+    waves : tuple of Wave
+        Parameters that are fitted as sine and cosine.
     """
 
     card: ClassVar[Card]
-    arm_card: ClassVar[Card | None] = None
+    mechanism_card: ClassVar[Card | None] = None
     needs_several_drives: ClassVar[bool] = False
     acts_in: ClassVar[frozenset[str]] = frozenset({PLATFORM})
     linear: ClassVar[tuple[Parameter, ...]]
@@ -251,6 +262,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     coefficients: ClassVar[tuple[Parameter, ...]]
     variants: ClassVar[tuple[tuple[str, ...], ...]]
     scanned: ClassVar[tuple[str, ...]]
+    is_positive: ClassVar[bool] = False
     unphysical_below: ClassVar[Mapping[str, float]] = {}
     may_be_measurement: ClassVar[bool] = False
     is_friction: ClassVar[bool] = False
@@ -261,6 +273,7 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     is_of_one_place: ClassVar[bool] = False
     at_one_load: ClassVar[str] = ''
     alike: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    waves: ClassVar[tuple[Wave, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         if hasattr(cls, 'linear'):
@@ -271,6 +284,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
                 cls.variants = (tuple(c.name for c in cls.coefficients),)
             if 'scanned' not in vars(cls):
                 cls.scanned = tuple(c.name for c in cls.coefficients)
+            if 'unphysical_below' not in vars(cls) and (cls.is_friction or cls.is_positive):
+                cls.unphysical_below = {p.name: 0.0 for p in cls.linear}
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and vars(self) == vars(other)
@@ -335,18 +350,26 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     @classmethod
     def card_in(cls, kind: str) -> Card:
         """Return the description for a kind of model."""
-        return cls.arm_card if kind == ARM and cls.arm_card is not None else cls.card
+        return cls.card if kind != MECHANISM else cls.mechanism_card or cls.card
 
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
         """Return the coefficients that belong to parameters."""
-        return {c.name: values[c.name] if c.default is None else values.get(c.name, c.default)
+        given = dict(values)
+        for amplitude, phase, sine, cosine in cls.waves:
+            given[sine] = values[amplitude] * math.cos(values[phase])
+            given[cosine] = values[amplitude] * math.sin(values[phase])
+        return {c.name: given[c.name] if c.default is None else given.get(c.name, c.default)
                 for c in cls.coefficients}
 
     @classmethod
     def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
         """Return the linear parameters that belong to coefficients."""
-        return dict(coefficients)
+        found = dict(coefficients)
+        for amplitude, phase, sine, cosine in cls.waves:
+            a, b = found.pop(sine), found.pop(cosine)
+            found[amplitude], found[phase] = math.hypot(a, b), math.atan2(b, a)
+        return found
 
     @classmethod
     def hypotheses(cls, names: tuple[str, ...]) -> frozenset[Hashable]:

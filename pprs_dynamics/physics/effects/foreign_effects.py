@@ -23,7 +23,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import EffectError, ModelError, WorkspaceError
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, names
-from pprs_dynamics.physics.mechanism.drive_states import DriveStates
+from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.system.plain_text import displayed
 
@@ -120,7 +120,7 @@ def _columns(result: Any, effect: type[DriveEffect], _: Any, drive: DriveSamples
     return tuple(_finite(_array(column, drive.velocity.shape), given) for column in columns)
 
 
-def _force(result: Any, _: Any, __: Any, state: DriveStates, *___: Any) -> Array:
+def _force(result: Any, _: Any, __: Any, state: MechanismState, *___: Any) -> Array:
     given = (state.position, state.velocity, state.acceleration, state.friction_load,
              state.transmitted)
     return _finite(_array(result, state.velocity.shape), given)

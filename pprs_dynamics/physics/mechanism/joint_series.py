@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -58,6 +58,10 @@ class JointSeries:
     def size(harmonics: int) -> int:
         """Return the number p of coefficients per joint."""
         return int(resting_series(tuple(range(1, harmonics + 1))).shape[1])
+
+    def scaled(self, factor: float) -> JointSeries:
+        """Return the same motion with all excursions times a factor."""
+        return replace(self, coefficients=factor * self.coefficients)
 
     def motion(self, time: Array) -> JointMotion:
         """Return the motion at times [s], with exact velocities and accelerations."""

@@ -13,40 +13,29 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import SingularityError, WorkspaceError
-from pprs_dynamics.physics.mechanism.description import PARAMETERS, Frame, inertial_in
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.mechanism.description import PARAMETERS, PRISMATIC, inertial_in
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.passive_joints import friction_table, passive_joints
-from pprs_dynamics.physics.mechanism.places import BodyPlace, PassiveJoint
-from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
+from pprs_dynamics.physics.mechanism.places import MECHANISM, SLIDE, BodyPlace, PassiveJoint
+from pprs_dynamics.physics.mechanism.reversal import Reversal
+from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.mechanism.tree_equations import (
-    CONDITION,
-    DETERMINANT,
-    JOINT_EFFORT,
-    KIND,
-    LOOP,
-    OPEN_IN_MOTION,
-    TRANSLATION,
-    TRANSMITTED,
-    WORST_CONDITION,
-    Data,
-    JointFriction,
-    Loads,
-    residual,
-)
-from pprs_dynamics.physics.mechanism.tree_evaluation import (
-    NO_FRICTION,
-    InverseDynamicsResult,
-    samples_last,
-)
-from pprs_dynamics.system.parallel import lazy
+from pprs_dynamics.physics.mechanism.tool_pose import ToolPose
+from pprs_dynamics.physics.mechanism.tree_equations import WORST_CONDITION
+from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
+from pprs_dynamics.physics.mechanism.tree_tables import JointFriction, Loads
+
+POSITION_STEP = 1e-4  # [rad, m] of a drive, for derivatives by its position
+LEAST_GRAVITY = 1e-9  # [m/s^2] along a slide, below which its share is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +58,6 @@ class Mechanism:
         At which loads of joints rub [m], where known.
     motors : mapping of str to (D,) sequence
         Turns of motors per turn of each drive, of motors that move more than one.
-    load_is_known : bool
-        Whether what rubs in the drives is what they carry, and no preload.
     """
 
     structure: Structure
@@ -80,7 +67,6 @@ class Mechanism:
     gravity: tuple[float, float, float]
     radii: Mapping[str, float] = field(default_factory=dict)
     motors: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    load_is_known: bool = True
 
     @property
     def masses(self) -> Array:
@@ -188,334 +174,133 @@ class Mechanism:
 
     def torques(self, position: Array, velocity: Array, acceleration: Array) -> Array:
         """Return the efforts of the drives that move the bodies, (N, D) [N m, N]."""
-        return self.at(position, velocity, acceleration).efforts(self)
+        efforts: Array = self.loads(self.at(position, velocity, acceleration), None).efforts
+        return efforts
 
     def regressor(self, position: Array, velocity: Array, acceleration: Array) -> Array:
         """Return the derivatives of the efforts by `inertial`, (N, D, 10 B)."""
-        return self.at(position, velocity, acceleration).regressor(self)
+        return self.at(position, velocity, acceleration).regressor(self.bodies, self.gravity_row)
 
-
-@dataclass(frozen=True, eq=False)
-class LinkMotion:
-    """The motion of all links of a structure, at N samples.
-
-    Parameters
-    ----------
-    structure : Structure
-    rows : (N, K) array
-        See `Evaluation.forward_kinematics`.
-    drives : tuple of (N, D) arrays
-        What it was computed for: position, velocity and acceleration.
-    """
-
-    structure: Structure
-    rows: Array
-    drives: tuple[Array, Array, Array]
-
-    @classmethod
-    def of(cls, structure: Structure, position: Array, velocity: Array, acceleration: Array,
-           start: Array | None = None, nearby: Array | None = None) -> LinkMotion:
-        """Return the motion, or raise as `Mechanism.at`; see `Evaluation.forward_kinematics`."""
-        rows, failed = structure.evaluation.forward_kinematics(
-            position, velocity, acceleration, start, nearby)
-        if failed >= 0:
-            raise WorkspaceError(failed, 'the loops do not close for the positions of the drives',
-                                 'must be within reach, on the way from home')
-        found = cls(structure, rows, (position, velocity, acceleration))
-        if len(structure.tables.passive):
-            found._require_regular()
-        found._require_closed()
-        return found
-
-    @cached_property
-    def motion(self) -> Data:
-        """The motion by name."""
-        return self.structure.evaluation.motion(self.rows)
-
-    def is_of(self, position: Array, velocity: Array, acceleration: Array) -> bool:
-        """Return whether it was computed for these very arrays."""
-        return all(mine is other for mine, other in zip(
-            self.drives, (position, velocity, acceleration), strict=True))
-
-    @property
-    def condition(self) -> Array:
-        """Condition number of the loops over that at home, (N,); 0 without loops."""
-        home = self.structure.evaluation.at_home[CONDITION]
-        condition: Array = self.motion.solution[:, CONDITION] / (home or 1.0)
-        return condition
-
-    def _require_regular(self) -> None:
-        home = self.structure.evaluation.at_home[DETERMINANT]
-        lost = ~(self.motion.solution[:, DETERMINANT] * home > 0)
-        if lost.any():
-            raise SingularityError(
-                int(np.argmax(lost)), 'the motion leaves the assembly of home through a '
-                'singularity', 'the determinant of the loops must keep its sign')
-        condition = self.condition
-        poor = ~(condition < WORST_CONDITION)
-        if poor.any():
-            worst = int(np.argmax(poor))
-            raise SingularityError(
-                worst, f'the loops are {condition[worst]:.3g} times worse conditioned than at home',
-                f'must be below {WORST_CONDITION:g}: the drives nearly lose hold')
-
-    def _require_closed(self) -> None:
-        """Raise WorkspaceError where rows that others implied at home no longer follow from them.
-
-        At a home where joints are in line, others become dependent than elsewhere.
-        """
-        t = self.structure.tables
-        implied = np.arange(len(t.passive), len(t.rows))
-        if not len(implied):
-            return
-        m = samples_last(self.motion)
-        residuals = np.stack([residual(t, m, int(r)) for r in implied], axis=-1)
-        size = np.abs(residuals) / t.row_unit[implied]
-        if np.all(size < OPEN_IN_MOTION):
-            return
-        sample = int(np.argmax(~np.all(size < OPEN_IN_MOTION, axis=1)))
-        worst = int(np.argmax(size[sample]))
-        row = implied[worst]
-        by = abs(residuals[sample, worst])
-        amount = (f'{1e3 * by:.3g} mm' if t.rows[row, KIND] == TRANSLATION
-                  else f'{np.degrees(by):.3g} degrees')
-        raise WorkspaceError(
-            sample, f'the loop {self.structure.loops[t.rows[row, LOOP]].name} is open by {amount}',
-            'must close as at home, where it follows from the other loops and joints alone: name a '
-            'robot.home at which no links are in line')
-
-    def frame_of(self, link: str) -> Frame:
-        """Return the frames of a link in the base's, R (N, 3, 3) and p (N, 3)."""
-        row, frame = self.structure.links[link]
-        m = self.motion
-        return Frame(m.R[:, row] @ frame.R, m.p[:, row] + m.R[:, row] @ frame.p)
-
-    @cached_property
-    def link_jacobians(self) -> tuple[Array, Array]:
-        """Angular and linear velocity of links per rate of drives, (N, J + 1, 3, D)."""
-        return self.structure.evaluation.link_jacobians(self.rows)
-
-    def load_rows(self, mechanism: Mechanism,
-                  wrenches: Mapping[int, tuple[Array, Array]] | None = None) -> Array:
-        """Return the forces that move the bodies and apply wrenches; see `Evaluation.forces`."""
-        return self.structure.evaluation.forces(
-            self.rows, mechanism.by_joint, mechanism.gravity_row, wrenches)
-
-    def loads(self, mechanism: Mechanism) -> Loads:
-        """Return the forces that move the bodies, by name."""
-        return self.structure.evaluation.loads(self.load_rows(mechanism))
-
-    def efforts(self, mechanism: Mechanism) -> Array:
-        """Return the efforts of the drives that move the bodies, (N, D)."""
-        efforts: Array = self.loads(mechanism).efforts
-        return efforts
-
-    def wrenches_of(self, load: StructureLoad) -> dict[int, tuple[Array, Array]]:
-        """Return a load as wrenches that links apply, by the joints that move them."""
-        t, m = self.structure.tables, self.motion
-        row, _ = self.structure.links[self.structure.tool]
-        arm = self.frame_of(self.structure.tool).p - m.p[:, row]
-        force, moment = load.wrench[:, :3], load.wrench[:, 3:]
-        found = {row: (force, moment + np.cross(arm, force))}
-        for name, torque in load.torques.items():
-            row = self.structure.rows[name]
-            along = torque[:, None] * m.z[:, row]
-            none = np.zeros_like(along)
-            # What the link of a joint applies, the one that it hangs on takes back.
-            for one, sign in ((row, 1.0), (int(t.parent[row]), -1.0)):
-                arm = m.p[:, row] - m.p[:, one]
-                force, moment = (none, sign * along) if t.turns[row] else (
-                    sign * along, sign * np.cross(arm, along))
-                before = found.get(one, (none, none))
-                found[one] = (before[0] + force, before[1] + moment)
-        return found
-
-    def regressor(self, mechanism: Mechanism) -> Array:
-        """Return the derivatives of the efforts by the bodies' parameters, (N, D, 10 B)."""
-        m, rows = self.motion, mechanism.bodies
-        R = m.R[:, rows]
-
-        def own(values: Array) -> Array:
-            """Return vectors, or columns of vectors, in the axes of their bodies."""
-            turned: Array = np.einsum('nbji,nbj...->nbi...', R, values)
-            return turned
-
-        W, U = (own(each[:, rows]) for each in self.link_jacobians)
-        w, wd = own(m.w[:, rows])[..., None], own(m.wd[:, rows])[..., None]
-        a = own(m.ud[:, rows] - np.asarray(mechanism.gravity))[..., None]
-
-        def cross(x: Array, y: Array) -> Array:
-            return np.stack([x[:, :, (i + 1) % 3] * y[:, :, (i + 2) % 3]
-                             - x[:, :, (i + 2) % 3] * y[:, :, (i + 1) % 3] for i in range(3)],
-                            axis=2)
-
-        samples, drives = len(m.q), U.shape[-1]
-        found = np.empty((samples, drives, len(rows), PARAMETERS))
-        found[..., 0] = np.sum(U * a, axis=2).transpose(0, 2, 1)
-        moment = (cross(U, wd) + w * np.sum(U * w, axis=2, keepdims=True)
-                  - U * np.sum(w * w, axis=2, keepdims=True) + cross(a, W))
-        found[..., 1:4] = moment.transpose(0, 3, 1, 2)
-        c = cross(W, w)
-        for k, (i, j) in enumerate(((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))):
-            column = W[:, :, i] * wd[:, :, j] + c[:, :, i] * w[:, :, j]
-            if i != j:
-                column = column + W[:, :, j] * wd[:, :, i] + c[:, :, j] * w[:, :, i]
-            found[..., 4 + k] = column.transpose(0, 2, 1)
-        return found.reshape(samples, drives, -1)
-
-
-@dataclass(frozen=True, eq=False)
-class MechanismState(JointMotion):
-    """A motion of a mechanism's drives with the quantities that effects take, (N, D) each.
-
-    Efforts and the model's own friction of joints come from one pass that keeps nothing else; the
-    motion of links and what joints transmit are computed when they are asked for.
-
-    Parameters
-    ----------
-    robot : Mechanism
-    reversal : Reversal
-    load : StructureLoad, optional
-    known : LinkMotion, optional
-        The motion of all links, where it is there.
-    friction : JointFriction
-        The model's own, which is found with the efforts.
-    start, nearby : (N, C) and (C,) arrays, optional
-        See `Evaluation.forward_kinematics`.
-    """
-
-    robot: Mechanism = field(kw_only=True)
-    reversal: Reversal = field(default_factory=Reversal, kw_only=True)
-    load: StructureLoad | None = field(default=None, kw_only=True)
-    known: LinkMotion | None = field(default=None, kw_only=True)
-    friction: JointFriction = field(default=NO_FRICTION, kw_only=True)
-    start: Array | None = field(default=None, kw_only=True)
-    nearby: Array | None = field(default=None, kw_only=True)
-
-    def __getitem__(self, samples: Any) -> Self:
-        """Return the samples that a slice, a mask or indices select, with their load."""
-        return replace(super().__getitem__(samples), known=None, start=None, nearby=None,
-                       load=None if self.load is None else self.load.at(samples))
+    # --- motion and forces, as `MechanismState` and models take them -----------------------------
 
     @property
     def drives(self) -> tuple[str, ...]:
         """Names of the drives."""
-        return self.robot.structure.drives
-
-    @lazy
-    def inverse_dynamics(self) -> InverseDynamicsResult | None:
-        """Closed coordinates, efforts and own friction in one pass; None where links are needed."""
-        if self.known is not None or self.load is not None:
-            return None
-        robot = self.robot
-        return robot.structure.evaluation.inverse_dynamics(
-            (self.position, self.velocity, self.acceleration), robot.by_joint, robot.gravity_row,
-            self.friction, None, self.start, self.nearby)
-
-    @lazy
-    def links(self) -> LinkMotion:
-        """The motion of all links."""
-        motion = self.position, self.velocity, self.acceleration
-        if self.known is not None and self.known.is_of(*motion):
-            return self.known
-        found = vars(self).get('inverse_dynamics')
-        start, nearby = (self.start, self.nearby) if found is None else (found.q, None)
-        return LinkMotion.of(self.robot.structure, *motion, start, nearby)
+        return self.structure.drives
 
     @property
-    def closed(self) -> Array:
-        """Closed coordinates, (N, C)."""
-        return self.links.motion.q if self.inverse_dynamics is None else self.inverse_dynamics.q
+    def kind(self) -> str:
+        """Whether it is one slide alone, or any other mechanism."""
+        structure = self.structure
+        return SLIDE if structure.kinds == (PRISMATIC,) and not structure.loops else MECHANISM
 
-    @lazy
-    def direction(self) -> Array:
-        """Sign of the velocity, sgn, turning over within the reversal velocity."""
-        direction: Array = smooth_sign(self.velocity, np.asarray(self.reversal.velocity))
-        return direction
+    @cached_property
+    def load_is_known(self) -> bool:
+        """Whether friction follows what the drives carry.
 
-    @lazy
-    def rigid_force(self) -> Array:
-        """Efforts without friction [N m, N]."""
-        efforts: Array = self.transmitted + self.robot.armature * self.acceleration
-        return efforts
-
-    @property
-    def transmitted(self) -> Array:
-        """Efforts that the drives' gears pass on, without friction [N m, N].
-
-        The motor accelerates its rotor on its own side of the gear.
+        On a slide alone that no gravity pulls, preload rubs, and the weight on its guide.
         """
-        efforts: Array = (self.reactions.efforts if self.inverse_dynamics is None
-                          else self.inverse_dynamics.efforts[TRANSMITTED])
-        return efforts
-
-    @lazy
-    def friction_load(self) -> Array:
-        """What a drive's gear carries [N m, N]: the size of what it passes on; 0 if not known."""
-        load: Array = np.abs(self.transmitted) * self.robot.load_is_known
-        return load
-
-    @lazy
-    def _load_rows(self) -> Array:
-        wrenches = None if self.load is None else self.links.wrenches_of(self.load)
-        return self.links.load_rows(self.robot, wrenches)
-
-    @lazy
-    def reactions(self) -> Loads:
-        """What joints and closures transmit without friction."""
-        return self.robot.structure.evaluation.loads(self._load_rows)
+        if self.kind == MECHANISM:
+            return True
+        row = self.structure.rows[self.structure.drives[0]]
+        t = self.structure.tables
+        return bool(abs(t.axis[row] @ t.place_R[row].T @ self.gravity_row) > LEAST_GRAVITY)
 
     @property
-    def tool_velocity(self) -> Array:
-        """Linear velocity of the tool's origin and angular velocity, in `base`, (N, 6)."""
-        links = self.links
-        row, _ = links.structure.links[links.structure.tool]
-        m = links.motion
-        arm = links.frame_of(links.structure.tool).p - m.p[:, row]
-        return np.concatenate((m.u[:, row] + np.cross(m.w[:, row], arm), m.w[:, row]), axis=1)
+    def motions(self) -> tuple[type, ...]:
+        """Kinds of motion that have forces: of the drives, and of the tool where it has loops."""
+        return (JointMotion, PlatformMotion) if self.structure.loops else (JointMotion,)
 
-    def joint_position(self, joint: str) -> Array:
-        """Return where a passive joint of the tree is, (N,) [rad, m]."""
-        t, row = self.links.structure.tables, self.links.structure.rows[joint]
-        position: Array = (t.ratio[row] * self.links.motion.q[:, t.coordinate[row]]
-                           + t.offset[row])
-        return position
+    @property
+    def turning(self) -> tuple[str, ...]:
+        """Drives that turn."""
+        return self.structure.turning
 
     @property
     def position_step(self) -> float:
-        """By which a drive is moved for derivatives [rad, m]."""
-        return 1e-4
+        """Step of a drive for derivatives by its position [rad, m]."""
+        return POSITION_STEP
 
-    def perturbed(self, drive: int, step: float) -> MechanismState:
-        """Return the state with a drive at other positions, which moves as it did."""
-        position = self.position.copy()
-        position[:, drive] += step
-        return replace(self, position=position, known=None)
+    @cached_property
+    def tool_pose(self) -> ToolPose:
+        """The drives' motion from that of the tool.
 
-    def accelerated(self, drive: int, change: float) -> MechanismState:
-        """Return the state with another acceleration of a drive."""
-        acceleration = self.acceleration.copy()
-        acceleration[:, drive] += change
-        return replace(self, acceleration=acceleration, known=None)
+        Raises
+        ------
+        ModelError
+            Where the tool's pose does not determine the drives.
+        """
+        return ToolPose(self.structure)
 
-    def against_friction(self, friction: JointFriction) -> Array:
-        """Return the drives' efforts against friction of joints, (N, D)."""
-        if friction is self.friction and self.inverse_dynamics is not None:
-            efforts: Array = self.inverse_dynamics.efforts[JOINT_EFFORT]
-            return efforts
-        return self.robot.structure.evaluation.friction(self.links.rows, self._load_rows,
-                                                        friction)
+    def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
+                         seed: JointMotion | None = None) -> JointMotion:
+        """Return the same: loops are closed where forces are evaluated."""
+        return JointMotion(position, velocity, acceleration)
 
-    def with_smoothing(self, reversal: Reversal) -> MechanismState:
-        """Return the state with a sgn of other widths; all else is computed once for both."""
-        state = replace(self, reversal=reversal, known=self.links)
-        vars(state)['_load_rows'] = self._load_rows
-        return state
+    def at_home(self, samples: int) -> JointMotion:
+        """Return the drives at rest where the description has them, one sample a second."""
+        position = np.tile(self.structure.home[self.structure.tables.drives], (samples, 1))
+        still = np.zeros_like(position)
+        return JointMotion(position, still, still, np.arange(samples, dtype=float))
 
-    def with_load(self, robot: Mechanism, load: StructureLoad | None = None) -> MechanismState:
-        """Return a state of this motion with other bodies, and with an additional load."""
-        if load is None:
-            load = self.load
-        elif self.load is not None:
-            load = self.load + load
-        return replace(self, robot=robot, load=load, known=self.links)
+    def state(self, motion: JointMotion | PlatformMotion, reversal: Reversal,
+              friction: JointFriction = NO_FRICTION, closed: dict[Any, Array] | None = None,
+              ) -> MechanismState:
+        """Return the state for a motion; `closed` as of `ModelState`."""
+        closed = {} if closed is None else closed
+        start, nearby, pose = None, closed.get(self.structure), None
+        if isinstance(motion, PlatformMotion):
+            # The assembly is that of the pose, whichever the same drives would find from home.
+            pose, nearby = motion, None
+            motion, start = self.tool_pose.drives(motion, closed)
+        return MechanismState(motion.position, motion.velocity, motion.acceleration, motion.time,
+                              channels=motion.channels, robot=self, reversal=reversal,
+                              start=start, nearby=nearby, friction=friction, motion=pose)
+
+    def remember(self, state: MechanismState, closed: dict[Any, Array]) -> None:
+        """Store the coordinates of the last sample, near which the next loops close."""
+        if len(state) and self.structure.loops:
+            closed[self.structure] = state.closed[-1].copy()
+
+    def kinematics(self, state: MechanismState) -> LinkMotion:
+        """Return the motion of all links in a state."""
+        found = vars(state).get('inverse_dynamics')
+        start, nearby = (state.start, state.nearby) if found is None else (found.q, None)
+        return LinkMotion.of(self.structure, state.position, state.velocity, state.acceleration,
+                             start, nearby)
+
+    def loads(self, links: LinkMotion, load: StructureLoad | None) -> Loads:
+        """Return what joints and closures transmit without friction."""
+        return links.loads(self.by_joint, self.gravity_row, load)
+
+    def inverse_dynamics(self, state: MechanismState) -> InverseDynamicsResult | None:
+        """Return closed coordinates, efforts and own friction in one pass."""
+        return self.structure.evaluation.inverse_dynamics(
+            (state.position, state.velocity, state.acceleration), self.by_joint, self.gravity_row,
+            state.friction, None, state.start, state.nearby)
+
+    def friction_load(self, state: MechanismState) -> Array:
+        """Return what the drives' gears carry [N m, N], (N, D); 0 if that is not known."""
+        load: Array = np.abs(state.transmitted) * self.load_is_known
+        return load
+
+    def moved(self, state: MechanismState, position: Array, acceleration: Array) -> MechanismState:
+        """Return the state at other positions and accelerations of the drives."""
+        return replace(state, position=position, acceleration=acceleration, known=None,
+                       motion=None)
+
+    def singularity_margin(self, state: MechanismState) -> float | None:
+        """Return 1 minus the condition number of the closures over its limit; None without any."""
+        if not self.structure.loops:
+            return None
+        return float(1 - state.links.condition.max() / WORST_CONDITION)
+
+    def variables(self, state: MechanismState) -> dict[str, Array]:
+        """Return the loads of the gears, where they are known."""
+        return {'load': state.friction_load} if self.load_is_known else {}
+
+    def require_bodies(self, key: str, value: Any) -> None:
+        """Raise ModelError, of a key and its value, for bodies that cannot be."""
+        moments = self.inertial[:, 1:4].any(axis=1)
+        if np.any((self.masses < 0) | (self.masses == 0) & moments):
+            raise ModelError(key, value, 'leave masses greater than 0')

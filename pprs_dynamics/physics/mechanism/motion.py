@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -33,6 +32,7 @@ ENDS = [3, 7, 10, 13, 16]  # where the columns of the next begin
 OTHERS = (0, 1, 2, *range(7, 19))  # columns that are not orientations
 _NO_PARAMETERS = KernelParameters(())
 FLOAT = np.dtype(np.float64)
+NO_CHANNELS: Mapping[str, Array] = {}
 MOST_SAMPLES = 10_000_000  # five hours at 500 Hz; more is a mistake in rate or times
 
 
@@ -68,7 +68,7 @@ class PlatformMotion:
 
     rows: Array
     time: Array | None = None
-    channels: Mapping[str, Array] = MappingProxyType({})
+    channels: Mapping[str, Array] = NO_CHANNELS
 
     def __init__(
         self, position: ArrayLike, orientation: ArrayLike, linear_velocity: ArrayLike,
@@ -86,7 +86,7 @@ class PlatformMotion:
 
     @classmethod
     def _of(cls, rows: Array, time: ArrayLike | None,
-            channels: Mapping[str, Array] = MappingProxyType({})) -> PlatformMotion:
+            channels: Mapping[str, Array] = NO_CHANNELS) -> PlatformMotion:
         """Return the motion of rows that are known to be right."""
         motion = object.__new__(cls)
         motion.__dict__['rows'] = rows

@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+# Kinds of robots: the closed form of the 3-PPRS, one slide alone, and every other one.
+PLATFORM, SLIDE, MECHANISM = 'platform', 'slide', 'mechanism'
+
 
 class PassiveJoint(NamedTuple):
     """A joint without a drive, or several joints that share their friction.

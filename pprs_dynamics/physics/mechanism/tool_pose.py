@@ -25,7 +25,7 @@ from pprs_dynamics.physics.mechanism.elimination import (
     with_elimination_order,
 )
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
+from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.structure import (
     STRIDE_SLIDE,
@@ -33,7 +33,7 @@ from pprs_dynamics.physics.mechanism.structure import (
     Structure,
     path_to_base,
 )
-from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Integers, Model
+from pprs_dynamics.physics.mechanism.tree_tables import TRANSLATION, Integers, Model
 
 COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
 SLIDES = 3  # the first of them

@@ -28,19 +28,7 @@ from pprs_dynamics.physics.mechanism.packed import (
     views,
 )
 from pprs_dynamics.physics.mechanism.tree_equations import (
-    EFFORTS,
-    JOINT_EFFORT,
-    OF_DRIVE,
-    OPEN,
-    STEPS,
-    TRANSMITTED,
     WARM_STEPS,
-    WIDTH,
-    Data,
-    Integers,
-    JointFriction,
-    Loads,
-    Model,
     actuator_efforts,
     close_loops,
     constraint_forces,
@@ -54,6 +42,20 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     predict,
     residual,
     update_frame_placements,
+)
+from pprs_dynamics.physics.mechanism.tree_tables import (
+    EFFORTS,
+    JOINT_EFFORT,
+    OF_DRIVE,
+    OPEN,
+    STEPS,
+    TRANSMITTED,
+    WIDTH,
+    Data,
+    Integers,
+    JointFriction,
+    Loads,
+    Model,
 )
 
 # Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
@@ -223,10 +225,10 @@ class Evaluation:
         self._run(None, None, rows, FORCES | KEPT, gravity, None, inertial, loads)
         return loads
 
-    def friction(self, rows: Array, loads: Array, friction: JointFriction) -> Array:
-        """Return the drives' efforts (N, D) against friction of joints, for rows of both."""
+    def friction(self, rows: Array, loads: Loads, friction: JointFriction) -> Array:
+        """Return the drives' efforts (N, D) against friction of joints under loads."""
         found = np.zeros((len(rows), len(self.tables.drives)))
-        m, o = samples_last(self.motion(rows)), samples_last(self.loads(loads))
+        m, o = samples_last(self.motion(rows)), samples_last(loads)
         # Loads are everybody's: what is of one friction alone does not go through them.
         o = o._replace(tau_friction=np.empty_like(o.tau_friction))
         with np.errstate(all='ignore'):

@@ -1,237 +1,533 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Model of the 3-PPRS: drive forces Q^m of the rigid body, the paper's friction and effects."""
+"""The model of every robot: forces that drives must apply for a motion, as a sum over a list.
+
+    tau = rigid body + own friction + effects
+
+per drive, positive along its positive direction; Eq. (14). What differs from robot to robot
+belongs to the robot: `ThreePprs` in closed form, `Mechanism` for every other one.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from os import PathLike
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.effects.effect import PLATFORM, Effect
+from pprs_dynamics.drives import DriveUnits, RecordedDrives
+from pprs_dynamics.errors import EffectError, MotionError
+from pprs_dynamics.physics.effects.catalogue import find_effect
+from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Effect
+from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
+from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
-from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.places import MECHANISM
 from pprs_dynamics.physics.mechanism.reversal import Reversal
+from pprs_dynamics.physics.mechanism.state import MechanismState
+from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION
 from pprs_dynamics.physics.model.effects_block import added_effects
-from pprs_dynamics.physics.model.force_model import ForceModel, Forces, ModelState
-from pprs_dynamics.physics.model.keys import KEYS, is_axis, is_mechanism, title_of
-from pprs_dynamics.physics.model.limits import Limits
-from pprs_dynamics.physics.model.one_pass import OnePass
-from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
-from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
-from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
-from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.physics.three_pprs.jacobians import condition_number
-from pprs_dynamics.physics.three_pprs.passive_friction import (
-    IndependentChainsFriction,
-    JointCoefficients,
-    PassiveFriction,
-    WholeMechanismFriction,
+from pprs_dynamics.physics.model.forces import RIGID_BODY, Forces, ModelState, total_force
+from pprs_dynamics.physics.model.keys import (
+    EFFORT_UNITS,
+    FILES,
+    GAIN,
+    ROBOT,
+    Key,
+    is_mechanism,
+    keys_of,
+    title_of,
 )
-from pprs_dynamics.physics.three_pprs.robot import Geometry, Masses, Robot
-from pprs_dynamics.physics.three_pprs.state import ThreePprsState, solve_mechanism
+from pprs_dynamics.physics.model.limits import DriveLimits
+from pprs_dynamics.physics.model.one_pass import one_pass_of
+from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, find_file, read_parameters
+from pprs_dynamics.physics.model.parameter_values import checked_values, source_of_errors
+from pprs_dynamics.physics.model.platform_block import read_platform
+from pprs_dynamics.physics.model.recorded_names import (
+    CURRENT,
+    effort_kind,
+    joint_names,
+    recorded_columns,
+)
+from pprs_dynamics.physics.model.robot_block import read_mechanism, require_drives
 
-HOME_HEIGHT = 0.5  # [m], of the platform at home
-# Of a long trajectory that many samples are looked at for their condition number, evenly spread:
-# neighbours hardly differ, and a singular value decomposition each would cost more than the model.
-MOST_CONDITIONS = 64
+# Reversals of friction take a hundredth of a period; what is faster is ripple of motor and gear.
+BLOCKS_PER_PERIOD = 100.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class DriveModel(ForceModel):
-    """The inverse dynamic model of a 3-PPRS with friction, Eq. (14): Q^m = sum of parts.
+class DriveModel:
+    """An inverse dynamic model: motion in, drive forces out.
 
     Parameters
     ----------
-    robot : Robot
-    limits : Limits
-    equations : {'corrected', 'printed'}
-        'printed' takes (7), (12), (13) to the letter.
-    effects, reversal, values, source
-        See `ForceModel`; the paper's friction comes first.
+    robot : Mechanism or ThreePprs
+        Bodies and joints; effects take their parameters from it.
+    effects : tuple of Effect
+        What acts in addition to the rigid body; the model's own friction comes first.
+    reversal : Reversal
+    limits : DriveLimits
+    values : mapping
+        The flat keys and values that the model was built from, complete with defaults.
+    source : str
+        The file that it came from, if any.
     """
 
-    kind: ClassVar[str] = PLATFORM
-    motions: ClassVar[tuple[type, ...]] = (PlatformMotion,)
-    default_file: ClassVar[str] = DEFAULT_MODEL
-    drives: ClassVar[tuple[str, ...]] = DRIVES
-    keys = KEYS
-
-    robot: Robot
-    limits: Limits
-    equations: str = 'corrected'
-
-    @property
-    def strokes(self) -> tuple[Array, Array]:
-        """Lowest and highest position of each drive [m], (6,) each."""
-        return self.limits.strokes
-
-    @property
-    def moved_mass(self) -> float:
-        """Mass of the platform and its payload [kg]."""
-        return float(self.values['masses.platform'] + self.values['masses.payload'])
-
-    @property
-    def effort_limits(self) -> Array:
-        """Largest absolute effort that each drive can apply [N], (6,)."""
-        return self.limits.efforts
+    robot: Any
+    effects: tuple[Effect, ...]
+    reversal: Reversal
+    limits: DriveLimits
+    values: Mapping[str, Any] = field(default_factory=dict)
+    source: str = ''
 
     @classmethod
-    def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> DriveModel:
-        """Build the model from flat keys and values; see `ForceModel.from_parameters`."""
-        with source_of_errors(source):
-            other = next((name for name in parameters if is_axis((name,)) or is_mechanism((name,))),
-                         None)
-            if other is not None:
-                raise ModelError(other, parameters[other], 'not be given: this needs a 3-PPRS, and '
-                                 f'{title_of(parameters)} is for pprs compare, diagnose, adopt, '
-                                 'fit and history')
-            values = checked_values(parameters)
-            for stroke in ('limits.slide_stroke', 'limits.lift_stroke'):
-                if not values[stroke][0] < values[stroke][1]:
-                    raise ModelError(stroke, values[stroke],
-                                     'be a lower and a higher position [m]')
-            robot = Robot(Geometry(**_group(values, 'geometry.')),
-                          Masses(**_group(values, 'masses.')),
-                          gravity_in_efforts(values, 'gravity'),
-                          (values['friction.revolute.diameter'] / 2,
-                           values['friction.spherical.diameter'] / 2))
-            limits = Limits.of(values)
-            effects = (ActiveFriction(**_group(values, 'friction.drives.')),
-                       _passive_friction(values, limits),
-                       *added_effects(parameters, cls.kind, cls.drives, robot))
-            _require_bodies(robot, effects)
-            reversal = Reversal(_reversal_velocity(values), values['friction.reversal_rate'])
-            return cls(robot=robot, effects=effects, limits=limits, reversal=reversal,
-                       equations=values['equations'], values=values, source=source)
+    def load(cls, path: str | PathLike[str] = DEFAULT_MODEL) -> Self:
+        """Read a model file.
 
-    def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
-                         seed: PlatformMotion | None = None) -> PlatformMotion:
-        """Return the platform's motion, by forward kinematics."""
-        return solve_forward_motion(
-            self.robot.geometry, position, velocity, acceleration, seed).motion
-
-    def mechanism(self, motion: PlatformMotion) -> ThreePprsState:
-        """Return drive motion, Jacobians and frictionless forces for a platform motion.
+        Parameters
+        ----------
+        path : path
+            A file; or, where there is none of that name, one of the package's own, as in
+            'config/paper.yaml'.
 
         Raises
         ------
-        WorkspaceError
-            For a pose out of reach.
-        SingularityError
-            For a pose nearer to a singularity than `limits.rod_sine` or
-            `limits.condition_number` allow.
+        UnreadableFileError
+            Where the file, or a description that it names, does not exist or cannot be read.
+        ModelError
+            See `from_parameters`.
         """
-        # Very large numbers overflow; users of the result check that it is finite.
-        with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
-            return solve_mechanism(
-                self.robot, motion, reversal=self.reversal, printed=self.equations == 'printed',
-                minimum_sine=self.limits.rod_sine, condition_limit=self.limits.condition_number)
+        file = find_file(path)
+        return cls.from_parameters(read_parameters(file), source=str(file))
 
-    def at_drives(self, state: ThreePprsState) -> ThreePprsState:
-        """Return the state in which the platform follows drives that move as in another."""
-        found = solve_forward_motion(self.robot.geometry, state.position, state.velocity,
-                                     state.acceleration, state.motion[:1]).motion.with_channels(
-                                         state.channels)
-        return self.mechanism(found if state.time is None else found.with_time(state.time))
+    @classmethod
+    def from_parameters(cls, parameters: Mapping[str, Any], source: str = '') -> Self:
+        """Build the model from flat keys and values, each checked.
 
-    def drive_forces(self, motion: PlatformMotion, state: ModelState | None = None) -> Forces:
-        """Return the forces for a platform motion; see `ForceModel.drive_forces`."""
-        self._require_motion(motion)
-        one_pass = self._one_pass
-        table = None if one_pass is None else one_pass.forces(motion)
-        if one_pass is None or table is None:
-            return self.forces_at(self.mechanism(motion), state)
-        added = self.effects[2:]
-        if added:
-            return self._with_effects(added, one_pass.parts(table),
-                                      one_pass.mechanism(motion, table), state)
-        if state is not None:
-            state.advance(motion.time, self.initial_state)
-        return Forces(table[0], lambda: one_pass.parts(table),
-                      lambda: one_pass.mechanism(motion, table))
+        Parameters
+        ----------
+        parameters : mapping
+            E.g. {'geometry.rod_length': 0.3, ...}; keys of nodes are ignored. Keys of
+            `robot` describe an axis, an arm or a robot with loops, others a 3-PPRS.
+        source : str
+            Named in errors; the path of a description counts from its folder.
+
+        Raises
+        ------
+        ModelError
+            For a key that is unknown, missing, of the wrong type or impossible.
+        """
+        with source_of_errors(source):
+            require_drives(parameters)
+            values = checked_values(parameters)
+            robot: Any
+            robot, own, reversal, limits = (
+                read_mechanism(values, Path(source).parent) if is_mechanism(parameters)
+                else read_platform(values))
+            effects = (*own, *added_effects(parameters, robot))
+            loaded = robot
+            for effect in effects:
+                if isinstance(effect, BodyEffect):
+                    loaded = effect.changed(loaded)
+                    loaded.require_bodies(f'effects.{effect.name}', effect.to_file())
+            return cls(robot=robot, effects=effects, reversal=reversal, limits=limits,
+                       values=values, source=source)
+
+    @property
+    def kind(self) -> str:
+        """One of 'platform', 'slide', 'mechanism'; effects say in which of them they act."""
+        kind: str = self.robot.kind
+        return kind
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Names of the drives."""
+        drives: tuple[str, ...] = self.robot.drives
+        return drives
+
+    @property
+    def moves_joints(self) -> bool:
+        """Whether it is commanded by the motion of its joints; else by that of a platform."""
+        return JointMotion in self.robot.motions
+
+    @property
+    def takes_long(self) -> bool:
+        """Whether forces take so long that several are evaluated in threads."""
+        return self.robot.structure is not None
 
     @cached_property
-    def _one_pass(self) -> OnePass | None:
-        """The paper's model in one pass, where no effect changes the bodies that it is of."""
-        match self.effects:
-            case (ActiveFriction() as active, WholeMechanismFriction() as passive, *added):
-                if not any(isinstance(effect, BodyEffect) for effect in added):
-                    return OnePass(self.robot, active, passive, self.limits, self.reversal,
-                                   self.equations == 'printed')
-        return None
+    def keys(self) -> dict[str, Key]:
+        """Keys of its files, by name."""
+        return keys_of(self.values)
 
-    def variables(self, state: ThreePprsState) -> dict[str, Array]:
-        """Return loads of the guides, rod angles, and where the platform is."""
-        motion = state.motion
-        x, y, z = motion.position.T
-        return {'load': state.friction_load, 'rod_angle': np.tile(state.chains.rod_angle, 2),
-                'platform_x': x, 'platform_y': y, 'platform_z': z,
-                'platform_tilt': motion.tilt, 'platform_turn': motion.turn}
+    @property
+    def block(self) -> str:
+        """Block of its file that describes the robot; '' for that of the paper."""
+        return ROBOT if is_mechanism(self.values) else ''
 
-    def condition_number(self, motion: PlatformMotion) -> Array:
-        """Return the condition number of the drive Jacobian, rotations times r, (N,).
+    @property
+    def is_described(self) -> bool:
+        """Whether all that it is follows from a description: no 3-PPRS, and no slide alone."""
+        return self.kind == MECHANISM
 
-        Unlike `drive_forces` it answers beyond `limits.condition_number` too.
+    @property
+    def units(self) -> tuple[DriveUnits, ...]:
+        """Units of the drives' quantities."""
+        return tuple(DriveUnits(name in self.robot.turning) for name in self.drives)
+
+    @property
+    def content(self) -> str:
+        """Hash of the description; '' without one."""
+        return '' if self.robot.structure is None else self.robot.structure.description.digest
+
+    @property
+    def gain(self) -> tuple[float, ...] | None:
+        """Effort per ampere of each drive [N m/A, N/A]; None for a model without."""
+        return self.values.get(GAIN)
+
+    @property
+    def moved_mass(self) -> float:
+        """Mass of what carries a load, or of all links [kg]."""
+        mass: float = self.robot.moved_mass
+        return mass
+
+    @property
+    def gear_ratios(self) -> tuple[float, ...]:
+        """Turns of the motor per turn of each drive; 1 where no gear is known."""
+        ratios: tuple[float, ...] = self.values.get('robot.gear_ratio', (1.0,) * len(self.drives))
+        return ratios
+
+    @property
+    def strokes(self) -> tuple[Array, Array]:
+        """Lowest and highest position of each drive [m, rad], (D,) each; may be infinite."""
+        return self.limits.strokes
+
+    @property
+    def speed_limits(self) -> Array:
+        """Largest speed of each drive [m/s, rad/s], (D,); infinite where none is known."""
+        structure = self.robot.structure
+        return np.full(len(self.drives), np.inf) if structure is None else structure.speed
+
+    @property
+    def effort_limits(self) -> Array:
+        """Largest absolute effort that each drive can apply [N, N m], (D,); may be infinite."""
+        return self.limits.efforts
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Sentences on bodies that cannot be, unless the file has other inertia than the URDF."""
+        structure = self.robot.structure
+        faults: tuple[str, ...] = (() if structure is None or self.values.get('links.inertia')
+                                   else structure.description.faults)
+        return faults
+
+    @property
+    def efforts_in_amperes(self) -> bool:
+        """Whether efforts of recordings are currents."""
+        return self.effort_kind == CURRENT or self.values.get('robot.effort_unit') == 'A'
+
+    @property
+    def rest_speed(self) -> float:
+        """Speed below which a drive stands and its effort is unknown; 0 where that counts too.
+
+        A described joint has a gear that holds any torque at rest. The speed is the file's own, not
+        that of a fit: which samples count must not change with the widths that are fitted to them.
         """
-        mechanism = solve_mechanism(self.robot, motion, minimum_sine=self.limits.rod_sine)
-        return condition_number(self.robot.geometry, mechanism.jacobians.J)
+        return float(self.values['friction.reversal_velocity']) if self.is_described else 0.0
 
-    def at_home(self, samples: int) -> PlatformMotion:
-        """Return the platform at rest at its home pose."""
-        return PlatformMotion.at_rest(np.tile([0.0, 0.0, HOME_HEIGHT], (samples, 1)),
-                                      np.tile([0.0, 0.0, 0.0, 1.0], (samples, 1)))
+    @property
+    def blocks_per_period(self) -> float:
+        """Means of efforts that are compared in a period of the motion; 0 for means of 10 ms."""
+        return BLOCKS_PER_PERIOD if self.is_described else 0.0
 
-    def singularity_margin(self, state: ThreePprsState) -> float:
-        """Return 1 minus the largest of three shares, see `ForceModel.singularity_margin`.
+    @property
+    def friction(self) -> AxisFriction:
+        """The friction of its drives, where no load changes it."""
+        return next(one for one in self.effects if isinstance(one, AxisFriction))
 
-        Condition number over its limit, smallest sine of a rod angle over that of the rods, and,
-        with independent chains, the ratio for the cosine.
+    @property
+    def offset(self) -> AxisOffset:
+        """The constant efforts of its drives."""
+        return next(one for one in self.effects if isinstance(one, AxisOffset))
+
+    @property
+    def title(self) -> str:
+        """What it is a model of, for a sentence."""
+        return title_of(self.values)
+
+    @cached_property
+    def recorded(self) -> RecordedDrives:
+        """How recordings hold the drives, by what the model file says.
+
+        Raises
+        ------
+        ModelError
+            For names and columns that cannot be.
         """
-        limits, J = self.limits, state.jacobians.J
-        number = condition_number(self.robot.geometry, J[::-(-len(J) // MOST_CONDITIONS)])
-        used = [number.max() / limits.condition_number,
-                limits.rod_sine / np.abs(state.chains.sin_u).min()]
-        if any(isinstance(effect, IndependentChainsFriction) for effect in self.effects):
-            used.append(limits.rod_cosine / np.abs(state.chains.cos_u).min())
-        return float(1 - max(used))
+        return RecordedDrives(
+            self.drives, joint_names(self.values, self.drives),
+            recorded_columns(self.values, self.drives), self.gain, self.efforts_in_amperes,
+            self.units, tuple(self.effort_limits.tolist()),
+            next((EFFORT_UNITS[value] for key, value in self.values.items()
+                  if key.endswith('.effort_unit')), 1.0))
 
+    @cached_property
+    def fingerprint(self) -> str:
+        """SHA-256 of the values in force: it changes with every parameter, not with the ledger."""
+        # A node has no ledger, and an empty list where a file says nothing.
+        values = {key: value for key, value in self.values.items()
+                  if value not in ([], ()) and not key.startswith('history.')}
+        if self.content:  # the same wherever the files lie
+            values.update({key: self.content for key in FILES if values.get(key)})
+        text = json.dumps(values, sort_keys=True, default=str)
+        return hashlib.sha256(text.encode()).hexdigest()
 
-def _group(values: Mapping[str, Any], prefix: str) -> dict[str, Any]:
-    """Return the keys and values right below a prefix."""
-    return {name.removeprefix(prefix): value for name, value in values.items()
-            if name.startswith(prefix) and '.' not in name.removeprefix(prefix)}
+    @property
+    def effort_kind(self) -> str:
+        """What the efforts of recordings are: one of `EFFORT_KINDS`."""
+        return effort_kind(self.values)
 
+    @property
+    def recorded_gain(self) -> Array:
+        """What efforts of recordings are multiplied by to give efforts in N and N m, (D,)."""
+        if self.gain is not None and self.efforts_in_amperes:
+            return np.asarray(self.gain)
+        return np.ones(len(self.drives))
 
-def _passive_friction(values: Mapping[str, Any], limits: Limits) -> PassiveFriction:
-    joints = (JointCoefficients(**_group(values, 'friction.revolute.')),
-              JointCoefficients(**_group(values, 'friction.spherical.')))
-    printed = values['equations'] == 'printed'
-    if values['friction.approach'] == WholeMechanismFriction.approach:
-        return WholeMechanismFriction(*joints, printed)
-    return IndependentChainsFriction(*joints, printed, limits.rod_cosine)
+    @property
+    def knows_currents(self) -> bool:
+        """Whether a gain was given; 1 for every drive is what stands where none was."""
+        return self.gain is not None and any(gain != 1 for gain in self.gain)
 
+    def currents(self, effort: Array) -> Array:
+        """Return the currents [A] that give efforts, (..., D), where `knows_currents`."""
+        current: Array = effort / np.asarray(self.gain)
+        return current
 
-def _reversal_velocity(values: Mapping[str, Any]) -> float | tuple[float, ...]:
-    """Return the width that all drives share, or one for each."""
-    common: float = values['friction.reversal_velocity']
-    own: tuple[float, ...] = values['friction.reversal_velocities']
-    return tuple(width or common for width in own) if any(own) else common
+    def offers(self, effect: type[CatalogueEffect]) -> bool:
+        """Return whether an effect of the catalogue can act in what this is a model of."""
+        return self.kind in effect.acts_in and (
+            len(self.drives) > 1 or not effect.needs_several_drives)
 
+    def bound(self, effect: type[CatalogueEffect]) -> type[CatalogueEffect]:
+        """Return an effect of the catalogue with the parameters that it has in this model."""
+        # Of one with the parameters that it has elsewhere, its own again.
+        return (find_effect(effect.name) or effect).bound(self.robot)
 
-def _require_bodies(robot: Robot, effects: Sequence[Effect]) -> None:
-    """Raise ModelError where effects leave bodies that cannot be."""
-    for effect in effects:
-        if isinstance(effect, BodyEffect):
-            robot = effect.changed(robot)
-            if not robot.masses.total > 0 or min(robot.masses.rods) < 0:
-                raise ModelError(f'effects.{effect.name}', effect.to_file(),
-                                 'leave masses greater than 0')
+    def mechanism(self, motion: Any, closed: dict[Any, Array] | None = None) -> MechanismState:
+        """Return what effects take of a motion; see `drive_forces` and `ModelState.closed`."""
+        state: MechanismState = self.robot.state(motion, self.reversal, self._joint_friction,
+                                                 closed)
+        return state
+
+    @cached_property
+    def _joint_friction(self) -> Any:
+        """The model's own friction of joints, which is computed in one pass with the efforts."""
+        return next((effect.table(self.robot, self.reversal) for effect in self.effects
+                     if isinstance(effect, ModelJointFriction)), NO_FRICTION)
+
+    def at_drives(self, state: MechanismState) -> MechanismState:
+        """Return the state in which the links follow drives that move as in another."""
+        motion = self.robot.motion_of_drives(
+            state.position, state.velocity, state.acceleration,
+            None if state.motion is None else state.motion[:1]).with_channels(state.channels)
+        return self.mechanism(motion if state.time is None else motion.with_time(state.time))
+
+    def drive_forces(self, motion: Any, state: ModelState | None = None) -> Forces:
+        """Return the forces that the drives must apply for a motion.
+
+        Parameters
+        ----------
+        motion : PlatformMotion or JointMotion
+            One of the robot's `motions`.
+        state : ModelState, optional
+            Carries effects with memory from call to call, and is advanced to the last sample;
+            without it every call starts afresh. With a state the loops close from where they were
+            at its last sample, where that is near.
+
+        Raises
+        ------
+        MotionError
+            For a motion of another kind, or of other drives.
+        WorkspaceError, SingularityError
+            Where the mechanism cannot be there. Strokes and efforts are not checked here:
+            `limits` does that, so that recordings beyond them can still be compared.
+        EffectError
+            Where an effect of another package fails.
+        """
+        self._require_motion(motion)
+        one_pass = self._one_pass
+        found = None if one_pass is None else one_pass.forces(
+            motion, None if state is None else state.closed)
+        if found is None:
+            # Very large numbers overflow; users of the result check that it is finite.
+            with np.errstate(over='ignore', invalid='ignore'):
+                if state is None:
+                    return self.forces_at(self.mechanism(motion))
+                mechanism = self.mechanism(motion, state.closed)
+                found = self.forces_at(mechanism, state)
+            self.robot.remember(mechanism, state.closed)
+        elif self._added:
+            return self._with_effects(self._added, found.parts, found.mechanism, state)
+        elif state is not None:
+            state.advance(motion.time, self.initial_state)
+        return found
+
+    @cached_property
+    def _one_pass(self) -> Any:
+        return one_pass_of(self.robot, self.effects, self.reversal, self._joint_friction)
+
+    @cached_property
+    def _added(self) -> tuple[Effect, ...]:
+        """Effects that are not part of the one pass."""
+        own = self._one_pass.OWN
+        return tuple(effect for effect in self.effects if not isinstance(effect, own))
+
+    def _require_motion(self, motion: Any) -> None:
+        """Raise MotionError for a motion that this model has no forces for."""
+        if not isinstance(motion, self.robot.motions):
+            kinds = ' or a '.join(kind.__name__ for kind in self.robot.motions)
+            raise MotionError('motion', f'it is a {type(motion).__name__}',
+                              f'be a {kinds} for {self.title}', 'shape')
+        if isinstance(motion, JointMotion) and np.shape(motion.position)[1:] != (
+                len(self.drives),):
+            raise MotionError('position', f'its shape is {np.shape(motion.position)}',
+                              f'be (N, {len(self.drives)}), a column for each of '
+                              f'{", ".join(self.drives)}', 'shape')
+
+    def forces_at(self, mechanism: Any, state: ModelState | None = None) -> Forces:
+        """Return the forces at a state of the mechanism; see `drive_forces`."""
+        return self._with_effects(self.effects, {RIGID_BODY: mechanism.rigid_force}, mechanism,
+                                  state)
+
+    def _with_effects(self, effects: Sequence[Effect], parts: dict[str, Array], mechanism: Any,
+                      state: ModelState | None) -> Forces:
+        """Return the forces of parts that are there and of effects."""
+        state = self.initial_state() if state is None else state
+        state.advance(mechanism.time, self.initial_state)
+        for effect in self.effects:
+            effect.check_memory(state.memories)
+        with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
+            # Bodies and what acts on them change the loads that friction follows: they go first.
+            for effect in effects:
+                if isinstance(effect, BodyEffect):
+                    loaded = effect.apply(mechanism)
+                    parts[effect.name] = loaded.rigid_force - mechanism.rigid_force
+                    mechanism = loaded
+            for effect in effects:
+                if not effect.is_measurement and not isinstance(effect, BodyEffect):
+                    parts[effect.name] = effect.force(mechanism, state.memories[effect.name])
+            return Forces(total_force(tuple(parts.values())), parts, mechanism)
+
+    def initial_state(self, start: float | None = None) -> ModelState:
+        """Return a fresh state for effects with memory.
+
+        Parameters
+        ----------
+        start : float, optional
+            When the recording began [s], where that is before the first sample.
+        """
+        return ModelState({effect.name: effect.initial_memory(start) for effect in self.effects},
+                          start)
+
+    def continued_state(self, model: Self, state: ModelState) -> ModelState:
+        """Return a state that goes on from another model's for the effects that both have.
+
+        What a machine remembers does not change with a parameter: memories are kept whatever the
+        parameters are, and new effects begin when the motion began. The other state must not be
+        used any more: memories are handed over, not copied.
+        """
+        continued = self.initial_state(state.start)
+        continued.end = state.end
+        known = {effect.name for effect in model.effects} & state.memories.keys()
+        for effect in self.effects:
+            if effect.name in known:
+                continued.memories[effect.name] = effect.continued_memory(
+                    continued.memories[effect.name], state.memories[effect.name])
+        return continued
+
+    @property
+    def assumed_at_start(self) -> dict[str, str]:
+        """What a fresh state takes for granted, by effect with a memory."""
+        return {effect.name: effect.assumed_at_start for effect in self.effects
+                if effect.assumed_at_start}
+
+    def sound_at(self, motion: Any) -> Self:
+        """Return the model without those effects of other packages that fail for a motion.
+
+        Raises
+        ------
+        PprsError
+            See `drive_forces`.
+        """
+        model = self
+        while True:
+            try:
+                model.drive_forces(motion)
+            except EffectError as error:
+                model = model.without(error.effect)
+            else:
+                return model
+
+    def without(self, effect: str) -> Self:
+        """Return the model without the effect of that name."""
+        return replace(self, effects=tuple(each for each in self.effects if each.name != effect))
+
+    def measured(self, forces: Forces, state: ModelState | None = None) -> Forces:
+        """Return the measured forces where the drives apply `forces`.
+
+        Effects of measurement become parts of their own; without any, `forces` are returned.
+
+        Parameters
+        ----------
+        forces : Forces
+            Consecutive samples with times, of `drive_forces`.
+        state : ModelState, optional
+            As there.
+        """
+        sensors = [effect for effect in self.effects if effect.is_measurement]
+        if not sensors:
+            return forces
+        # Each effect gets the states that its kind of model makes.
+        mechanism: Any = forces.mechanism
+        parts, total = dict(forces.parts), forces.total
+        state = self.initial_state() if state is None else state
+        for effect in sensors:
+            memory = state.memories[effect.name]
+            after = (effect.seen(total, mechanism, memory)
+                     if isinstance(effect, MeasurementEffect)
+                     else total + effect.force(mechanism, memory))
+            parts[effect.name], total = after - total, after
+        return Forces(total, parts, mechanism)
+
+    @property
+    def misreadings(self) -> tuple[MeasurementEffect, ...]:
+        """Effects because of which drives are elsewhere than their encoders say."""
+        return tuple(effect for effect in self.effects
+                     if isinstance(effect, MeasurementEffect) and effect.shifts_positions())
+
+    def position_error(self, position: Array) -> Array:
+        """Return the errors of measured positions (N, D), to be subtracted, but those by load."""
+        errors = [one.position_error(self.drives, position) for one in self.misreadings]
+        return np.sum(errors, axis=0) if errors else np.zeros_like(position)
+
+    def loaded_position_error(self, transmitted: Array) -> Array:
+        """Return the errors of measured positions by what gears pass on, (N, D)."""
+        errors = [one.loaded_position_error(self.drives, transmitted) for one in self.misreadings]
+        return np.sum(errors, axis=0) if errors else np.zeros_like(transmitted)
+
+    def windup_error(self, transmitted: Array, windup: Array) -> Array:
+        """Return the further errors of second encoders, of position and its rates, (3, N, D)."""
+        errors: Array = np.sum([one.windup_error(self.drives, transmitted, windup)
+                                for one in self.misreadings], axis=0)
+        return errors

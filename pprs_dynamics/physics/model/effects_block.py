@@ -19,14 +19,9 @@ LISTS = ('effects.active', 'effects.measured')
 
 
 def added_effects(
-    parameters: Mapping[str, Any], kind: str, drives: tuple[str, ...],
-    robot: Any = None, turning: tuple[str, ...] = (),
+    parameters: Mapping[str, Any], robot: Any,
 ) -> Iterator[CatalogueEffect]:
-    """Yield the effects that are active in a model of a kind with drives, all blocks checked.
-
-    Parameters of some are those that they have on the `robot`; of drives that are `turning` bounds
-    are others.
-    """
+    """Yield the effects that are active on a robot, all blocks checked."""
     active = parameters.get('effects.active', [])
     if not isinstance(active, (list, tuple)) or not all(isinstance(n, str) for n in active):
         raise ModelError('effects.active', active, 'be a list of names of effects')
@@ -42,11 +37,11 @@ def added_effects(
         found = find_effect(name)
         if found is None:
             raise _unknown(name, 'effects')
-        _check_place(name, block, found, kind, drives, title_of(parameters))
+        _check_place(name, block, found, robot.kind, robot.drives, title_of(parameters))
         found = found.bound(robot)
         # A block that is not active is checked all the same, but may still be incomplete.
         if issubclass(found, DriveEffect):
-            found.check_bounds(block, turning)
+            found.check_bounds(block, robot.turning)
         effect = found.from_file(block, complete=name in active)
         if name in active:
             if name in of_sensors:

@@ -15,7 +15,7 @@ from functools import cache
 from typing import Any
 
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.three_pprs.robot import ELBOWS
+from pprs_dynamics.physics.three_pprs.geometry import ELBOWS
 
 EQUATIONS = ('corrected', 'printed')
 ANY = -1
@@ -177,24 +177,11 @@ KEYS: dict[str, Key] = {key.name: key for key in (
         upper=0.5, default=0.05),
 )}
 
-# A single axis: one prismatic drive, as on a bench.
-AXIS_KEYS: dict[str, Key] = {key.name: key for key in (
-    Key('axis.mass', 'M, all that the drive moves, rotor and screw included', 'kg',
-        positive=True),
-    Key('axis.viscous', 'F_v, viscous friction', 'N s/m', lower=0),
-    Key('axis.coulomb', 'F_c, dry friction', 'N', lower=0),
-    Key('axis.offset', 'constant force beside weight and friction', 'N', default=0.0),
-    Key('axis.gravity', 'gravity along the positive direction: -9.81 where that is up', 'm/s^2',
-        default=0.0),
-    Key('friction.reversal_velocity', 'width in which sgn turns over', 'm/s', positive=True),
-)}
-
-
 # Units of recorded efforts, and what they are in N m or N; amperes are multiplied by the gain.
 EFFORT_UNITS = {'N m': 1.0, 'N': 1.0, 'A': 1.0, 'mN m': 1e-3, 'mN': 1e-3, 'kN m': 1e3, 'kN': 1e3,
                 'N cm': 1e-2, 'kgf cm': 0.0980665, 'kgf m': 9.80665, 'kgf': 9.80665,
                 'lbf in': 0.1129848290276167}
-ROBOT, AXIS = 'robot', 'axis'  # blocks that describe a mechanism
+ROBOT = 'robot'  # block that describes a mechanism
 DRIVES_KEY, GAIN, LOCKED = 'robot.drives', 'robot.gain', 'robot.locked.'
 FILES = ('robot.urdf', 'robot.mjcf')  # keys that hold paths
 LOOPS = ('spherical', 'revolute', 'universal', 'cylindrical', 'prismatic', 'fixed')
@@ -299,11 +286,6 @@ ADDED = ('effects.', 'uncertainties.', 'tolerances.', 'history.', 'joint_map.', 
          'columns.', 'effort_kind', 'reference')
 
 
-def is_axis(names: Iterable[str]) -> bool:
-    """Return whether keys are those of a single axis, not of a 3-PPRS."""
-    return any(name.startswith('axis.') for name in names)
-
-
 def is_mechanism(names: Iterable[str]) -> bool:
     """Return whether keys are those of a robot that a description file describes."""
     return any(name.startswith('robot.') for name in names)
@@ -314,9 +296,9 @@ def title_of(parameters: Mapping[str, Any]) -> str:
     if any(name.startswith('robot.loops.') or (name == 'robot.mjcf' and value)
            for name, value in parameters.items()):
         return 'a robot with loops'
-    if is_mechanism(parameters):
-        return 'a serial arm'
-    return 'a single axis' if is_axis(parameters) else 'a 3-PPRS'
+    if not is_mechanism(parameters):
+        return 'a 3-PPRS'
+    return 'a single axis' if len(parameters.get(DRIVES_KEY, ())) == 1 else 'a serial arm'
 
 
 def keys_of(parameters: Mapping[str, Any]) -> dict[str, Key]:
@@ -325,11 +307,11 @@ def keys_of(parameters: Mapping[str, Any]) -> dict[str, Key]:
         drives = parameters.get(DRIVES_KEY, ())
         count = len(drives) if isinstance(drives, (list, tuple)) and drives else 1
         return {**mechanism_keys(count), **named_keys(parameters)}
-    return AXIS_KEYS if is_axis(parameters) else KEYS
+    return KEYS
 
 
 # Names of all keys of the model, of whatever kind.
-NAMES = frozenset({*KEYS, *AXIS_KEYS, *mechanism_keys(1)})
+NAMES = frozenset({*KEYS, *mechanism_keys(1)})
 
 
 # Keys of ROS 2 itself and of single nodes, which may stand in the same file.
@@ -348,7 +330,7 @@ NODE_PREFIXES = ('qos_overrides.',)
 
 
 def as_list(value: Any) -> Any:
-    """Return a tuple as the list that a file holds for it, and any other value as it is."""
+    """Return a tuple as a list, as in a file, and any other value unchanged."""
     return list(value) if isinstance(value, tuple) else value
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Margins:
     Parameters
     ----------
     singularity : float or None
-        See `ForceModel.singularity_margin`.
+        See `Robot.singularity_margin`.
     workspace : float
         Distance of a drive from an end of its stroke, over half the stroke.
     drive : str
@@ -33,13 +33,13 @@ class Margins:
     drive: str
 
 
-def margins(model: ForceModel, mechanism: Any) -> Margins:
+def margins(model: DriveModel, mechanism: Any) -> Margins:
     """Return the margins of a motion that the model has accepted.
 
     Parameters
     ----------
-    model : ForceModel
-    mechanism : ThreePprsState or MechanismState
+    model : DriveModel
+    mechanism : MechanismState
         What `model.drive_forces` returned with the forces.
     """
     lower, upper = model.strokes
@@ -49,5 +49,5 @@ def margins(model: ForceModel, mechanism: Any) -> Margins:
             upper - lower) * 2
     room = np.where(np.isnan(room), 1.0, room)
     nearest = int(room.argmin())
-    return Margins(model.singularity_margin(mechanism), float(room[nearest]),
+    return Margins(model.robot.singularity_margin(mechanism), float(room[nearest]),
                    model.drives[nearest])

@@ -7,10 +7,9 @@ A file that exists is edited: what does not change keeps its place and its comme
 diff against the old one shows what was changed and nothing else. The blocks `effects` and
 the ledger, which commands write, are written anew at the end of the model and of the file.
 
-A library that keeps comments, ruamel.yaml, formats the whole file anew. Of 15 forms in which a
-model file may be written it changed untouched lines in nine: four spaces of indentation (40
-lines), values in a column, spaces within brackets, lists over several lines, `~`, `.1E-2`, an
-anchor, what follows `---`. It also writes 1e-05, which is a word for YAML 1.1. Hence an editor.
+A library that keeps comments, ruamel.yaml, formats the whole file anew. It changed untouched
+lines in nine of 15 forms of a model file, among them indentation by four spaces, values in a
+column and lists over several lines. It also writes 1e-05, which is a word for YAML 1.1.
 """
 
 from __future__ import annotations
@@ -29,6 +28,7 @@ import yaml
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.catalogue import find_effect
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
     DRIVES_KEY,
     FILES,
@@ -37,7 +37,6 @@ from pprs_dynamics.physics.model.keys import (
     keys_of,
 )
 from pprs_dynamics.physics.model.ledger import BLOCK
-from pprs_dynamics.physics.model.model_file import build_model
 from pprs_dynamics.physics.model.parameter_file import (
     LEDGER,
     other_nodes,
@@ -127,7 +126,7 @@ def format_model(values: Mapping[str, Any], path: str = '') -> str:
     ModelError
         For values that are no model.
     """
-    build_model(values, path)
+    DriveModel.from_parameters(values, path)
     keys = keys_of(values)
     ordered = {key: values[key] for key in keys if key in values}
     ordered.update((key, value) for key, value in values.items() if key not in ordered
@@ -155,7 +154,7 @@ def edit_model(text: str, values: Mapping[str, Any], path: str = '') -> str:
     ModelError
         For values that are no model.
     """
-    build_model(values, path)
+    DriveModel.from_parameters(values, path)
     old = parse_parameters(text)
     keys = keys_of(values)
     wanted = {key: value for key, value in values.items()

@@ -1,10 +1,10 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The rigid body and the paper's friction in one pass over the samples.
+"""The rigid body and the model's own friction in one pass over the samples.
 
-No intermediate quantity is stored. The equations are the functions that `ThreePprsState` and the
-two effects call, too, which store every step and take three times as long.
+No intermediate quantity is stored. The equations are those that states and effects evaluate step
+by step, which takes three times as long.
 """
 
 from __future__ import annotations
@@ -14,18 +14,39 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array, Sample, Value
+from pprs_dynamics.physics.effects.effect import Effect
+from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
+from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
+from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.evaluation import evaluate
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_sample import motion_sample
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
+from pprs_dynamics.physics.mechanism.state import MechanismState
+from pprs_dynamics.physics.mechanism.tree_evaluation import InverseDynamicsResult
+from pprs_dynamics.physics.mechanism.tree_tables import (
+    ARMATURE,
+    COULOMB,
+    DRIVE_FRICTION,
+    JOINT_EFFORT,
+    OF_DRIVE,
+    OFFSET,
+    RIGID,
+    TOTAL,
+    VISCOUS,
+    WIDTH,
+    JointFriction,
+)
 from pprs_dynamics.physics.mechanism.vectors import Vector
-from pprs_dynamics.physics.model.force_model import (
+from pprs_dynamics.physics.model.forces import (
     ACTIVE_FRICTION,
     PASSIVE_FRICTION,
     RIGID_BODY,
+    Forces,
     total_force,
 )
-from pprs_dynamics.physics.model.limits import Limits
 from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction, drive_friction
 from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
 from pprs_dynamics.physics.three_pprs.closure import (
@@ -43,15 +64,17 @@ from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
 )
 from pprs_dynamics.physics.three_pprs.joint_rates import turnover
 from pprs_dynamics.physics.three_pprs.kernel_parameters import Joints, RobotParameters
-from pprs_dynamics.physics.three_pprs.passive_friction import WholeMechanismFriction
+from pprs_dynamics.physics.three_pprs.passive_friction import (
+    PassiveFriction,
+    WholeMechanismFriction,
+)
 from pprs_dynamics.physics.three_pprs.passive_joints import (
     JointResistance,
     friction_forces,
     joint_resistances,
 )
 from pprs_dynamics.physics.three_pprs.rigid_body import ThreeForces, body_forces
-from pprs_dynamics.physics.three_pprs.robot import Robot
-from pprs_dynamics.physics.three_pprs.state import MechanismKinematics, ThreePprsState
+from pprs_dynamics.physics.three_pprs.robot import ThreePprs
 
 
 class DriveFriction(NamedTuple):
@@ -65,18 +88,15 @@ class DriveFriction(NamedTuple):
 class ForcesParameters(NamedTuple):
     """Parameters of `forces_kernel`.
 
-    `printed` and `printed_friction` are 1 for the equations to the letter, else 0; `bound` is
-    the square of the condition number allowed, `reversal_rate` that of the passive joints
-    [rad/s], `drives` six of `DriveFriction`.
+    `printed` is 1 for Eq. (7) to the letter, else 0; `bound` is the square of the condition
+    number allowed, `drives` six of `DriveFriction`.
     """
 
     robot: RobotParameters
     platform_radius: Value
     printed: Value
-    printed_friction: Value
     minimum_sine: Value
     bound: Value
-    reversal_rate: Value
     joints: Joints
     drives: tuple[DriveFriction, ...]
 
@@ -87,58 +107,127 @@ FORCES = 4  # total and three parts
 SHORT = 2048
 
 
-class OnePass:
-    """A model without effects on the bodies, ready to be evaluated.
+class PlatformPass:
+    """One pass of the 3-PPRS.
 
     Parameters
     ----------
-    robot : Robot
+    robot : ThreePprs
     active : ActiveFriction
     passive : WholeMechanismFriction
-    limits : Limits
     reversal : Reversal
-    printed : bool
     """
 
-    def __init__(
-        self, robot: Robot, active: ActiveFriction, passive: WholeMechanismFriction,
-        limits: Limits, reversal: Reversal, printed: bool,
-    ) -> None:
-        self._robot, self._reversal, self._printed = robot, reversal, printed
-        self._bounds = limits.rod_sine, limits.condition_number
+    OWN = ActiveFriction, PassiveFriction
+
+    def __init__(self, robot: ThreePprs, active: ActiveFriction, passive: WholeMechanismFriction,
+                 reversal: Reversal) -> None:
+        self._robot, self._reversal = robot, reversal
         widths = reversal.widths(len(active.viscous)).tolist()
         drives = zip(active.viscous, active.coulomb, widths, strict=True)
         self.parameters = robot.kernel_parameters.extended(
-            ForcesParameters, robot.geometry.platform_radius, float(printed),
-            float(passive.printed), limits.rod_sine, limits.condition_number ** 2, reversal.rate,
-            passive.joints, tuple(DriveFriction(*drive) for drive in drives))
+            ForcesParameters, robot.geometry.platform_radius, float(robot.printed),
+            robot.bounds.rod_sine, robot.bounds.condition_number ** 2, passive.joints(reversal),
+            tuple(DriveFriction(*drive) for drive in drives))
 
-    def forces(self, motion: PlatformMotion) -> Array | None:
-        """Return total, rigid body, active and passive friction, (4, N, 6) [N].
+    def forces(self, motion: PlatformMotion, closed: object) -> Forces | None:
+        """Return the forces with the own friction.
 
-        For up to `SHORT` samples (7, N, 6): position, velocity and acceleration of the drives
-        follow [m, m/s, m/s^2]. None where a sample may be out of reach or too near a singularity:
-        the caller must check every sample then.
+        None where a sample may be out of reach or too near a singularity: the caller must check
+        every sample then.
         """
         rows = motion.rows
         table = np.empty((FORCES + 3 if len(rows) <= SHORT else FORCES, len(rows), 6))
-        return table if evaluate(forces_kernel, self.parameters, rows, table) < 0 else None
+        if evaluate(forces_kernel, self.parameters, rows, table) >= 0:
+            return None
+        drive_motion = ((table[FORCES], table[FORCES + 1], table[FORCES + 2])
+                        if len(table) > FORCES else None)
+        return Forces(table[0], lambda: {
+            RIGID_BODY: table[1], ACTIVE_FRICTION: table[2], PASSIVE_FRICTION: table[3]},
+            lambda: self._robot.state(motion, self._reversal, drive_motion=drive_motion),
+            drive_motion)
 
-    @staticmethod
-    def parts(table: Array) -> dict[str, Array]:
-        """Return the parts in a table of `forces` by name."""
-        return {RIGID_BODY: table[1], ACTIVE_FRICTION: table[2], PASSIVE_FRICTION: table[3]}
 
-    def mechanism(self, motion: PlatformMotion, table: Array) -> ThreePprsState:
-        """Return the state of the mechanism, not yet solved, for a motion and its forces."""
-        kinematics = MechanismKinematics(self._robot.geometry, motion, *self._bounds)
-        if len(table) > FORCES:
-            kinematics.__dict__['drive_motion'] = tuple(table[FORCES:])
-        return ThreePprsState(self._robot, motion, kinematics, self._reversal, self._printed)
+class TreePass:
+    """One pass of any other mechanism.
+
+    Parameters
+    ----------
+    robot : Mechanism
+    effects : tuple of Effect
+    reversal : Reversal
+    joints : JointFriction
+        The model's own.
+    """
+
+    OWN = AxisFriction, AxisOffset, ModelJointFriction
+
+    def __init__(self, robot: Mechanism, effects: tuple[Effect, ...], reversal: Reversal,
+                 joints: JointFriction) -> None:
+        self._robot, self._reversal, self._joints = robot, reversal, joints
+        self._own = [effect.name for effect in effects if isinstance(effect, self.OWN)]
+        self._actuators = np.zeros((OF_DRIVE, len(robot.drives)))
+        self._actuators[ARMATURE] = robot.armature
+        self._actuators[WIDTH] = reversal.velocity
+        for effect in effects:
+            if isinstance(effect, AxisFriction):
+                self._actuators[VISCOUS], self._actuators[COULOMB] = effect.viscous, effect.coulomb
+            elif isinstance(effect, AxisOffset):
+                self._actuators[OFFSET] = effect.value
+
+    def forces(self, motion: JointMotion | PlatformMotion, closed: dict[Any, Array] | None,
+               ) -> Forces | None:
+        """Return the forces with the own friction for a motion of the drives.
+
+        None for a motion of the tool, and where a sample is out of reach or singular.
+        """
+        if not isinstance(motion, JointMotion):
+            return None
+        structure = self._robot.structure
+        found = structure.evaluation.inverse_dynamics(
+            (motion.position, motion.velocity, motion.acceleration), self._robot.by_joint,
+            self._robot.gravity_row, self._joints, self._actuators,
+            nearby=None if closed is None else closed.get(structure))
+        if found is None:
+            return None
+        if closed is not None and structure.loops and len(motion):
+            closed[structure] = found.q[-1].copy()
+        return Forces(found.efforts[TOTAL], lambda: self._parts(found),
+                      lambda: self._state(motion, found),
+                      (motion.position, motion.velocity, motion.acceleration))
+
+    def _parts(self, found: InverseDynamicsResult) -> dict[str, Array]:
+        """Return the parts of efforts by name, in the order of the effects."""
+        offset = self._actuators[OFFSET] + np.zeros_like(found.efforts[TOTAL])
+        own = {AxisFriction.name: found.efforts[DRIVE_FRICTION], AxisOffset.name: offset,
+               ModelJointFriction.name: found.efforts[JOINT_EFFORT]}
+        return {RIGID_BODY: found.efforts[RIGID], **{name: own[name] for name in self._own}}
+
+    def _state(self, motion: JointMotion, found: InverseDynamicsResult) -> MechanismState:
+        """Return the state of the mechanism whose efforts are known already."""
+        state = self._robot.state(motion, self._reversal, self._joints)
+        vars(state).update(inverse_dynamics=found, rigid_force=found.efforts[RIGID])
+        return state
+
+
+def one_pass_of(robot: Any, effects: tuple[Effect, ...], reversal: Reversal,
+                joints: JointFriction) -> PlatformPass | TreePass | None:
+    """Return the one pass of a model; None where an effect changes the bodies.
+
+    The second approach to friction, Eq. (13), has none either.
+    """
+    if any(isinstance(effect, BodyEffect) for effect in effects):
+        return None
+    match robot, effects:
+        case ThreePprs(), (ActiveFriction() as active, WholeMechanismFriction() as passive, *_):
+            return PlatformPass(robot, active, passive, reversal)
+        case Mechanism(), _:
+            return TreePass(robot, effects, reversal, joints)
+    return None
 
 
 def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, parts: Any) -> Any:
-    """Fill tables of forces from one of motions, see `OnePass.forces`."""
+    """Fill tables of forces from one of motions, see `PlatformPass.forces`."""
     m, geometry = motion_sample(motion, s), p.robot.geometry
     rods = chain_motions(geometry, m)
     if len(parts) > FORCES:
@@ -150,7 +239,7 @@ def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, parts: Any) -> 
     nothing = Vector(zero, zero, zero)
     bodies = body_forces(p.robot, m, rods, inverse, Wrench(nothing, nothing), nothing, p.printed)
     k = _joint_resistances(p, rods, bodies)
-    passive = friction_forces(geometry, rods, inverse, k, p.printed_friction)
+    passive = friction_forces(geometry, rods, inverse, k, p.joints.printed)
     for i in range(CHAINS):
         c, f = rods[i], bodies[i]
         _write_forces(i, p, parts, s, f.slide, c.slide_velocity, f.slide_load, passive.slides[i])
@@ -166,7 +255,7 @@ def _joint_resistances(
 ) -> JointResistance:
     f = bodies[i]
     return joint_resistances(p.joints, f.H, f.V, f.W, f.V_star, f.W_star,
-                             turnover(rods[i].u_dot, rods[i].omega, p.reversal_rate))
+                             turnover(rods[i].u_dot, rods[i].omega, p.joints.width))
 
 
 def _write_forces(

@@ -13,31 +13,30 @@ from contextlib import suppress
 import numpy as np
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import load_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL
 
 LOOPS_MODEL = 'config/hexapod.yaml'  # what it needs serves every mechanism
 SAMPLES = 3  # more than one, as for recordings
 
 
-def prepare(model: ForceModel) -> None:
+def prepare(model: DriveModel) -> None:
     """Evaluate a model once, both ways, alone and in a batch.
 
     A robot that cannot be at home refuses it, after what is needed has been compiled. Effects that
-    fail are told of when they are asked for an answer.
+    fail raise their error in the first real call.
     """
-    home = model.at_home(SAMPLES)
+    home = model.robot.at_home(SAMPLES)
     with suppress(PprsError):
         model = model.sound_at(home)
         forces = model.drive_forces(home)
         model.drive_forces(home[:1])
         position = forces.drive_motion[0]
-        model.motion_of_drives(position, np.zeros_like(position), np.zeros_like(position))
+        model.robot.motion_of_drives(position, np.zeros_like(position), np.zeros_like(position))
         for effect in model.effects:
             effect.force(forces.mechanism, effect.initial_memory())
 
 
 if __name__ == '__main__':
     for file in DEFAULT_MODEL, LOOPS_MODEL:
-        prepare(load_model(file))
+        prepare(DriveModel.load(file))

@@ -15,7 +15,9 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
+from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 from pprs_dynamics.physics.three_pprs.passive_friction import (
@@ -23,7 +25,7 @@ from pprs_dynamics.physics.three_pprs.passive_friction import (
     PassiveFriction,
     WholeMechanismFriction,
 )
-from pprs_dynamics.physics.three_pprs.state import ThreePprsState
+from pprs_dynamics.physics.three_pprs.robot import ThreePprs
 
 # Of the paper's path; fine enough that rms figures no longer change in four digits.
 SAMPLES = 9425
@@ -84,9 +86,13 @@ def reproduce(model: DriveModel) -> Reproduction:
 
     Raises
     ------
+    ModelError
+        For another robot than a 3-PPRS.
     WorkspaceError, SingularityError
-        Where another robot than the paper's cannot follow the path.
+        Where another 3-PPRS than the paper's cannot follow the path.
     """
+    if not isinstance(model.robot, ThreePprs):
+        raise ModelError('--model', model.source, 'be a 3-PPRS, as the paper is on one')
     path = HelicalPath(radius=model.robot.geometry.base_radius)
     time = np.linspace(0.0, path.duration, SAMPLES)
     mechanism = model.mechanism(path.motion(time))
@@ -95,27 +101,28 @@ def reproduce(model: DriveModel) -> Reproduction:
     approaches: tuple[PassiveFriction, ...] = (
         WholeMechanismFriction(given.revolute, given.spherical, given.printed),
         IndependentChainsFriction(given.revolute, given.spherical, given.printed,
-                                  model.limits.rod_cosine))
+                                  model.values['limits.rod_cosine']))
     passive = {effect.approach: _where_defined(effect, mechanism) for effect in approaches}
     hard_model = replace(model, reversal=replace(
         model.reversal, velocity=HARD_REVERSAL, rate=HARD_REVERSAL))
     hard = hard_model.mechanism(path.motion(time))
     return Reproduction(
-        time, mechanism.rigid_body.force, active, passive, mechanism.chains.rod_angle,
+        time, mechanism.rigid_force, active, passive, mechanism.links.chains.rod_angle,
         tuple(_claims(hard, _effect(model, ActiveFriction), approaches)))
 
 
 def _claims(
-    state: ThreePprsState, active_friction: ActiveFriction,
+    state: MechanismState, active_friction: ActiveFriction,
     approaches: tuple[PassiveFriction, ...],
 ) -> list[Claim]:
-    Q, active = state.rigid_body.force, active_friction.force(state)
+    Q, active = state.rigid_force, active_friction.force(state)
     first, second = (_where_defined(effect, state) for effect in approaches)
     friction = active + first
     share = 100 * _rms(friction) / _rms(Q + friction)
-    u = np.degrees(state.chains.rod_angle)
+    chains = state.links.chains
+    u = np.degrees(chains.rod_angle)
     # A rod that leans down has a negative angle; upright is 90 degrees either way.
-    crossed = bool(np.any(state.chains.cos_u.min(axis=0) * state.chains.cos_u.max(axis=0) < 0))
+    crossed = bool(np.any(chains.cos_u.min(axis=0) * chains.cos_u.max(axis=0) < 0))
     near = _approach_at(approaches[1], state, 1e-3)
     a, p1, p2 = _rms(active), _rms(first), _rms(second)
     passive_share = float(np.max(p1 / _rms(Q + friction)))
@@ -147,13 +154,13 @@ def _claims(
     ]
 
 
-def _approach_at(effect: PassiveFriction, state: ThreePprsState, cosine: float) -> float:
+def _approach_at(effect: PassiveFriction, state: MechanismState, cosine: float) -> float:
     assert isinstance(effect, IndependentChainsFriction)
     force = _where_defined(replace(effect, minimum_cosine=cosine), state)
     return float(np.nanmax(np.abs(force)))
 
 
-def _where_defined(effect: PassiveFriction, state: ThreePprsState) -> Array:
+def _where_defined(effect: PassiveFriction, state: MechanismState) -> Array:
     """Return the effect's force, NaN where it refuses."""
     if isinstance(effect, IndependentChainsFriction):
         # Evaluated with the bound lifted, so that refused samples can be blanked one by one.

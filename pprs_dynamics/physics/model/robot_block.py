@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -13,29 +12,69 @@ from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
+from pprs_dynamics.physics.effects.effect import Effect
+from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.mechanism.description import (
-    PARAMETERS,
-    PRISMATIC,
+    REVOLUTE,
     Description,
     Frame,
-    Joint,
     Loop,
     Transmission,
-    body_at,
 )
+from pprs_dynamics.physics.mechanism.evaluation import not_compiling_yet
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
+from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure, pose_frame
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
 from pprs_dynamics.physics.model.keys import DRIVES_KEY, FILES, LOCKED, MOTORS, POSE
+from pprs_dynamics.physics.model.limits import DriveLimits
+from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
 from pprs_dynamics.system.package_files import located
 
-AXIS = 'axis'  # the joint, and drive, of a single axis
 # Joints whose motors do not move one joint each.
 COUPLED = ('differential', 'fourbar')
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)  # [m/s^2] where no description has it
+# Elements of an inertia tensor: as files have them, and as `Mechanism` has them.
+OF_FILES, OF_MECHANISM = ('xx', 'yy', 'zz', 'xy', 'xz', 'yz'), ('xx', 'xy', 'yy', 'xz', 'yz', 'zz')
+FROM_FILES = [OF_FILES.index(axes) for axes in OF_MECHANISM]
+TO_FILES = [OF_MECHANISM.index(axes) for axes in OF_FILES]
+
+
+def require_drives(parameters: Mapping[str, Any]) -> None:
+    """Raise ModelError for an empty list of drives, before keys of their number are checked."""
+    if DRIVES_KEY in parameters and not parameters[DRIVES_KEY]:
+        raise ModelError(DRIVES_KEY, parameters[DRIVES_KEY], 'name at least one joint')
+
+
+def read_mechanism(values: dict[str, Any], folder: Path,
+                   ) -> tuple[Mechanism, tuple[Effect, ...], Reversal, DriveLimits]:
+    """Return a mechanism, its own friction, its smoothing and limits.
+
+    The checked values are completed by those of the description.
+    """
+    structure = read_structure(values, folder)
+    values.update(described_values(structure, values))
+    robot = _with_bodies(structure, values)
+    common = values['friction.reversal_velocity']
+    width = tuple(own or common for own in values['friction.reversal_velocities'])
+    return (robot, (AxisFriction(values['friction.viscous'], values['friction.coulomb']),
+                    AxisOffset(values['friction.offset']), *passive_friction(structure, values)),
+            Reversal(width, values['friction.reversal_rate'], values['friction.reversal_slide']),
+            joint_limits(structure))
+
+
+def joint_limits(structure: Structure) -> DriveLimits:
+    """Return the ranges and efforts that a description has; infinite where it has none."""
+    units = [DriveUnits(kind == REVOLUTE) for kind in structure.kinds]
+    return DriveLimits(
+        structure.drives, tuple(one.position for one in units), tuple(one.effort for one in units),
+        structure.lower, structure.upper, structure.effort,
+        ('its range in the URDF',) * len(units), 'the effort limit of URDF or node')
 
 
 def read_structure(values: dict[str, Any], folder: Path) -> Structure:
@@ -64,36 +103,6 @@ def read_structure(values: dict[str, Any], folder: Path) -> Structure:
                 if key.startswith(('robot.home.', 'robot.loops.', LOCKED)))
     return _structure(description, values['robot.base'], values['robot.tool'],
                       values[DRIVES_KEY], own)
-
-
-def axis_mechanism(mass: float, gravity: float) -> Mechanism:
-    """Return a carriage on a slide, at the slope at which gravity along it is what is given.
-
-    Parameters
-    ----------
-    mass : float
-        [kg]
-    gravity : float
-        Along the positive direction [m/s^2]. Without any, what rubs is preload and the weight on
-        the guide, constant and unknown.
-    """
-    g = max(abs(gravity), -STANDARD_GRAVITY[2])
-    structure = _slide(gravity / g)
-    rows = np.array([structure.rows[AXIS]])
-    carriage = body_at(mass, (0.0, 0.0, 0.0), np.zeros((3, 3)))[None]
-    return Mechanism(structure, rows, carriage, np.zeros(1), (0.0, 0.0, -g),
-                     load_is_known=gravity != 0)
-
-
-@lru_cache(maxsize=64)
-def _slide(down: float) -> Structure:
-    """Return the structure of an axis; `down`, the sine of its slope."""
-    carriage = body_at(1.0, (0.0, 0.0, 0.0), np.zeros((3, 3)))
-    joint = Joint(AXIS, PRISMATIC, 'base', 'carriage', Frame(),
-                  np.array([math.sqrt(1 - down * down), 0.0, -down]))
-    return build_structure(
-        Description('', {'base': np.zeros(PARAMETERS), 'carriage': carriage}, {AXIS: joint}, ''),
-        'base', 'carriage', (AXIS,))
 
 
 @lru_cache(maxsize=64)
@@ -151,7 +160,7 @@ def coupled(description: Description) -> list[Transmission]:
 
 
 def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return keys and values that the file leaves to the description, complete with defaults.
+    """Return keys and values that a description gives where the file is silent, with defaults.
 
     Raises
     ------
@@ -247,3 +256,50 @@ def passive_friction(structure: Structure, values: Mapping[str, Any],
                              'be greater than 0 beside coulomb: the load rubs at it [m]')
     if blocks:
         yield ModelJointFriction(blocks)
+
+
+def inertial_values(inertial: Array) -> dict[str, tuple[float, ...]]:
+    """Return the keys and values in files of inertial parameters (B, 10); see `Mechanism`."""
+    return {'links.mass': tuple(inertial[:, 0].tolist()),
+            'links.moment': tuple(inertial[:, 1:4].ravel().tolist()),
+            'links.inertia': tuple(inertial[:, 4:][:, TO_FILES].ravel().tolist())}
+
+
+def _with_bodies(structure: Structure, values: Mapping[str, Any]) -> Mechanism:
+    """Return the mechanism with its bodies, from the file where it has them."""
+    bodies = np.flatnonzero(structure.inertial.any(axis=1))
+    inertial = structure.inertial[bodies]
+    for key, first, size in (('links.mass', 0, 1), ('links.moment', 1, 3),
+                             ('links.inertia', 4, 6)):
+        if not values[key]:
+            continue
+        if len(values[key]) != size * len(bodies):
+            names = ', '.join(structure.moved_by[int(row)] for row in bodies)
+            raise ModelError(key, list(values[key]), f'hold {size * len(bodies)} numbers, {size} '
+                             f'for each of {names}')
+        given = np.reshape(values[key], (-1, size))
+        inertial[:, first:first + size] = given[:, FROM_FILES] if size == 6 else given
+    for row, (mass, *moment) in zip(bodies, inertial[:, :4], strict=True):
+        if mass < 0 or (mass == 0 and any(moment)):
+            name = next(name for name, at in structure.rows.items() if at == row)
+            raise ModelError('links.mass', float(mass), f'be greater than 0 for what {name} moves')
+    robot = Mechanism(structure, bodies, inertial, np.array(values['robot.armature']),
+                      gravity_in_efforts(values, 'robot.gravity'), joint_radii(values),
+                      motor_map(structure, values))
+    _require_driven_bodies(robot)
+    return robot
+
+
+def _require_driven_bodies(robot: Mechanism) -> None:
+    """Raise ModelError for a drive that moves no mass at home."""
+    structure = robot.structure
+    home = structure.home[None, structure.tables.drives]
+    for d, name in enumerate(structure.drives):
+        pushed = np.zeros_like(home)
+        pushed[0, d] = 1.0
+        rest = np.zeros_like(home)
+        with not_compiling_yet():
+            moved, still = (robot.torques(home, rest, one)[0, d] for one in (pushed, rest))
+        if not moved - still + robot.armature[d] > 0:
+            raise ModelError(DRIVES_KEY, name,
+                             'move a body: no link that it moves has a mass')

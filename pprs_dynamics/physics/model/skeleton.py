@@ -11,11 +11,9 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.mechanism import LinkMotion
+from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import joint_positions
 
 LINK, DRIVE, GUIDE = 'link', 'drive', 'guide'
@@ -69,18 +67,16 @@ class Skeleton:
     labels: dict[str, int]
 
     @classmethod
-    def of(cls, model: ForceModel, motion: PlatformMotion | JointMotion,
-           ) -> Skeleton:
+    def of(cls, model: DriveModel, motion: PlatformMotion | JointMotion) -> Skeleton:
         """Return the poses of a motion of a model."""
-        if isinstance(model, MechanismModel):
-            return _of_links(model, model.mechanism(motion).links)
-        assert isinstance(model, DriveModel)
-        assert isinstance(motion, PlatformMotion)
-        return _of_platform(model, motion)
+        if model.robot.structure is None:
+            assert isinstance(motion, PlatformMotion)
+            return _of_platform(model, motion)
+        return _of_links(model, model.mechanism(motion).links)
 
 
 def _of_platform(model: DriveModel, motion: PlatformMotion) -> Skeleton:
-    geometry, strokes = model.robot.geometry, model.limits.slide_stroke
+    geometry, strokes = model.robot.geometry, model.values['limits.slide_stroke']
     found = joint_positions(geometry, motion)
     points: list[Array] = []
     lines: list[Line] = []
@@ -105,7 +101,7 @@ def _of_platform(model: DriveModel, motion: PlatformMotion) -> Skeleton:
                     tuple(joints[f'A_{i}'] for i in (1, 2, 3)), joints, {}, labels)
 
 
-def _of_links(model: MechanismModel, links: LinkMotion) -> Skeleton:
+def _of_links(model: DriveModel, links: LinkMotion) -> Skeleton:
     s, m = model.robot.structure, links.motion
     t, size = s.tables, s.size
     count = len(t.parent)

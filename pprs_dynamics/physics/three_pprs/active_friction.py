@@ -12,7 +12,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import Effect
-from pprs_dynamics.physics.three_pprs.state import ThreePprsState
+from pprs_dynamics.physics.mechanism.state import MechanismState
 
 SixFloats = tuple[float, float, float, float, float, float]
 
@@ -38,7 +38,7 @@ class ActiveFriction(Effect):
     viscous: SixFloats
     coulomb: SixFloats
 
-    def force(self, state: ThreePprsState, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return Delta Q^m, (N, 6) [N]."""
         Q_m: Array = drive_friction(np.asarray(self.viscous), np.asarray(self.coulomb),
                                     state.velocity, state.friction_load, state.direction)

@@ -27,8 +27,8 @@ from pprs_dynamics.physics.mechanism.motion_sample import (
 )
 from pprs_dynamics.physics.mechanism.vectors import ChainVector, Vector, add, cross, in_chain
 from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
+from pprs_dynamics.physics.three_pprs.geometry import Geometry
 from pprs_dynamics.physics.three_pprs.kernel_parameters import Chain, GeometryParameters
-from pprs_dynamics.physics.three_pprs.robot import Geometry
 
 CHAIN_COLUMNS = 48
 

@@ -25,8 +25,8 @@ from pprs_dynamics.physics.three_pprs.closure import (
     inverse_kernel,
     rod_row,
 )
+from pprs_dynamics.physics.three_pprs.geometry import Geometry
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import ChainKinematics
-from pprs_dynamics.physics.three_pprs.robot import Geometry
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,9 @@ REVOLUTE, SPHERICAL = 'revolute', 'spherical'  # names of the joints C_i and A_i
 class Chain(NamedTuple):
     """Constants of one chain.
 
-    `cos` and `sin` of delta_i; `x`, `y` of the spherical joint in `platform` [m]. The slides
-    alone say how the platform moves horizontally, (v_x, v_y) = sum of (`left_x`, `left_y`) times
-    the speed of A_i along n_i, and one thing more: the sum of `balance` times these speeds is 0
-    for a platform that does not turn.
+    `cos` and `sin` of delta_i; `x`, `y` of the spherical joint in `platform` [m].
+    With s_i, the speed of A_i along n_i, (v_x, v_y) = sum of (`left_x`, `left_y`) s_i. The sum
+    of `balance` s_i is 0 for a platform that does not turn.
     """
 
     cos: Value
@@ -68,8 +67,13 @@ class RobotParameters(NamedTuple):
 
 
 class Joints(NamedTuple):
-    """Friction of C_i and of A_i: c [N m s/rad], M [N m] at any load, mu [1] and d [m]."""
+    """Friction of C_i and of A_i: c [N m s/rad], M [N m] at any load, mu [1] and d [m].
 
+    It turns over within `width` [rad/s]; `printed` is 1 for Eq. (12) to the letter, else 0.
+    """
+
+    width: Any
+    printed: Any
     c_r: Value = 0.0
     M_r: Value = 0.0
     mu_r: Value = 0.0
@@ -80,15 +84,16 @@ class Joints(NamedTuple):
     d_s: Value = 0.0
 
     @classmethod
-    def of(cls, blocks: Mapping[str, Mapping[str, float]]) -> Joints:
-        """Return the friction of blocks `revolute` and `spherical`; 0 for what is left out.
+    def of(cls, blocks: Mapping[str, Mapping[str, float]], width: float) -> Joints:
+        """Return the friction of blocks `revolute` and `spherical`; 0 by default.
 
         Parameters
         ----------
         blocks : mapping of str to mapping
             `viscous`, `torque`, `coulomb` and `radius`.
+        width : float
         """
-        return cls(*(
+        return cls(width, 0.0, *(
             factor * block.get(key, 0.0)
             for block in (blocks.get(REVOLUTE, {}), blocks.get(SPHERICAL, {}))
             for key, factor in (('viscous', 1.0), ('torque', 1.0), ('coulomb', 1.0),

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,9 +19,10 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.physics.effects.effect import Effect
+from pprs_dynamics.physics.mechanism.reversal import Reversal
+from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.three_pprs.joint_rates import relative_rate
 from pprs_dynamics.physics.three_pprs.kernel_parameters import Joints
-from pprs_dynamics.physics.three_pprs.state import ThreePprsState
 
 
 @dataclass(frozen=True)
@@ -62,14 +62,14 @@ class PassiveFriction(Effect):
     spherical: JointCoefficients
     printed: bool = False
 
-    @cached_property
-    def joints(self) -> Joints:
-        """The coefficients as kernels take them."""
-        return Joints(*(value for joint in (self.revolute, self.spherical)
-                        for value in (joint.viscous, 0.0, joint.coulomb, joint.diameter)))
+    def joints(self, reversal: Reversal) -> Joints:
+        """Return the coefficients as kernels take them."""
+        return Joints(reversal.rate, float(self.printed), *(
+            value for joint in (self.revolute, self.spherical)
+            for value in (joint.viscous, 0.0, joint.coulomb, joint.diameter)))
 
     @abstractmethod
-    def force(self, state: ThreePprsState, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return Delta Q^p, (N, 6) [N]."""
 
 
@@ -79,9 +79,9 @@ class WholeMechanismFriction(PassiveFriction):
 
     approach: ClassVar[str] = 'whole_mechanism'
 
-    def force(self, state: ThreePprsState, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return Delta Q^p, (N, 6) [N], by virtual power."""
-        return state.against_friction(self.joints, self.printed)
+        return state.against_friction(self.joints(state.reversal))
 
 
 @dataclass(frozen=True)
@@ -96,19 +96,19 @@ class IndependentChainsFriction(PassiveFriction):
     Notes
     -----
     An approximation in either form: it is unbounded where cos u_i = 0, where it refuses, and
-    even with the signs mended its friction power can be negative. Use it to reproduce the
+    even with the signs corrected its friction power can be negative. Use it to reproduce the
     paper, not to drive a robot.
     """
 
     approach: ClassVar[str] = 'independent_chains'
     minimum_cosine: float = 0.05
 
-    def singular(self, state: ThreePprsState) -> np.ndarray:
+    def singular(self, state: MechanismState) -> np.ndarray:
         """Return the samples at which this approach is not defined, (N,) bool."""
-        mask: np.ndarray = np.any(np.abs(state.chains.cos_u) < self.minimum_cosine, axis=1)
+        mask: np.ndarray = np.any(np.abs(state.links.chains.cos_u) < self.minimum_cosine, axis=1)
         return mask
 
-    def force(self, state: ThreePprsState, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return Delta Q^p, (N, 6) [N].
 
         Raises
@@ -119,17 +119,19 @@ class IndependentChainsFriction(PassiveFriction):
         singular = self.singular(state)
         if np.any(singular):
             sample = int(np.argmax(singular))
-            smallest = np.abs(state.chains.cos_u[sample])
+            smallest = np.abs(state.links.chains.cos_u[sample])
             raise SingularityError(
                 sample, f'|cos u| of chain {int(np.argmin(smallest)) + 1} is '
                 f'{smallest.min():.3g}, where friction.approach independent_chains is unbounded',
                 f'limits.rod_cosine is {self.minimum_cosine:g}')
-        k_r, k_s = np.hsplit(state.resistances(self.joints), 2)
-        omega_n = relative_rate(state.chains.u_dot, state.chains.angular_velocity)
-        lever = state.robot.geometry.rod_length * state.chains.cos_u
+        chains = state.links.chains
+        k_r, k_s = np.hsplit(state.links.resistances(
+            state.reactions, self.joints(state.reversal)), 2)
+        omega_n = relative_rate(chains.u_dot, chains.angular_velocity)
+        lever = state.robot.geometry.rod_length * chains.cos_u
         sign = -1.0 if self.printed else 1.0
         M_s_up, M_s_n = -k_s * omega_n.k, -k_s * omega_n.n                     # Eq. (9)
-        M_r_n = -k_r * state.chains.u_dot                                      # Eq. (9)
+        M_r_n = -k_r * chains.u_dot                                            # Eq. (9)
         slides = sign * M_s_up / lever                                         # Eq. (13)
         lifts = sign * (M_s_n + M_r_n) / lever                                 # Eq. (13)
         return np.concatenate((slides, lifts), axis=1)

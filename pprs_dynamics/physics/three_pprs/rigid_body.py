@@ -18,7 +18,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, Sample, Value
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
-from pprs_dynamics.physics.mechanism.evaluation import evaluate
+from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_sample import (
     MotionSample,
@@ -57,7 +57,6 @@ from pprs_dynamics.physics.three_pprs.kernel_parameters import (
     PlatformBody,
     RobotParameters,
 )
-from pprs_dynamics.physics.three_pprs.robot import Robot
 
 
 class Reactions(NamedTuple):
@@ -82,7 +81,7 @@ class RigidBody:
 
     Parameters
     ----------
-    force : (N, 6) array
+    efforts : (N, 6) array
         Q_i [N] in drive order.
     guide_load : (N, 6) array
         Normal force on the guide of every drive [N], the root in Eq. (15) and (16).
@@ -90,7 +89,7 @@ class RigidBody:
         `reactions` as kernels take them.
     """
 
-    force: Array
+    efforts: Array
     guide_load: Array
     reaction_table: Array
 
@@ -119,9 +118,10 @@ class ChainForces(NamedTuple):
 def platform_wrench(body: PlatformBody, g: Vector, m: MotionSample) -> Wrench:
     """Return the wrench about o that moves platform and payload, in `base` [N, N m].
 
-    Left side of Eq. (6) minus weight, with the centre of mass anywhere: with d its vector from
-    o, force (M + m)(a_o + eps x d + omega x (omega x d) - g) and moment
-    [I]eps + omega x [I]omega + d x force.
+    Left side of Eq. (6) minus weight, with the centre of mass anywhere. With d its vector from o:
+
+        force = (M + m)(a_o + eps x d + omega x (omega x d) - g)
+        moment = [I]eps + omega x [I]omega + d x force
     """
     d = turned(m.rotation, body.centre)
     a_centre = plus(m.a, plus(product(m.epsilon, d), product(m.omega, product(m.omega, d))))
@@ -260,21 +260,21 @@ def body_kernel(
 
 
 def solve_bodies(
-    robot: Robot, motion: PlatformMotion, chains: Array, inverse: Array, printed: bool,
-    load: StructureLoad | None,
+    robot: KernelParameters[RobotParameters], motion: PlatformMotion, chains: Array,
+    inverse: Array, printed: bool, load: StructureLoad | None,
 ) -> RigidBody:
     """Return frictionless drive forces, reactions and guide loads.
 
     Parameters
     ----------
-    robot : Robot
+    robot : KernelParameters
     motion : PlatformMotion
     chains, inverse : arrays
         See `chain_table` and `inverse_table`.
     printed : bool
         Take Eq. (7) to the letter, which lacks the factor l in its rod term.
     load : StructureLoad, optional
-        Loads beside bodies and gravity.
+        Loads in addition to bodies and gravity.
     """
     samples = len(motion)
     force, guide_load = np.empty((samples, 6)), np.empty((samples, 6))
@@ -283,7 +283,7 @@ def solve_bodies(
     if load is not None:
         loads[:, :6] = load.wrench
         loads[:, 6:] = load.torques.get(REVOLUTE, 0.0)
-    parameters = robot.kernel_parameters.extended(BodyParameters, printed)
+    parameters = robot.extended(BodyParameters, printed)
     evaluate(body_kernel, parameters, motion.rows, chains, inverse, loads, force, guide_load,
              reactions)
     return RigidBody(force, guide_load, reactions)

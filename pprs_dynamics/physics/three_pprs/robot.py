@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The robot: geometry, masses and gravity."""
+"""The 3-PPRS with its bodies, evaluated by the paper's closed form."""
 
 from __future__ import annotations
 
@@ -10,174 +10,66 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import COUNT, DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.evaluation import KernelParameters
-from pprs_dynamics.physics.mechanism.places import BodyPlace, PassiveJoint
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.places import PLATFORM, BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal
-from pprs_dynamics.physics.mechanism.vectors import ChainVector, Vector, in_base
+from pprs_dynamics.physics.mechanism.state import MechanismState
+from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.vectors import Vector
+from pprs_dynamics.physics.three_pprs.forward_motion import platform_rates, solve_forward_motion
+from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
+from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.kernel_parameters import (
     REVOLUTE,
     SPHERICAL,
-    Chain,
     ChainMasses,
-    GeometryParameters,
     Joints,
     PlatformBody,
     RobotParameters,
 )
+from pprs_dynamics.physics.three_pprs.kinematics import PlatformKinematics
+from pprs_dynamics.physics.three_pprs.rigid_body import RigidBody, solve_bodies
 
 RODS = 'rods'
-ELBOWS = ('up', 'down')
+HOME_HEIGHT = 0.5  # [m], of the platform at home
+POSITION_STEP = 3e-5  # of a rod's length, for derivatives by a drive's position
+# The condition number of a long trajectory is computed at this many samples, evenly spread:
+# neighbours hardly differ, and a singular value decomposition costs more than the model.
+MOST_CONDITIONS = 64
 
 
-class ChainFrames:
-    """The three chain frames (e_i, n_i, k) in `base`.
-
-    Parameters
-    ----------
-    angles : sequence of 3 floats
-        Chain angles delta_i [rad].
-    """
-
-    def __init__(self, angles: tuple[float, float, float]) -> None:
-        self.cos = np.cos(angles)
-        self.sin = np.sin(angles)
-
-    def base(self, vector: ChainVector) -> Array:
-        """Return one vector per chain in `base`, (N, 3, 3): samples, chains, components."""
-        result = np.empty((*np.shape(vector.e), 3))
-        result[..., 0], result[..., 1], result[..., 2] = in_base(self, vector)
-        return result
-
-
-@dataclass(frozen=True)
-class Geometry:
-    """Lengths and angles of the mechanism.
+class SingularityBounds(NamedTuple):
+    """Distances that poses must keep from singularities.
 
     Parameters
     ----------
-    base_radius, platform_radius, rod_length : float
-        R, r and l [m].
-    chain_angles, platform_angles : 3 floats
-        delta_i on the base and delta'_i on the platform [rad].
-    elbow : {'up', 'down'}
-        Branch of the inverse kinematics: 'up' has sin u_i > 0, the carriage below the platform.
+    rod_sine : float
+        Smallest abs(sin u_i); at 0 a rod is horizontal and the inverse kinematics singular.
+    condition_number : float
+        Largest condition number of the drive Jacobian, rotations times r.
+    rod_cosine : float
+        Smallest abs(cos u_i); infinitely small unless chains are independent, Eq. (13).
     """
 
-    base_radius: float
-    platform_radius: float
-    rod_length: float
-    chain_angles: tuple[float, float, float]
-    platform_angles: tuple[float, float, float]
-    elbow: str = 'up'
+    rod_sine: float = 1e-6
+    condition_number: float = inf
+    rod_cosine: float = 0.0
 
-    def __post_init__(self) -> None:
-        for name in ('base_radius', 'platform_radius', 'rod_length'):
-            _require(f'geometry.{name}', getattr(self, name), getattr(self, name) > 0,
-                     'be greater than 0 m')
-        for name in ('chain_angles', 'platform_angles'):
-            angles = np.asarray(getattr(self, name), dtype=float)
-            _require(f'geometry.{name}', getattr(self, name), angles.shape == (3,),
-                     'hold three angles [rad]')
-            distance = np.abs(np.exp(1j * angles) - np.exp(1j * np.roll(angles, 1)))
-            _require(f'geometry.{name}', getattr(self, name), bool(np.all(distance > 1e-6)),
-                     'hold three different directions')
-        _require('geometry.elbow', self.elbow, self.elbow in ELBOWS, 'be one of up, down')
-        turned = np.subtract(self.platform_angles, self.chain_angles)
-        span = np.abs(self.base_radius - self.platform_radius * np.cos(turned)).max()
-        _require('geometry.rod_length', self.rod_length, bool(span < self.rod_length),
-                 f'be greater than {span:.6g} m, for the platform to stand unturned above the '
-                 'base')
 
-    @property
-    def elbow_sign(self) -> float:
-        """Sign of sin u_i."""
-        return 1.0 if self.elbow == 'up' else -1.0
-
-    @cached_property
-    def frames(self) -> ChainFrames:
-        """The frames of the chains."""
-        return ChainFrames(self.chain_angles)
-
-    @cached_property
-    def kernel_parameters(self) -> KernelParameters[GeometryParameters]:
-        """Lengths and the constants of the chains."""
-        frames, delta = self.frames, np.asarray(self.chain_angles)
-        joints = self.platform_radius * np.exp(1j * np.asarray(self.platform_angles))
-        left = np.linalg.pinv(np.stack((-frames.sin, frames.cos), axis=1))
-        # The weights with which the three directions n_i add up to nothing.
-        balance = np.sin(np.roll(delta, -2) - np.roll(delta, -1))
-        constants = np.stack((frames.cos, frames.sin, joints.real, joints.imag, *left, balance),
-                             axis=1).tolist()
-        first, second, third = (Chain(*chain) for chain in constants)
-        return KernelParameters(GeometryParameters(
-            self.base_radius, self.rod_length, self.elbow_sign, (first, second, third)))
+UNBOUNDED = SingularityBounds()
 
 
 @dataclass(frozen=True)
-class Masses:
-    """Masses and the inertia of the platform with its payload.
-
-    Parameters
-    ----------
-    platform, payload : float
-        M and m [kg].
-    slides, lifts, rods : 3 floats each
-        m_1..m_3, m_4..m_6 and m_b of each chain [kg].
-    centre : 3 floats
-        Centre of mass of platform and payload from o, in `platform` [m].
-    inertia : 6 floats
-        Elements xx, yy, zz, xy, xz, yz of the inertia tensor of both about that centre, in
-        `platform` [kg m^2]; products as tensor elements (-integral of x y dm), as in a URDF.
-    """
-
-    platform: float
-    payload: float
-    slides: tuple[float, float, float]
-    lifts: tuple[float, float, float]
-    rods: tuple[float, float, float]
-    centre: tuple[float, float, float]
-    inertia: tuple[float, float, float, float, float, float]
-
-    def __post_init__(self) -> None:
-        for name, value in (('platform', self.platform), ('payload', self.payload)):
-            _require(f'masses.{name}', value, value >= 0, 'be at least 0 kg')
-        for name in ('slides', 'lifts', 'rods'):
-            value = getattr(self, name)
-            _require(f'masses.{name}', value, len(value) == 3 and min(value) >= 0,
-                     'hold three masses of at least 0 kg')
-        _require('masses.platform', self.platform, self.total > 0,
-                 'with masses.payload be greater than 0 kg')
-        # A body's tensor has principal moments that satisfy the triangle inequality; a point
-        # mass has none at all. Tolerance: a thin disc lies exactly on the border.
-        moments = np.linalg.eigvalsh(self.inertia_tensor)
-        slack = 1e-9 * max(float(moments[2]), 1e-300)
-        _require('masses.inertia', self.inertia, bool(moments[0] >= -slack),
-                 'be a positive semi-definite tensor')
-        triangle = bool(moments[0] + moments[1] >= moments[2] - slack)
-        _require('masses.inertia', self.inertia, triangle,
-                 'have principal moments of which each two sum to at least the third')
-
-    @property
-    def total(self) -> float:
-        """M + m [kg]."""
-        return self.platform + self.payload
-
-    @property
-    def inertia_tensor(self) -> Array:
-        """Inertia tensor about the centre of mass, in `platform`, (3, 3) [kg m^2]."""
-        xx, yy, zz, xy, xz, yz = self.inertia
-        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-@dataclass(frozen=True)
-class Robot:
-    """The rigid mechanism: all that the frictionless dynamics needs.
+class ThreePprs:
+    """The 3-PPRS; its members are those of `Mechanism`.
 
     Parameters
     ----------
@@ -187,16 +79,26 @@ class Robot:
         Gravity acceleration in `base` [m/s^2].
     radii : 2 floats
         At which loads of C_i and A_i rub [m], where known.
+    bounds : SingularityBounds
+    printed : bool
+        Take Eq. (7) to the letter.
     """
 
     geometry: Geometry
     masses: Masses
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     radii: tuple[float, float] = (0.0, 0.0)
+    bounds: SingularityBounds = UNBOUNDED
+    printed: bool = False
 
-    # Its bodies and passive joints are three of a kind each, which no two of them are alike to.
+    # Bodies and passive joints are three of a kind, and no two kinds are alike.
     structure: ClassVar[None] = None
+    drives: ClassVar[tuple[str, ...]] = DRIVES
     motors: ClassVar[Mapping[str, tuple[float, ...]]] = {}
+    armature: ClassVar[Array] = np.zeros(COUNT)
+    motions: ClassVar[tuple[type, ...]] = (PlatformMotion,)
+    turning: ClassVar[tuple[str, ...]] = ()
+    kind: ClassVar[str] = PLATFORM
 
     @property
     def passive_joints(self) -> tuple[PassiveJoint, ...]:
@@ -207,7 +109,7 @@ class Robot:
 
     @property
     def tool_place(self) -> BodyPlace:
-        """Where a payload is: at the centre of mass of platform and payload."""
+        """The centre of mass of platform and payload, where a payload is added."""
         return BodyPlace('platform', (0.0, 0.0, 0.0), inf, is_spread=True)
 
     @property
@@ -217,34 +119,38 @@ class Robot:
 
     @property
     def moved_mass(self) -> float:
-        """Mass of all bodies [kg]: left open."""
-        return inf
+        """Mass of the platform and its payload [kg]."""
+        return self.masses.total
 
     @property
     def numbers(self) -> Array:
-        """All that forces follow from, in one row."""
+        """All numbers that determine the forces, in one row."""
         return self.kernel_parameters.row
+
+    @property
+    def position_step(self) -> float:
+        """Step of a drive for derivatives by its position [m]."""
+        return POSITION_STEP * self.geometry.rod_length
 
     def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal,
                        ) -> Joints:
-        """Return friction of joints as `ThreePprsState.against_friction` takes it."""
-        return Joints.of(blocks)
+        """Return friction of joints as `MechanismState.against_friction` takes it."""
+        return Joints.of(blocks, reversal.rate)
 
-    def heavier(self, link: str, mass: float) -> Robot:
+    def heavier(self, link: str, mass: float) -> ThreePprs:
         """Return the robot with a payload, or with rods, that weigh more [kg].
 
-        They are not held to what a real body can have: see `with_masses`.
+        The masses are not checked, see `with_masses`.
         """
         if link == RODS:
             return self.with_masses(rods=tuple(m_b + mass for m_b in self.masses.rods))
         return self.with_masses(payload=self.masses.payload + mass)
 
-    def with_masses(self, **masses: Any) -> Robot:
-        """Return the robot with some fields of `Masses` changed.
+    def with_masses(self, **masses: Any) -> ThreePprs:
+        """Return the robot with some fields of `Masses` changed, unchecked.
 
-        They are not held to what a real body can have: a fit looks at one coefficient at a time,
-        and an inertia about one axis alone belongs to no body. Who asks for the masses of a real
-        robot makes `Masses` of them again, which checks.
+        A fit changes one coefficient at a time, and an inertia about one axis alone belongs to no
+        body. Build `Masses` from the result to check them.
         """
         altered = copy.copy(self.masses)
         for name, value in masses.items():
@@ -263,7 +169,97 @@ class Robot:
             self.geometry.kernel_parameters.named, body, (first, second, third),
             Vector(*self.gravity)))
 
+    # --- motion --------------------------------------------------------------------------------
 
-def _require(key: str, value: Any, condition: bool, rule: str) -> None:
-    if not condition:
-        raise ModelError(key, value, rule)
+    def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
+                         seed: PlatformMotion | None = None) -> PlatformMotion:
+        """Return the platform's motion, by forward kinematics."""
+        return solve_forward_motion(self.geometry, position, velocity, acceleration, seed).motion
+
+    def at_home(self, samples: int) -> PlatformMotion:
+        """Return the platform at rest at its home pose."""
+        return PlatformMotion.at_rest(np.tile([0.0, 0.0, HOME_HEIGHT], (samples, 1)))
+
+    def state(self, motion: PlatformMotion, reversal: Reversal, friction: object = None,
+              closed: object = None, drive_motion: tuple[Array, Array, Array] | None = None,
+              ) -> MechanismState:
+        """Return the state for a platform motion, whose drive motion may be known already.
+
+        Raises
+        ------
+        WorkspaceError
+            For a pose out of reach.
+        SingularityError
+            For a pose nearer to a singularity than `bounds` allow.
+        """
+        found = PlatformKinematics(
+            self.geometry, motion, self.bounds.rod_sine, self.bounds.condition_number)
+        # Very large numbers overflow; users of the result check that it is finite.
+        with np.errstate(over='ignore', invalid='ignore', divide='ignore'):
+            if drive_motion is None:
+                drive_motion = found.drive_motion
+                _ = found.inverse_table
+        return MechanismState(*drive_motion, motion.time, channels=motion.channels, robot=self,
+                              reversal=reversal, known=found, motion=motion)
+
+    def remember(self, state: MechanismState, closed: object) -> None:
+        """Store nothing: poses have a closed form."""
+
+    def kinematics(self, state: MechanismState) -> PlatformKinematics:
+        """Return the kinematics of a state that lacks them."""
+        return PlatformKinematics(
+            self.geometry, state.motion, self.bounds.rod_sine, self.bounds.condition_number)
+
+    def loads(self, found: PlatformKinematics, load: StructureLoad | None) -> RigidBody:
+        """Return frictionless drive forces and reactions."""
+        return solve_bodies(self.kernel_parameters, found.motion, found.chain_table,
+                            found.inverse_table, self.printed, load)
+
+    def inverse_dynamics(self, state: MechanismState) -> None:
+        """Return None: the model evaluates its one pass itself."""
+
+    def friction_load(self, state: MechanismState) -> Array:
+        """Return the normal forces on the guides [N], (N, 6)."""
+        load: Array = state.reactions.guide_load
+        return load
+
+    def moved(self, state: MechanismState, position: Array, acceleration: Array) -> MechanismState:
+        """Return the state at other drive positions, to first order, and accelerations."""
+        motion = state.motion
+        if position is not state.position:
+            from scipy.spatial.transform import Rotation  # here: commands start without it
+
+            move = np.einsum('nij,nj->ni', state.links.jacobians.J, position - state.position)
+            turned = Rotation.from_rotvec(move[:, 3:]) * Rotation.from_quat(motion.orientation)
+            motion = PlatformMotion.at_rest(motion.position + move[:, :3], turned.as_quat())
+        rates = platform_rates(self.geometry, motion, state.velocity, acceleration)
+        rates = rates.with_channels(state.channels)
+        return replace(self.state(rates if state.time is None else rates.with_time(state.time),
+                                  state.reversal), robot=state.robot, load=state.load)
+
+    # --- singularities ----------------------------------------------------------------------------
+
+    def singularity_margin(self, state: MechanismState) -> float:
+        """Return 1 minus the largest of three shares, 0 at the limit.
+
+        Condition number over its limit, smallest sine of a rod angle over that of the rods, and,
+        with independent chains, the ratio for the cosine.
+        """
+        bounds, J, chains = self.bounds, state.links.jacobians.J, state.links.chains
+        number = condition_number(self.geometry, J[::-(-len(J) // MOST_CONDITIONS)])
+        return float(1 - max(number.max() / bounds.condition_number,
+                             bounds.rod_sine / np.abs(chains.sin_u).min(),
+                             bounds.rod_cosine / np.abs(chains.cos_u).min()))
+
+    def variables(self, state: MechanismState) -> dict[str, Array]:
+        """Return loads of the guides, rod angles, and where the platform is."""
+        motion = state.motion
+        x, y, z = motion.position.T
+        return {'load': state.friction_load, 'rod_angle': np.tile(state.links.chains.rod_angle, 2),
+                'platform_x': x, 'platform_y': y, 'platform_z': z,
+                'platform_tilt': motion.tilt, 'platform_turn': motion.turn}
+
+    def require_bodies(self, key: str, value: Any) -> None:
+        """Raise ModelError, of a key and its value, for bodies that cannot be."""
+        if not self.masses.total > 0 or min(self.masses.rods) < 0:
+            raise ModelError(key, value, 'leave masses greater than 0')

@@ -13,6 +13,7 @@ import numpy as np
 from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Twist, Vector3
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import (
     JointTrajectory,
     JointTrajectoryPoint,
@@ -24,7 +25,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages.status_codes import Rejection
 
 BASE = 'base'
@@ -49,7 +50,7 @@ class RobotNames(NamedTuple):
     frame: str
 
     @classmethod
-    def of(cls, model: ForceModel, frame: str = '') -> RobotNames:
+    def of(cls, model: DriveModel, frame: str = '') -> RobotNames:
         """Return the names of a model's drives; `frame` '' for that of its kind."""
         # A platform's is `base`; that of joints means nothing.
         return cls(model.recorded.joints, frame or (BASE if model.drives == DRIVES else ''))
@@ -114,6 +115,11 @@ def joint_state(
     return message
 
 
+def efforts(effort: Array) -> Float64MultiArray:
+    """Return the drives' efforts, (D,)."""
+    return Float64MultiArray(data=doubles(effort))
+
+
 def joint_positions(stamp: int, names: Sequence[str], position: Array) -> JointState:
     """Return positions of joints at a time [ns], without efforts."""
     message = JointState(name=list(names), position=doubles(position))
@@ -134,11 +140,11 @@ def transforms(stamp: int, base: str, links: Sequence[str], poses: Array, prefix
     """
     found = []
     for link, (x, y, z, *turn) in zip(links, poses.tolist(), strict=True):
-        one = TransformStamped(child_frame_id=prefix + link)
-        one.header.stamp, one.header.frame_id = time(stamp), prefix + base
-        one.transform.translation = Vector3(x=x, y=y, z=z)
-        one.transform.rotation = Quaternion(**dict(zip('xyzw', turn, strict=True)))
-        found.append(one)
+        transform = TransformStamped(child_frame_id=prefix + link)
+        transform.header.stamp, transform.header.frame_id = time(stamp), prefix + base
+        transform.transform.translation = Vector3(x=x, y=y, z=z)
+        transform.transform.rotation = Quaternion(**dict(zip('xyzw', turn, strict=True)))
+        found.append(transform)
     return found
 
 

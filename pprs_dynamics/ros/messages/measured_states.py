@@ -33,7 +33,7 @@ class MeasuredState(NamedTuple):
 class MeasuredStates:
     """Reads joint states, and merges those that hold some of the drives each by their stamps.
 
-    A message with all drives is a sample as it is. Of others, as of several broadcasters, samples
+    A message with all drives is one sample. Of others, as of several broadcasters, samples
     are at the stamps of the first drive, as `pprs` reads recordings. Messages with no drive at
     all, as of a gripper, are passed over while the drives come in others.
 

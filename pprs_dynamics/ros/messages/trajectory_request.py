@@ -21,8 +21,7 @@ from pprs_dynamics.measurement.files.samples import Indices, Mask
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion, position_spline_derivatives
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.pose_spline import FEWEST_POSES, spline_derivatives
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages.conversions import (
     BASE,
     NANOSECONDS,
@@ -327,16 +326,16 @@ class RequestReader(NamedTuple):
         return request or self.of_message(message_in(data, self.message), now, missing)
 
 
-def readers_for(model: ForceModel, names: RobotNames | None = None) -> dict[str, RequestReader]:
+def readers_for(model: DriveModel, names: RobotNames | None = None) -> dict[str, RequestReader]:
     """Return how trajectories for a model arrive, by topic.
 
-    A robot with loops takes the motion of its drives, and beside it that of its tool where the
-    tool's pose determines the drives.
+    A robot with loops takes the motion of its drives, and of its tool if the pose of the tool
+    determines the drives.
     """
     readers = {TRAJECTORY: reader_for(model, names)}
-    if isinstance(model, MechanismModel):
+    if model.moves_joints:
         try:
-            tool = model.tool_pose.structure.tool
+            tool = model.robot.tool_pose.structure.tool
         except ModelError:
             return readers
         readers[POSES] = _poses((names and names.frame) or str(model.values['robot.base']),
@@ -344,7 +343,7 @@ def readers_for(model: ForceModel, names: RobotNames | None = None) -> dict[str,
     return readers
 
 
-def reader_for(model: ForceModel, names: RobotNames | None = None) -> RequestReader:
+def reader_for(model: DriveModel, names: RobotNames | None = None) -> RequestReader:
     """Return how trajectories for a model arrive, by the names of its robot."""
     names = names or RobotNames.of(model)
     return joint_reader(names.joints) if model.moves_joints else _poses(names.frame, PLATFORM)

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where all joints and free bodies of a robot are, prepared beside a node that answers."""
+"""Poses of all joints and free bodies of a robot, prepared in a thread of its own."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from threading import Thread
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.model_file import build_model
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.export.exported_robot import TreePose, TreePositions
 
 
@@ -22,10 +21,10 @@ class AllJoints:
     """
 
     def __init__(self) -> None:
-        self._model: ForceModel | None = None
+        self._model: DriveModel | None = None
         self._made: list[TreePositions | PprsError] = []
 
-    def at(self, model: ForceModel, position: Array) -> tuple[TreePositions, TreePose] | None:
+    def at(self, model: DriveModel, position: Array) -> tuple[TreePositions, TreePose] | None:
         """Return the names, and where all is, for positions of the drives, (D,) [m, rad].
 
         None while the tree is being made.
@@ -47,10 +46,10 @@ class AllJoints:
         return tree, tree.at(position - model.position_error(position[None])[0])
 
 
-def _make(model: ForceModel, position: Array, made: list[TreePositions | PprsError]) -> None:
+def _make(model: DriveModel, position: Array, made: list[TreePositions | PprsError]) -> None:
     try:
         # Made anew here: buffers of a model serve one thread at a time.
-        tree = TreePositions(build_model(model.values, model.source))
+        tree = TreePositions(DriveModel.from_parameters(model.values, model.source))
         with suppress(PprsError):  # it is there to load what is compiled
             tree.at(position)
         made.append(tree)

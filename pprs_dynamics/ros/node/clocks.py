@@ -18,7 +18,7 @@ IDLE = 3600.0  # [s] period of a timer that is cancelled
 LOOKS = 4  # within a timeout, at whether ROS time still advances
 SHORTEST_LOOK = 1_000_000  # [ns]
 MISSING_CLOCK = ('use_sim_time is true and nothing has come on /clock: stamps count from 0, and '
-                 'what goes by the time of the simulation stands still')
+                 'timers of the simulation do not run')
 
 
 def steady_clock() -> Clock:
@@ -40,9 +40,9 @@ def clock_is_missing(node: Node) -> bool:
 class CommandWatchdog:
     """Calls back once when the command of the last trajectory has gone stale.
 
-    It is stale when ROS time has passed the end of the trajectory by the timeout, or when ROS time
-    has not advanced for the timeout of steady time: a simulation may be slower than real time, may
-    stand still, and its clock may never come. Time that is set back counts as no advance.
+    It is stale when ROS time has passed the end of the trajectory by the timeout. It is also stale
+    when ROS time has not advanced for the timeout of steady time, as where a simulation stops or
+    its clock never comes. Time that is set back counts as no advance.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 
 """Whether a joint_trajectory_controller follows what it is sent, by the state that it publishes.
 
-A controller drops a trajectory with a line in its own log and nothing else: its sender is not told.
+A controller that drops a trajectory writes that into its own log only; the sender gets no answer.
 """
 
 from __future__ import annotations
@@ -177,7 +177,7 @@ class ControllerWatch:
         if self._sent[-1].moves_at_end:
             yield ('trajectories end in motion, which it takes only with '
                    'allow_nonzero_velocity_at_trajectory_end: true; or set stop_time here')
-        yield 'its log says why'
+        yield 'its log has the reason'
 
 
 def _forget(entries: deque[Any], before: float) -> None:

@@ -26,9 +26,7 @@ from pprs_dynamics.ros.node.rclpy_internals import (
     InternalsChangedError,
     WaitSet,
     call_if_due,
-    missing,
     take,
-    works,
 )
 
 STOP_SIGNALS = frozenset({signal.SIGINT, signal.SIGTERM})
@@ -59,14 +57,9 @@ class PromptExecutor(StoppableExecutor):
     """Serves messages and timers straight from the wait set; everything else goes rclpy's way.
 
     rclpy builds a task, a coroutine and a new wait set of every entity and every event handler
-    for each message, which costs more than the model. Here messages and timers are served at
-    once, and only services and guard conditions go that way. Event handlers, which tell of QoS
-    that does not fit, are looked at once a second. At 500 Hz an echo node takes 0.35 ms of
-    processor time a message with it, 0.76 ms with rclpy's, and the feedforward node 0.34 ms against
-    0.57 to 0.84; with the EventsExecutor of rclpy 9.1.2
-    it answers nothing, and takes a quarter of a core while nothing comes. Before anything is
-    served a timer is tried. With an rclpy whose internals have changed, raise or do nothing,
-    everything goes rclpy's way.
+    for each message, which costs more than the model (docs/benchmarks.md). Here only services and
+    guard conditions go that way. Event handlers, which report QoS that does not fit, are looked at
+    once a second. With an rclpy whose internals have changed everything goes rclpy's way.
     """
 
     def __init__(self, **options: Any) -> None:
@@ -82,18 +75,11 @@ class PromptExecutor(StoppableExecutor):
 
     def spin(self) -> None:
         """Execute callbacks until `stop` or shutdown."""
-        reason = f'{", ".join(names)} missing' if (names := missing()) else ''
-        if not reason:
-            try:
-                if all(works(node) for node in self.get_nodes()[:1]):
-                    self._spin_promptly()
-                else:
-                    reason = 'a timer that was due was not served'
-            except InternalsChangedError as error:
-                reason = str(error)
-        if reason:
+        try:
+            self._spin_promptly()
+        except InternalsChangedError as error:
             get_logger('executor').warning(
-                f'this release of rclpy is not known ({reason}): its own executor is used, which '
+                f'this release of rclpy is not known ({error}): its own executor is used, which '
                 'answers more slowly')
             super().spin()
 

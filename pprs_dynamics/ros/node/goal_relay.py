@@ -38,10 +38,10 @@ class ControllerError(PprsError):
 class GoalRelay:
     """Sends goals on, passes feedback and cancelling, and never waits for a dead server.
 
-    A server is taken for dead where discovery says that it has gone; after a silence of `patience`
-    while it owes an answer to a goal or a cancel request, or once it has given feedback, which
-    controllers give all the time; and where it gave none, that long after the goal's motion should
-    have ended. Discovery alone tells of a killed process after 20 s, of one that hangs never.
+    A server counts as dead when discovery reports that it has gone. It also counts as dead after a
+    silence of `patience`: while it owes an answer, after its last feedback, or after the end of the
+    goal's motion. Discovery alone reports a killed process after 20 s, and a process that hangs
+    never.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class GoalRelay:
                 raise ControllerError(f'{said}; the goal was not accepted')
             theirs = sent.result()
             if not theirs.accepted:
-                raise ControllerError('the controller rejected the goal; its log says why')
+                raise ControllerError('the controller rejected the goal; its log has the reason')
         except ControllerError:
             self._forget(watched)
             raise
@@ -209,7 +209,7 @@ class _Watched:
 
 
 def _cancel_late(sent: Any) -> None:
-    """Cancel a goal that is accepted after its sender was told that it was not."""
+    """Cancel a goal that is accepted after its sender got a refusal."""
     theirs = sent.result()
     if theirs is not None and theirs.accepted:
         theirs.cancel_goal_async()

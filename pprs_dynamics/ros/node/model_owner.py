@@ -18,7 +18,7 @@ from rclpy.task import Future
 from std_msgs.msg import String
 
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.node.qos import LATCHED, subscription
@@ -52,7 +52,7 @@ class ModelOwner:
         Called with parameters when the owner's model has changed, where both had the same one.
     """
 
-    def __init__(self, node: Node, name: str, model: Callable[[], ForceModel],
+    def __init__(self, node: Node, name: str, model: Callable[[], DriveModel],
                  follow: Callable[[list[Parameter]], None]) -> None:
         self.name, self._node, self._model, self._follow = name, node, model, follow
         self.status: dict[str, Any] = {}
@@ -118,7 +118,7 @@ class ModelOwner:
                 for name, value in zip(names, answer.result().values, strict=False)]))
 
 
-def changes(model: ForceModel, values: Values) -> list[Parameter]:
+def changes(model: DriveModel, values: Values) -> list[Parameter]:
     """Return the parameters that make a model another one, without its ledger."""
     changed = {key: value for key, value in values.items()
                if not key.startswith(HISTORY) and model.values.get(key) != value}

@@ -21,9 +21,7 @@ from pprs_dynamics.physics.model.keys import (
     NAMES,
     NODE_KEYS,
     NODE_PREFIXES,
-    is_mechanism,
 )
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
 from pprs_dynamics.ros.node.model_history import ModelHistory
 from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
@@ -37,8 +35,8 @@ from pprs_dynamics.ros.node.parameters import (
     overrides,
     with_hint,
 )
+from pprs_dynamics.ros.node.provenance import arguments_of
 
-NodeModel = DriveModel | MechanismModel
 Checked = TypeVar('Checked')
 DEMO = node_parameter('demo', False, 'true: without a model file this is the paper\'s robot, for '
                       'demonstrations', stays=True)
@@ -62,8 +60,17 @@ class NoModelError(PprsError):
 class ExplainsRefusals(Node):
     """A node that refuses parameters in the words of the model's files.
 
-    rclpy compares with the range in a descriptor first, and says less. `_settings` is what checks.
+    rclpy compares with the range in a descriptor first, and says less. `_settings` checks here.
+
+    Attributes
+    ----------
+    arguments : sequence of str
+        Command line of the node.
     """
+
+    def __init__(self, name: str, **options: Any) -> None:
+        self.arguments = arguments_of(options)
+        super().__init__(name, **options)
 
     def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
         """Set parameters one after the other; each is taken or refused by itself."""
@@ -119,7 +126,7 @@ class Followed(ABC, Generic[Checked]):
             self._apply(self._checked, changes)
 
 
-class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
+class ModelParameters(Followed[tuple[DriveModel, dict[str, Any]]]):
     """Declares a node's own parameters and those of a model, and follows their changes.
 
     Parameters
@@ -134,7 +141,7 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
 
     Attributes
     ----------
-    model : DriveModel or MechanismModel
+    model : DriveModel
         In force now; of one kind, and of the same drives, as long as the node runs.
     node_values : dict
         Values of the node's own parameters.
@@ -151,15 +158,14 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
     """
 
     def __init__(
-        self, node: Node, parameters: Iterable[NodeParameter], changed: Callable[[], None],
-        drives: bool = False,
+        self, node: ExplainsRefusals, parameters: Iterable[NodeParameter],
+        changed: Callable[[], None], drives: bool = False,
     ) -> None:
         self._changed, self.history = changed, ModelHistory(node) if drives else None
         parameters = (*parameters, DEMO)
         declare_node_parameters(node, parameters)
         given = overrides(node)
-        self._kind: type[NodeModel] = MechanismModel if is_mechanism(given) else DriveModel
-        taken_from_paper = declare_model(node)
+        taken_from_paper = declare_model(node, node.arguments)
         self._stays: dict[str, Any] = {}
         super().__init__(node, parameters)
         self.model, self.node_values = self._checked
@@ -175,12 +181,12 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
                 + (f', but for {len(KEYS) - len(taken_from_paper)} parameters'
                    if len(taken_from_paper) < len(KEYS) else ''))
 
-    def _validated(self, changes: Iterable[Parameter]) -> tuple[NodeModel, dict[str, Any]]:
+    def _validated(self, changes: Iterable[Parameter]) -> tuple[DriveModel, dict[str, Any]]:
         self._refuse_foreign(changes)
         values = current_values(self._node, changes)
         node_values = {each.name: each.check(values.pop(each.name, None))
                        for each in self._declared}
-        model = self._kind.from_parameters(values)
+        model = DriveModel.from_parameters(values)
         now = self._staying(model, node_values)
         for name, before in self._stays.items():
             if now[name] != before:
@@ -189,7 +195,7 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
         model.initial_state()  # an effect that cannot even begin is refused
         return model, node_values
 
-    def _staying(self, model: NodeModel, node_values: Mapping[str, Any]) -> dict[str, Any]:
+    def _staying(self, model: DriveModel, node_values: Mapping[str, Any]) -> dict[str, Any]:
         """Return what holds as long as the node runs, its topics were made by it."""
         names = {DRIVES_KEY: model.drives,
                  'joint_prefix and joint_map': model.recorded.joints}
@@ -210,7 +216,7 @@ class ModelParameters(Followed[tuple[NodeModel, dict[str, Any]]]):
                 raise ModelError(change.name, value, 'be set on the node that has it: '
                                  f'{self._node.get_name()} has no such parameter')
 
-    def _apply(self, checked: tuple[NodeModel, dict[str, Any]],
+    def _apply(self, checked: tuple[DriveModel, dict[str, Any]],
                changes: Iterable[Parameter]) -> None:
         before, (self.model, self.node_values) = self.model, checked
         if self.history is not None and self.model.fingerprint != before.fingerprint:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,6 @@ from rclpy.parameter import Parameter
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
     ADDED,
     ANY,
@@ -26,17 +25,14 @@ from pprs_dynamics.physics.model.keys import (
     FILES,
     KEYS,
     LARGEST,
-    NAMES,
-    NODE_KEYS,
     Key,
     as_list,
-    is_axis,
     is_mechanism,
     keys_of,
 )
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.model.parameter_values import is_known
-from pprs_dynamics.ros.node.provenance import folder_of, names_given
+from pprs_dynamics.ros.node.provenance import folder_of
 from pprs_dynamics.ros.node.rclpy_internals import parameter_overrides
 from pprs_dynamics.system.package_files import located
 
@@ -141,14 +137,14 @@ def drive_count(node: Node) -> int:
 
 def has_model(given: Mapping[str, Any]) -> bool:
     """Return whether a robot is among the parameters given, and not only changes of the paper's."""
-    return is_mechanism(given) or is_axis(given) or any(
+    return is_mechanism(given) or any(
         name.startswith('geometry.') for name in given)
 
 
-def declare_model(node: Node) -> list[str]:
+def declare_model(node: Node, arguments: Sequence[str]) -> list[str]:
     """Declare every key of a node's model, which is the paper's 3-PPRS where nothing is given.
 
-    A relative path of a mechanism's URDF becomes an absolute one.
+    A relative path of a mechanism's URDF becomes an absolute one, by the node's command line.
 
     Returns
     -------
@@ -161,11 +157,9 @@ def declare_model(node: Node) -> list[str]:
         For a key that is missing or breaks its rule.
     """
     given = overrides(node)
-    if is_axis(given):
-        DriveModel.from_parameters(given)  # refuses it
     for key in FILES:
         if isinstance(given.get(key), str) and given[key]:
-            given[key] = str(located(given[key], folder_of(key)))
+            given[key] = str(located(given[key], folder_of(key, arguments)))
     # Of somebody's own robot what is missing must not become the paper's in silence.
     defaults = {} if has_model(given) else default_parameters()
     _declare_keys(node, keys_of(given), given, defaults)
@@ -175,7 +169,7 @@ def declare_model(node: Node) -> list[str]:
 def _declare_keys(
     node: Node, keys: Mapping[str, Key], given: Mapping[str, Any], defaults: Mapping[str, Any],
 ) -> None:
-    """Declare a model's keys, and what was given beside them, as of effects."""
+    """Declare a model's keys and further parameters, as of effects."""
     for name, key in keys.items():
         value = given.get(name, defaults.get(name, key.default))
         if value is None and name in given and key.may_be_empty:
@@ -201,7 +195,7 @@ def _declare_key(node: Node, key: Key, value: Any) -> None:
 def _declare(
     node: Node, name: str, kind: Parameter.Type, value: Any, descriptor: ParameterDescriptor,
 ) -> None:
-    """Declare a parameter with a value of a type, which an empty list does not tell."""
+    """Declare a parameter with a value and its type, which an empty list lacks."""
     # An override would bring back a whole number, or a relative path.
     if isinstance(value, list) and not value:
         node.declare_parameter(name, kind, descriptor, ignore_override=True)
@@ -211,7 +205,7 @@ def _declare(
 
 
 def in_declared_type(node: Node, change: Parameter) -> Parameter:
-    """Return a change with decimal numbers where whole ones, or nothing, stand for them."""
+    """Return a change with whole numbers and empty lists in the declared type."""
     kind = (node.get_parameter(change.name).type_ if node.has_parameter(change.name)
             else _added_type(change.name, change.value))
     value = plain_value(change.value)
@@ -259,8 +253,7 @@ def refuse_unknown(node: Node) -> None:
 
 def overrides(node: Node) -> dict[str, Any]:
     """Return what was given in files and on the command line, None for an empty list."""
-    given = parameter_overrides(node, lambda: {*NAMES, *NODE_KEYS, *names_given()})
-    return {name: plain_value(value) for name, value in given.items()}
+    return {name: plain_value(value) for name, value in parameter_overrides(node).items()}
 
 
 def current_values(node: Node, changes: Iterable[Parameter] = ()) -> dict[str, Any]:
@@ -273,12 +266,12 @@ def current_values(node: Node, changes: Iterable[Parameter] = ()) -> dict[str, A
 def added_descriptor(name: str) -> ParameterDescriptor:
     """Return how a parameter is declared that is not in the table of keys, as of an effect."""
     if name == ACTIVE:
-        return _descriptor('effects beside the paper\'s friction, in force',
+        return _descriptor('effects in force in addition to the paper\'s friction',
                            'be a list of names of effects', Parameter.Type.STRING_ARRAY)
     block, _, rest = name.partition('.')
     effect, _, place = rest.partition('.')
     if block == 'effects' and effect in CATALOGUE:
-        for parameter in (one.widest for one in CATALOGUE[effect].parameters):
+        for parameter in (parameter.widest for parameter in CATALOGUE[effect].parameters):
             if place.rpartition('.')[2] == parameter.name:
                 unit = f' [{parameter.unit}]' if parameter.unit else ''
                 descriptor = _descriptor(

@@ -15,16 +15,13 @@ from typing import Any
 from rclpy.node import Node
 
 from pprs_dynamics.physics.mechanism.evaluation import compiling_here
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.preparation import prepare
 
 NAME = 'preparation'
-# [s] A message asks for the interpreter some five times: with Python's 5 ms each, messages at
-# 200 Hz pile up behind the compiler.
-SWITCH_INTERVAL = 0.0002
 
 
-def prepare_beside(node: Node, model: ForceModel) -> threading.Thread:
+def prepare_beside(node: Node, model: DriveModel) -> threading.Thread:
     """Start loading or compiling what a model needs in a thread of its own.
 
     Compiled kernels load in a second. The first time after an installation they are compiled,
@@ -55,14 +52,10 @@ def end_if_preparing(status: int) -> None:
         os._exit(status)
 
 
-def _prepare(logger: Any, model: ForceModel) -> None:
-    began, interval = time.monotonic(), sys.getswitchinterval()
-    sys.setswitchinterval(SWITCH_INTERVAL)
-    try:
-        with compiling_here():
-            prepare(type(model).from_parameters(dict(model.values), model.source))
-    finally:
-        sys.setswitchinterval(interval)
-    # What stands now stays: no walk through Numba's objects in the middle of a control cycle.
-    gc.freeze()
+def _prepare(logger: Any, model: DriveModel) -> None:
+    began = time.monotonic()
+    with compiling_here():
+        prepare(type(model).from_parameters(dict(model.values), model.source))
+    if gc.get_freeze_count():  # else it is for the program that runs this node
+        gc.freeze()  # no walk through Numba's objects in the middle of a control cycle
     logger.info(f'equations are compiled, after {time.monotonic() - began:.1f} s')

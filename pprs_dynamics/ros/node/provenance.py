@@ -12,7 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import FILES
 from pprs_dynamics.physics.model.parameter_file import DEFAULT_MODEL, LEDGER, find_file
 from pprs_dynamics.system.bounded_yaml import parse, read_text
@@ -33,38 +33,27 @@ def files_given(arguments: Sequence[str]) -> list[dict[str, str]]:
             for path in paths if path.is_file()]
 
 
-def hardware_of(model: ForceModel) -> str:
+def hardware_of(model: DriveModel) -> str:
     """Return which robot a model is of: an arm by its URDF."""
     name = model.title.partition(' ')[2]
     described = [Path(model.values[key]).stem for key in FILES if model.values.get(key)]
     return ' '.join((name, *described))
 
 
-def check_files(arguments: Sequence[str]) -> None:
-    """Raise UnreadableFileError where a parameter file on a command line is out of bounds.
-
-    ROS 2 takes a minute over a list that is nested 10^5 deep, and longer over larger ones.
-    """
-    for path in _paths(arguments):
-        if path.is_file():  # what is not, ROS 2 refuses; a pipe can be read only once
-            parse(read_text(path), path)
-
-
 def _paths(arguments: Sequence[str]) -> list[Path]:
     return [Path(value) for option, value in pairwise(arguments) if option == OPTION]
 
 
-def names_given(arguments: Sequence[str] | None = None) -> list[str]:
-    """Return the names of parameters on a command line and in the files that it names."""
-    arguments = sys.argv if arguments is None else arguments
-    return [name for path in _paths(arguments) if path.is_file()
-            for name in _names_in(path)] + _names_on(arguments)
+def arguments_of(options: Mapping[str, Any]) -> Sequence[str]:
+    """Return the command line of a node with such options: its own, or that of the process."""
+    return options.get('cli_args') or sys.argv
 
 
-def folder_of(name: str) -> Path:
+def folder_of(name: str, arguments: Sequence[str]) -> Path:
     """Return the folder that a path in a parameter counts from: its file's, or the present one."""
-    files = [path for path in _paths(sys.argv) if path.is_file() and name in _names_in(path)]
-    return Path.cwd() if not files or name in _names_on(sys.argv) else files[-1].resolve().parent
+    files = [path for path in _paths(arguments) if path.is_file() and name in _names_in(path)]
+    return Path.cwd() if not files or name in _names_on(arguments) else (
+        files[-1].resolve().parent)
 
 
 def _names_in(path: Path) -> list[str]:

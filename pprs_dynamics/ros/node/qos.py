@@ -62,7 +62,7 @@ def subscription(
 
 
 def _warning(node: Node, topic: str, who: str) -> Callable[[Any], None]:
-    """Return what tells of QoS that does not fit; rclpy's own names the topic before remapping."""
+    """Return a callback that warns of QoS that does not fit, with the topic after remapping."""
     resolved = node.resolve_topic_name(topic)
 
     def warn(event: Any) -> None:

@@ -3,25 +3,19 @@
 
 """Private names of rclpy that the nodes use; no other file does.
 
-They may change with any release. `missing` tells which of them an rclpy lacks, and each has rclpy's
-public way beside it: the executor then spins as rclpy's own, which costs latency, and parameters
-are asked for one by one. A name that is there but behaves in another way ends in
-InternalsChangedError.
+They may change with any release. A name that is missing or behaves in another way ends in
+InternalsChangedError, and the executor then spins as rclpy's own, which costs latency.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 
@@ -33,35 +27,12 @@ except (ImportError, AttributeError):
     rclpy_implementation = None
 
 FOR_EVER = -1  # [ns]
-TRIALS, TRIAL = 20, 50_000_000  # waits for a timer that is due at once; each at most so long [ns]
-# What handles must offer for messages and timers to be served without rclpy's executor.
-NAMES = {
-    'WaitSet': ('clear_entities', 'add_subscription', 'add_timer', 'add_guard_condition',
-                'add_client', 'add_service', 'wait', 'get_ready_entities'),
-    'Subscription': ('take_message', 'pointer'),
-    'Timer': ('is_timer_ready', 'call_timer'),
-    'GuardCondition': ('pointer',),
-}
-OVERRIDES = '_parameter_overrides'
-STATE_MACHINE = '_state_machine'
 # RuntimeError is the public base of rclpy's own errors.
 _CHANGED = (AttributeError, TypeError, RuntimeError)
 
 
 class InternalsChangedError(Exception):
     """A name of rclpy's that is not public behaves in another way than it did."""
-
-
-def missing() -> list[str]:
-    """Return the names that this rclpy lacks for `WaitSet`, `take` and `call_if_due`."""
-    absent = []
-    for kind, names in NAMES.items():
-        offered = getattr(rclpy_implementation, kind, None)
-        if offered is None:
-            absent.append(kind)
-        else:
-            absent += [f'{kind}.{name}' for name in names if not hasattr(offered, name)]
-    return absent
 
 
 class WaitSet:
@@ -138,59 +109,17 @@ def call_if_due(timer: Timer) -> bool:
     return bool(due)
 
 
-def works(node: Node) -> bool:
-    """Return whether a timer of a node is served, as `WaitSet` and `call_if_due` would.
-
-    Raises
-    ------
-    InternalsChangedError
-    """
-    timer = node.create_timer(0.0001, lambda: None, clock=Clock(clock_type=ClockType.STEADY_TIME))
-    try:
-        wait_set = WaitSet(node.context)
-        for _ in range(TRIALS):
-            wait_set.wait((), [timer], timeout=TRIAL)
-            if wait_set.ready('timer', [timer]) and call_if_due(timer):
-                return True
-        return False
-    finally:
-        node.destroy_timer(timer)
-
-
 def destroy_state_machine(node: LifecycleNode) -> None:
-    """Let go of what rclpy leaves of a destroyed managed node.
+    """Destroy the state machine of a destroyed managed node.
 
     Its state machine holds the node, and with it the DDS participant, until Python's garbage
     collection finds the circle; of frozen objects it never does.
     """
-    machine: Any = getattr(node, STATE_MACHINE, None)
+    machine: Any = getattr(node, '_state_machine', None)
     if hasattr(machine, 'destroy_when_not_in_use'):
         machine.destroy_when_not_in_use()
 
 
-def parameter_overrides(
-    node: Node, candidates: Callable[[], Iterable[str]],
-) -> dict[str, Any]:
-    """Return what was given in files and on the command line, None for an empty list.
-
-    Parameters
-    ----------
-    node : Node
-    candidates : callable
-        Returns the names to ask for where rclpy does not show which were given; others go unseen
-        then, and empty lists are left out.
-    """
-    given = getattr(node, OVERRIDES, None)
-    if given is not None:
-        return {name: parameter.value for name, parameter in given.items()}
-    found = {}
-    for name in candidates():
-        if node.has_parameter(name):
-            continue  # of rclpy's own
-        # A parameter that is declared without a value has the one that was given.
-        parameter = node.declare_parameter(name, descriptor=ParameterDescriptor(
-            dynamic_typing=True))
-        if parameter.type_ != Parameter.Type.NOT_SET:
-            found[name] = parameter.value
-        node.undeclare_parameter(name)
-    return found
+def parameter_overrides(node: Node) -> dict[str, Any]:
+    """Return the parameters of files and of the command line, None for an empty list."""
+    return {name: parameter.value for name, parameter in node._parameter_overrides.items()}

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Publishers of a topic as its messages tell: whether several take turns, and what was passed over.
+"""Publishers of a topic by its messages: whether several alternate, and which were passed over.
 
 Two programs that send setpoints alternate in the drives, as do two nodes of one name; discovery
 alone would also list publishers that were killed, for as long as their lease.
@@ -43,7 +43,7 @@ class Senders:
         Parameters
         ----------
         info : mapping
-            Of the middleware; where it tells no publisher or no number, nothing is known.
+            Of the middleware; without publisher or number nothing is known.
         """
         publisher = (info.get('publisher_gid') or {}).get('data', b'')
         if publisher != self._latest:

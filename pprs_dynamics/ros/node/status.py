@@ -40,7 +40,7 @@ class StatusReporter:
     counters : dict of int
         Shared with the node, which counts up in place.
     hardware : str
-        Which robot `/diagnostics` tells of.
+        Name of the robot on `/diagnostics`.
     refresh : callable, optional
         Called once a second before the status goes out, to bring `facts` up to date.
     """

@@ -11,7 +11,7 @@ free joints draw it, and two balls are cut.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -40,8 +40,7 @@ from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.structure import build_structure
 from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.three_pprs.robot import Robot
+from pprs_dynamics.physics.three_pprs.robot import ThreePprs
 from pprs_dynamics.simulation.export.expressed import (
     URDF,
     Expressed,
@@ -110,7 +109,7 @@ class ExportedRobot:
     ----------
     name : str
     mechanism : Mechanism
-    joints : dict of str to dict
+    joints : mapping of str to mapping
         See `Expressed`.
     bodies : tuple of Body
         Parents first.
@@ -118,7 +117,7 @@ class ExportedRobot:
 
     name: str
     mechanism: Mechanism
-    joints: dict[str, dict[str, float]]
+    joints: Mapping[str, Mapping[str, float]]
     bodies: tuple[Body, ...]
 
     @property
@@ -140,12 +139,16 @@ def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
         For bodies that no real ones are, and closures that no format has.
     """
     model = expressed.model
-    if isinstance(model, DriveModel):
-        robot = with_bodies(model.robot, model.effects)
-        name, mechanism = 'three_pprs', _platform(robot, model, kind)
-    else:
-        name, mechanism = model.block, with_bodies(model.robot, model.effects)
-    return ExportedRobot(name, mechanism, expressed.joints, tuple(_bodies(mechanism)))
+    robot = with_bodies(model.robot, model.effects)
+    if model.moves_joints:
+        return described(model.block, robot, expressed.joints)
+    return described('three_pprs', platform_mechanism(robot, model, kind), expressed.joints)
+
+
+def described(name: str, mechanism: Mechanism, joints: Mapping[str, Mapping[str, float]] = {},
+              ) -> ExportedRobot:
+    """Return a mechanism as files of simulators describe it; `joints` as of `Expressed`."""
+    return ExportedRobot(name, mechanism, joints, tuple(_bodies(mechanism)))
 
 
 def _bodies(mechanism: Mechanism) -> Iterator[Body]:
@@ -190,7 +193,7 @@ def _inertia(name: str, parameters: Array) -> tuple[float, Array, Array, Array]:
     return max(mass, LEAST), centre, moments, axes
 
 
-def _platform(robot: Robot, model: DriveModel, kind: str) -> Mechanism:
+def platform_mechanism(robot: ThreePprs, model: DriveModel, kind: str) -> Mechanism:
     """Return the 3-PPRS."""
     geometry, masses = robot.geometry, robot.masses
     R, r, l = geometry.base_radius, geometry.platform_radius, geometry.rod_length  # noqa: E741
@@ -245,7 +248,7 @@ def _platform(robot: Robot, model: DriveModel, kind: str) -> Mechanism:
     else:
         hang('platform', FLOATING, 'base', 'platform', Frame(), e_x)
         poses = {'platform': Frame(p=np.array([0.0, 0.0, HOME_HEIGHT]))}
-    strokes = dict(zip(DRIVES, (*[model.limits.slide_stroke] * 3, *[model.limits.lift_stroke] * 3),
+    strokes = dict(zip(DRIVES, zip(*model.strokes, strict=True),
                        strict=True))
     efforts = dict(zip(DRIVES, model.effort_limits.tolist(), strict=True))
     joints = {name: replace(joint, lower=strokes[name][0], upper=strokes[name][1],
@@ -278,7 +281,7 @@ class TreePositions:
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
 
     Attributes
     ----------
@@ -295,7 +298,7 @@ class TreePositions:
         As `export_robot`.
     """
 
-    def __init__(self, model: ForceModel) -> None:
+    def __init__(self, model: DriveModel) -> None:
         robot = export_robot(express(model, URDF), URDF)
         self._mechanism = robot.mechanism
         joints = [body for body in robot.bodies if body.kind != FREE]

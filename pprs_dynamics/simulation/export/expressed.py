@@ -26,9 +26,6 @@ from pprs_dynamics.physics.effects.laws.viscous_friction import ViscousFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.physics.model.model_file import Model, build_model
 from pprs_dynamics.physics.three_pprs.passive_friction import WholeMechanismFriction
 
 MJCF, URDF = 'mjcf', 'urdf'
@@ -58,7 +55,7 @@ class Expressed:
 
     Parameters
     ----------
-    model : Model
+    model : DriveModel
         With no more than the format holds; dry friction turns over at once.
     joints : dict of str to dict of str to float
         Of each joint `damping`, `frictionloss`, `armature`, `stiffness` and `springref`, where
@@ -67,7 +64,7 @@ class Expressed:
         Keys of the model file and names of effects; of robots with loops in URDF, their loops.
     """
 
-    model: Model
+    model: DriveModel
     joints: dict[str, dict[str, float]]
     not_expressed: tuple[str, ...]
 
@@ -75,13 +72,13 @@ class Expressed:
 class _Sorting:
     """Sorts what a model has into what a format holds and what it does not."""
 
-    def __init__(self, model: ForceModel, kind: str) -> None:
+    def __init__(self, model: DriveModel, kind: str) -> None:
         self.model, self.kind, self.held = model, kind, HELD[kind]
-        self.loops = [loop.name for loop in model.robot.structure.loops] if isinstance(
-            model, MechanismModel) else []
+        self.loops = [loop.name for loop in model.robot.structure.loops] if (
+            model.moves_joints) else []
         # Joints of a format that passive joints of the model are; those without do not turn alone.
         self.passive = {
-            one.name: HINGES if isinstance(model, DriveModel) else (one.name,)
+            one.name: (one.name,) if model.moves_joints else HINGES
             for one in model.robot.passive_joints if one.has_position}
         self.joints: dict[str, dict[str, float]] = {}
         self.left: list[str] = []
@@ -157,26 +154,23 @@ class _Sorting:
         return self.take(joints)
 
 
-def express(model: ForceModel, kind: str) -> Expressed:
+def express(model: DriveModel, kind: str) -> Expressed:
     """Return what a format can hold of a model.
 
     Parameters
     ----------
-    model : ForceModel
+    model : DriveModel
     kind : {'urdf', 'mjcf'}
     """
     sorting = _Sorting(model, kind)
-    if isinstance(model, DriveModel):
-        _sort_platform(model, sorting)
-    elif isinstance(model, MechanismModel):
-        _sort_arm(model, sorting)
+    (_sort_arm if model.moves_joints else _sort_platform)(model, sorting)
     for effect in model.effects:
         if effect.name in model.values.get(ACTIVE, ()):
             sorting.add(effect)
     if kind == URDF:
         _under_standard_gravity(model, sorting)
-        sorting.left += ['ball_2', 'ball_3'] if isinstance(model, DriveModel) else sorting.loops
-    reduced: Any = replace(build_model(sorting.values, model.source),
+        sorting.left += sorting.loops if model.moves_joints else ['ball_2', 'ball_3']
+    reduced = replace(DriveModel.from_parameters(sorting.values, model.source),
                            reversal=Reversal(AT_ONCE, AT_ONCE, AT_ONCE))
     return Expressed(reduced, {name: {key: value for key, value in numbers.items() if value}
                                for name, numbers in sorting.joints.items()},
@@ -196,14 +190,12 @@ def _sort_platform(model: DriveModel, sorting: _Sorting) -> None:
     sorting.exchange('equations', 'corrected')
 
 
-def _sort_arm(model: MechanismModel, sorting: _Sorting) -> None:
+def _sort_arm(model: DriveModel, sorting: _Sorting) -> None:
     """Sort rotors and friction, also of passive joints; of these no loads."""
-    friction = 'friction' if model.is_described else model.block
-    sorting.keep(f'{friction}.viscous', model.drives, DAMPING)
-    sorting.keep(f'{friction}.coulomb', model.drives, FRICTION)
-    sorting.drop(f'{friction}.offset')
-    if model.is_described:
-        sorting.keep('robot.armature', model.drives, ARMATURE)
+    sorting.keep('friction.viscous', model.drives, DAMPING)
+    sorting.keep('friction.coulomb', model.drives, FRICTION)
+    sorting.drop('friction.offset')
+    sorting.keep('robot.armature', model.drives, ARMATURE)
     for key in model.values:
         name, _, parameter = key.removeprefix('friction.joints.').rpartition('.')
         if not key.startswith('friction.joints.') or parameter == 'radius':
@@ -214,13 +206,6 @@ def _sort_arm(model: MechanismModel, sorting: _Sorting) -> None:
             sorting.keep(key, (name,), OF_PASSIVE[parameter])
 
 
-def _under_standard_gravity(model: ForceModel, sorting: _Sorting) -> None:
+def _under_standard_gravity(model: DriveModel, sorting: _Sorting) -> None:
     """Take the gravity that is assumed where a file has none."""
-    if model.is_described:
-        sorting.exchange('robot.gravity', STANDARD_GRAVITY)
-    elif isinstance(model, MechanismModel):
-        # The axis is put at a slope that gives its share of it.
-        most, along = -STANDARD_GRAVITY[2], model.values['axis.gravity']
-        sorting.exchange('axis.gravity', min(max(along, -most), most))
-    else:
-        sorting.exchange('gravity', STANDARD_GRAVITY)
+    sorting.exchange('robot.gravity' if model.moves_joints else 'gravity', STANDARD_GRAVITY)

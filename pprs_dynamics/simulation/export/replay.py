@@ -19,80 +19,56 @@ from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.force_model import ForceModel
-from pprs_dynamics.physics.model.mechanism_model import MechanismModel
-from pprs_dynamics.simulation.engine_model import load_engine
+from pprs_dynamics.simulation.engine import load_engine
 from pprs_dynamics.simulation.engine_state import EngineState
 from pprs_dynamics.simulation.export.exported_robot import ExportedRobot
 from pprs_dynamics.simulation.export.expressed import AT_ONCE, MJCF, Expressed
 from pprs_dynamics.simulation.export.writers import closures
-from pprs_dynamics.simulation.mechanism_run import draw_motion
+from pprs_dynamics.simulation.injection import draw_motion
 
 # The motion where no recording is given: rests, reverses every drive, and takes seconds.
 DURATION, RATE = 8.0, 100.0  # [s, Hz]
 
 
-class Replay:
-    """The file in the engine, and the errors of all that was replayed.
+def file_efforts(robot: ExportedRobot, text: str, kind: str, drives: JointMotion) -> Array:
+    """Return the drives' efforts by a file along a motion, (N, D) [N m, N].
 
     Parameters
     ----------
-    expressed : Expressed
     robot : ExportedRobot
     text : str
         The file's content.
     kind : {'urdf', 'mjcf'}
+    drives : JointMotion
     """
-
-    def __init__(self, expressed: Expressed, robot: ExportedRobot, text: str, kind: str) -> None:
-        self.expressed, self.robot = expressed, robot
-        mujoco = self.engine = load_engine('the replay of an exported model')
-        spec = mujoco.MjSpec.from_string(text)
-        structure = robot.mechanism.structure
-        if kind != MJCF:
-            spec.option.gravity = robot.mechanism.gravity
-            _close(mujoco, spec, robot)
-        model = spec.compile()
-        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-        model.opt.disableflags |= (mujoco.mjtDisableBit.mjDSBL_CONTACT
-                                   | mujoco.mjtDisableBit.mjDSBL_LIMIT)
-        self.state = EngineState(mujoco, model, structure, Frame())
-        self.samples = 0
-        self.squares = np.zeros((2, len(structure.drives)))
-
-    def efforts(self, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """Return the drives' efforts by the file, (N, D) [N m, N]."""
-        mujoco, state = self.engine, self.state
-        model, data = state.model, state.data
-        m = self.robot.mechanism.at(position, velocity, acceleration).motion
-        found = np.empty_like(position)
-        for k in range(len(position)):
-            state.put(m, k)
-            mujoco.mj_inverse(model, data)
-            closing = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
-            rows = data.efc_J.reshape(-1, model.nv)[closing]
-            # Dry friction by its law, in the place of the engine's constraints.
-            needed = (data.qfrc_inverse + data.qfrc_constraint
-                      + model.dof_frictionloss * np.tanh(data.qvel / AT_ONCE))
-            found[k] = state.driven(needed, rows)
-        return found
-
-    def add(self, forces: Any) -> Array:
-        """Replay the motion of forces of the model, and return the efforts by the file, (N, D)."""
-        motion = (forces.mechanism.motion if isinstance(self.expressed.model, DriveModel)
-                  else JointMotion(*forces.drive_motion))
-        model: Any = self.expressed.model  # of the kind that the motion is of
-        expected = model.drive_forces(motion).total
-        efforts = self.efforts(*(np.ascontiguousarray(each) for each in forces.drive_motion))
-        self.samples += len(efforts)
-        for sums, other in zip(self.squares, (efforts, expected), strict=True):
-            sums += np.sum((forces.total - other) ** 2, axis=0)
-        return efforts
+    mujoco = load_engine('the replay of an exported model')
+    spec = mujoco.MjSpec.from_string(text)
+    if kind != MJCF:
+        spec.option.gravity = robot.mechanism.gravity
+        _close(mujoco, spec, robot)
+    model = spec.compile()
+    model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    model.opt.disableflags |= (mujoco.mjtDisableBit.mjDSBL_CONTACT
+                               | mujoco.mjtDisableBit.mjDSBL_LIMIT)
+    state = EngineState(mujoco, model, robot.mechanism.structure, Frame())
+    data = state.data
+    motion = robot.mechanism.at(drives.position, drives.velocity, drives.acceleration).motion
+    found = np.empty_like(drives.position)
+    for k in range(len(drives)):
+        state.put(motion, k)
+        mujoco.mj_inverse(model, data)
+        closing = data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+        # Dry friction by its law, in the place of the engine's constraints.
+        found[k] = state.driven(
+            data.qfrc_inverse + data.qfrc_constraint
+            + model.dof_frictionloss * np.tanh(data.qvel / AT_ONCE),
+            data.efc_J.reshape(-1, model.nv)[closing])
+    return found
 
 
 @dataclass(frozen=True)
 class Replayed:
-    """What a replay found.
+    """Result of a replay.
 
     Parameters
     ----------
@@ -115,34 +91,29 @@ class Replayed:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as data for JSON."""
-        by_drive = zip(self.drives, self.units, self.error.tolist(), self.expected.tolist(),
-                       self.effort.tolist(), strict=True)
-        return {
-            'replay_error': root_mean_square(self.error),
-            'expected_error': root_mean_square(self.expected),
-            'effort': root_mean_square(self.effort),
-            'drives': {name: {'unit': unit, 'replay_error': error, 'expected_error': expected,
-                              'effort': effort}
-                       for name, unit, error, expected, effort in by_drive}}
+        return {'replay_error': root_mean_square(self.error),
+                'expected_error': root_mean_square(self.expected),
+                'effort': root_mean_square(self.effort)}
 
 
-def replay_excitation(model: ForceModel, replay: Replay) -> Replayed:
-    """Replay a short motion of the model itself."""
-    state = model.initial_state()
-    forces = model.measured(model.drive_forces(_excitation(model), state), state)
-    replay.add(forces)
-    error, expected, effort = (np.sqrt(sums / replay.samples) for sums in (
-        *replay.squares, np.sum(forces.total ** 2, axis=0)))
+def replay(model: DriveModel, expressed: Expressed, robot: ExportedRobot, text: str, kind: str,
+           ) -> Replayed:
+    """Replay a short motion of the model in MuJoCo; see `file_efforts`."""
+    state, motion = model.initial_state(), _excitation(model)
+    forces = model.measured(model.drive_forces(motion, state), state)
+    by_file = file_efforts(robot, text, kind, JointMotion(*forces.drive_motion))
+    error, expected, effort = (np.sqrt(np.mean(values ** 2, axis=0)) for values in (
+        forces.total - by_file, forces.total - expressed.model.drive_forces(motion).total,
+        forces.total))
     return Replayed(model.drives, tuple(unit.effort for unit in model.units), error, expected,
                     effort)
 
 
-def _excitation(model: ForceModel) -> Any:
+def _excitation(model: DriveModel) -> Any:
     time = np.arange(0.0, DURATION, 1 / RATE)
-    if isinstance(model, DriveModel):
-        return Excitation(duration=DURATION).motion(time)
-    assert isinstance(model, MechanismModel)
-    return draw_motion(model, DURATION, 0)
+    if model.moves_joints:
+        return draw_motion(model, DURATION, 0)
+    return Excitation(duration=DURATION).motion(time)
 
 
 def _close(mujoco: Any, spec: Any, robot: ExportedRobot) -> None:

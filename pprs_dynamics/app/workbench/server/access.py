@@ -23,7 +23,6 @@ from starlette.responses import PlainTextResponse, RedirectResponse, Response
 
 TOKEN = 'token'  # in the query of the address
 MOST_BYTES = 64_000  # of a body that is no upload
-MOST_COOKIES = 16  # browsers at a time; the one that was quiet for longest has to go
 SAFE = ('GET', 'HEAD')
 HEADERS = {
     'Content-Security-Policy':
@@ -36,7 +35,7 @@ HEADERS = {
 
 @dataclass
 class Keys:
-    """Tokens that are good for one exchange each, and the cookies they were exchanged for.
+    """Tokens that are good for one exchange each, and the cookie that they are exchanged for.
 
     Parameters
     ----------
@@ -48,7 +47,7 @@ class Keys:
     host: str
     port: int
     _token: str = field(default_factory=lambda: secrets.token_urlsafe(32), repr=False)
-    _cookies: list[str] = field(default_factory=list, repr=False)
+    _cookie: str = field(default_factory=lambda: secrets.token_urlsafe(32), repr=False)
     _lock: Lock = field(default_factory=Lock, repr=False)
 
     @property
@@ -74,17 +73,11 @@ class Keys:
             if not secrets.compare_digest(token.encode(), self._token.encode()):
                 return None
             self._token = secrets.token_urlsafe(32)
-            self._cookies = [*self._cookies, secrets.token_urlsafe(32)][-MOST_COOKIES:]
-            return self._cookies[-1]
+            return self._cookie
 
     def knows(self, cookie: str) -> bool:
-        """Return whether a cookie was given out; it is then the last to be forgotten."""
-        with self._lock:
-            # All are compared, so that the time tells nothing.
-            same = [one for one in self._cookies
-                    if secrets.compare_digest(cookie.encode(), one.encode())]
-            self._cookies = [one for one in self._cookies if one not in same] + same
-            return bool(same)
+        """Return whether this is the cookie."""
+        return secrets.compare_digest(cookie.encode(), self._cookie.encode())
 
 
 class AccessControl:
@@ -148,7 +141,7 @@ class AccessControl:
                 self.used()
             return answer
         if not known:
-            return _refuse(401, 'open the address that stands in the terminal, with its token')
+            return _refuse(401, 'open the address in the terminal, with its token')
         length = headers.get('content-length', '0')
         most = self.uploads.get(request.url.path, MOST_BYTES)
         if not length.isdecimal() or len(length) > len(str(most)) or int(length) > most:

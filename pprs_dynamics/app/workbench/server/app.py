@@ -96,7 +96,7 @@ def _status(status: int) -> Callable[[Request, Exception], Response]:
 
 
 def in_thread(work: Callable[[Any], Response]) -> Callable[[Request], Awaitable[Response]]:
-    """Return an endpoint that works beside the loop."""
+    """Return an endpoint that works in a thread."""
     async def endpoint(request: Request) -> Response:
         return await run_in_threadpool(work, request.query_params)
     return endpoint
@@ -319,7 +319,7 @@ class Api:
         return self.hub.live
 
     async def events(self, request: Request) -> Response:
-        """Tell the page, whenever something changed, the version that it led to."""
+        """Stream the version of the state after each change."""
         async def lines() -> AsyncIterator[bytes]:
             queue = self.hub.subscribe()
             try:

@@ -41,7 +41,7 @@ class ChangeLog:
         version : int
             As it was before the state was looked at.
         """
-        effects = {(EFFECTS, one['name']): one for one in state.get(EFFECTS, ())}
+        effects = {(EFFECTS, effect['name']): effect for effect in state.get(EFFECTS, ())}
         parts = {(key, ''): value for key, value in state.items() if key != EFFECTS} | effects
         parts['effect_names', ''] = [name for _, name in effects]
         changed = [key for key, part in parts.items()

@@ -24,7 +24,7 @@ from pprs_dynamics.app.workbench.server.offered import ENDINGS, Offered
 from pprs_dynamics.app.workbench.session import Session
 from pprs_dynamics.app.workbench.session_file import SavedSession
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.physics.model.force_model import ForceModel
+from pprs_dynamics.physics.model.drive_model import DriveModel
 
 MOST_UPLOADS, LONGEST_NAME = 20, 80
 NOT_PLAIN = re.compile('[^A-Za-z0-9._-]+')  # in names of files from elsewhere
@@ -45,7 +45,7 @@ class LiveSource(Protocol):
     def machine(self) -> str:
         """Return what would be set, in words, for a person to confirm; '' where no node runs."""
 
-    def set_model(self, model: ForceModel, confirmed: str) -> dict[str, Any]:
+    def set_model(self, model: DriveModel, confirmed: str) -> dict[str, Any]:
         """Set a model on the running nodes, all or none; return what each said."""
 
     def restore(self, confirmed: str) -> dict[str, Any]:
@@ -87,7 +87,7 @@ class Hub:
         self._worker = Thread(target=self._run, name='workbench', daemon=True)
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begin to work; changes are told in this loop."""
+        """Start the worker; changes are announced in this loop."""
         self._loop = loop
         self._worker.start()
 
@@ -112,7 +112,7 @@ class Hub:
 
     @contextmanager
     def steady(self) -> Iterator[None]:
-        """Keep the state as it is while the block lasts, for one who looks at it."""
+        """Prevent changes of the state while the block lasts."""
         with self._steady, self.session.ticks.steady() if self.session else nullcontext():
             yield
 
@@ -129,7 +129,7 @@ class Hub:
         self._waiting.discard(queue)
 
     def notify(self) -> None:
-        """Tell all browsers that something changed."""
+        """Notify all browsers of a change."""
         self.log.count()
         if self._loop is not None and not self._loop.is_closed():
             with suppress(RuntimeError):  # it closes just now
@@ -171,14 +171,14 @@ class Hub:
     def upload(self, name: str) -> Iterator[Path]:
         """Give the path for an upload, in a folder of its own, with what is plain of its name.
 
-        What raises an error inside leaves nothing behind, and does not count.
+        After an error inside the block nothing remains, and the upload does not count.
 
         Raises
         ------
         SessionError
             For an ending that no reader has, or after too many uploads.
         """
-        ending = next((one for one in ENDINGS if name.lower().endswith(one)), None)
+        ending = next((ending for ending in ENDINGS if name.lower().endswith(ending)), None)
         if ending is None:
             raise SessionError(f'a recording must end in {", ".join(ENDINGS)}')
         with self._lock:

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What goes over the wire: fields of requests, checked, and answers in binary.
+"""Checked fields of requests, and binary answers.
 
 An answer is a JSON header with arrays for typed arrays, or a file to download.
 """

@@ -3,16 +3,15 @@
 
 """Friction that differs by direction, in its dry or in its viscous part.
 
-With p = (1 + sgn q_dot) / 2 while moving forwards and 1 - p while moving backwards, the force is
-p (F_f + c_f q_dot) + (1 - p) (-F_b + c_b q_dot): positive forces and coefficients oppose the
-motion in their direction. Dry friction alone equals coulomb_friction (F_f + F_b) / 2 plus
-effort_offset (F_f - F_b) / 2, which is also what it gives at rest.
+The force is p (F_f + c_f q_dot) + (1 - p) (-F_b + c_b q_dot), with p = (1 + sgn q_dot) / 2.
+Positive forces and coefficients oppose the motion in their direction. Dry friction alone equals
+coulomb_friction (F_f + F_b) / 2 plus effort_offset (F_f - F_b) / 2, which is also its force at
+rest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
-from typing import ClassVar
+from collections.abc import Hashable
 
 import numpy as np
 
@@ -28,9 +27,9 @@ VISCOUS = ('viscous_forward', 'viscous_backward')
 class AsymmetricFriction(DriveEffect):
     """Friction that differs by direction: wipers, worm and screw drives, check valves."""
 
-    name: ClassVar[str] = 'asymmetric_friction'
-    is_friction: ClassVar[bool] = True
-    at_one_load: ClassVar[str] = 'gear_efficiency'
+    name = 'asymmetric_friction'
+    is_friction = True
+    at_one_load = 'gear_efficiency'
     linear = (
         Parameter('force_forward', 'F_f', 'N', 'dry friction forwards', -1e6, 1e6, 0.0, 0.5),
         Parameter('force_backward', 'F_b', 'N', 'dry friction backwards', -1e6, 1e6, 0.0, 0.5),
@@ -39,7 +38,6 @@ class AsymmetricFriction(DriveEffect):
         Parameter('viscous_backward', 'c_b', 'N s/m', 'viscous coefficient backwards', -1e6, 1e6,
                   0.0, 5.0))
     variants = (*((name,) for name in VISCOUS + FORCES), FORCES, VISCOUS, FORCES + VISCOUS)
-    unphysical_below: ClassVar[Mapping[str, float]] = dict.fromkeys(FORCES + VISCOUS, 0.0)
     card = Card(
         'F_f + c_f q_dot while q_dot > 0; -F_b + c_b q_dot while q_dot < 0',
         'over velocity, a branch that is higher or steeper on one side of zero than on the other',

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import Effect
-from pprs_dynamics.physics.mechanism.drive_states import DriveStates
+from pprs_dynamics.physics.mechanism.state import MechanismState
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class AxisFriction(Effect):
         F_c [N, N m].
     """
 
-    name: ClassVar[str] = 'active_friction'
+    name = 'active_friction'
     viscous: float | tuple[float, ...]
     coulomb: float | tuple[float, ...]
 
-    def force(self, state: DriveStates, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the drives' forces, (N, D) [N, N m]."""
         viscous, coulomb = self._rows
         return viscous * state.velocity + coulomb * state.direction
@@ -56,10 +56,10 @@ class AxisOffset(Effect):
         [N, N m]
     """
 
-    name: ClassVar[str] = 'offset'
+    name = 'offset'
     value: float | tuple[float, ...]
 
-    def force(self, state: DriveStates, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the drives' forces, (N, D) [N, N m]."""
         force: Array = 0.0 * state.velocity + self._row
         return force

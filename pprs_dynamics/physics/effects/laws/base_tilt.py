@@ -13,19 +13,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import cos, sin
-from typing import Any, ClassVar
+from typing import Any
 
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
 
 class BaseTilt(BodyEffect):
     """Gravity turned by x about the x axis of `base`, then by y about its y axis."""
 
-    name: ClassVar[str] = 'base_tilt'
-    acts_in = frozenset({PLATFORM, ARM})
-    idealised: ClassVar[bool] = False
-    nonlinear: ClassVar[bool] = True
+    name = 'base_tilt'
+    acts_in = frozenset({PLATFORM, MECHANISM})
+    idealised = False
+    nonlinear = True
     # A base is levelled to a degree; what leans by more than 20 stands so on purpose: gravity in
     # the model says how.
     linear = tuple(
@@ -40,7 +41,7 @@ class BaseTilt(BodyEffect):
         'the model with a wrong direction',
         'put a spirit level on the base; shim one foot by 5 mm and repeat: the error must change',
         'Khalil, Dombre, Modeling, Identification and Control of Robots, 2002')
-    arm_card = Card(
+    mechanism_card = Card(
         'g -> R_y(alpha_y) R_x(alpha_x) g, in base',
         'errors of all joints that depend on the pose alone: the first joint, which carries no '
         'weight on a level base, shows it best where its axis should be upright',

@@ -5,9 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar
-
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.physics.effects.effect import Card, Parameter
@@ -16,11 +13,10 @@ from pprs_dynamics.physics.effects.effect import Card, Parameter
 class CoulombFriction(DriveEffect):
     """Force of constant size against the motion: seals, preloaded nuts and bearings."""
 
-    name: ClassVar[str] = 'coulomb_friction'
-    is_friction: ClassVar[bool] = True
-    at_one_load: ClassVar[str] = 'load_friction'
+    name = 'coulomb_friction'
+    is_friction = True
+    at_one_load = 'load_friction'
     linear = (Parameter('force', 'F', 'N', 'size of the friction force', -1e6, 1e6, scale=0.5),)
-    unphysical_below: ClassVar[Mapping[str, float]] = {'force': 0.0}
     card = Card(
         'F sgn(q_dot)',
         'a square wave: one level while the drive moves forwards, its negative backwards, a '

@@ -10,13 +10,13 @@ l = sqrt(1 + rho^2 - 2 rho cos(q - q_0)) is its length over b.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
-from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.mechanism.places import MECHANISM
 
 PRESSURE = 'pressure'
 # Over less of a turn [rad] it is a spring like any other.
@@ -31,8 +31,8 @@ BEND = 0.2
 class Counterbalance(DriveEffect):
     """Spring, gas or hydraulic cylinder that carries weight, between two links."""
 
-    name: ClassVar[str] = 'counterbalance'
-    acts_in = frozenset({ARM})
+    name = 'counterbalance'
+    acts_in = frozenset({MECHANISM})
     linear = (Parameter('force', 'F_b', 'N m', 'pull at no length, times b; negative where it '
                         'pushes', -1e7, 1e7, scale=5.0),
               Parameter('stiffness', 'K', 'N m', 'stiffness times b^2', -1e7, 1e7, 0.0,

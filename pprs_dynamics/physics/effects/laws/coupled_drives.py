@@ -16,18 +16,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
+from pprs_dynamics.physics.mechanism.places import MECHANISM
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 
 
 class CoupledDrives(StructureEffect):
     """Friction of a motor that moves more than one joint, by the map of the model file."""
 
-    name: ClassVar[str] = 'coupled_drives'
-    acts_in = frozenset({ARM})
-    is_friction: ClassVar[bool] = True
-    is_of_one_place: ClassVar[bool] = True
+    name = 'coupled_drives'
+    acts_in = frozenset({MECHANISM})
+    is_friction = True
+    is_of_one_place = True
     linear = ()
     card = Card(
         "tau -> tau + A' (c m_dot + F sgn(m_dot)), m_dot = A q_dot of one motor",

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveRange, DriveSamples, GainEffect
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter, Wave
 from pprs_dynamics.physics.effects.laws.friction_temperature import (
     middle_temperature,
     warmer_than,
@@ -30,9 +29,9 @@ class CurrentGain(GainEffect):
     Efforts are currents times one constant; what the motor gives per current is another one.
     """
 
-    name: ClassVar[str] = 'current_gain'
-    idealised: ClassVar[bool] = False
-    nonlinear: ClassVar[bool] = True
+    name = 'current_gain'
+    idealised = False
+    nonlinear = True
     linear = (Parameter('temperature', 'kappa', '1/K', 'by which effort is measured too large per '
                         'kelvin', -0.1, 0.1, 0.0, scale=0.001, expected=(0.002, 0.002)),
               Parameter('ripple', 'a', '1', 'height of the wave over the effort', 0.0, 0.9, 0.0,
@@ -50,6 +49,7 @@ class CurrentGain(GainEffect):
         Parameter('cosine', 'a sin(phi)', '1', 'share of the cosine', -0.9, 0.9, scale=0.02,
                   expected=(0.03, 0.03)))
     variants = (('temperature',), ('sine', 'cosine'))
+    waves = (Wave('ripple', 'phase', 'sine', 'cosine'),)
     card = Card(
         'measured effort = (1 + kappa (T - T_0) + a sin(2 pi q / p + phi)) F',
         'an error in proportion to the effort itself, weight, inertia and friction alike, that '
@@ -83,17 +83,3 @@ class CurrentGain(GainEffect):
         return [*({'reference': middle + share * span, 'pitch': pitches[0]}
                   for share in ((-1.0, 0.0, 1.0) if span else (0.0,))),
                 *({'reference': middle, 'pitch': pitch} for pitch in pitches[1:])]
-
-    @classmethod
-    def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
-        """Return kappa, a cos(phi) and a sin(phi)."""
-        a, phi = values['ripple'], values['phase']
-        return {'temperature': values['temperature'], 'sine': a * math.cos(phi),
-                'cosine': a * math.sin(phi)}
-
-    @classmethod
-    def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
-        """Return kappa, height and phase of the wave."""
-        sine, cosine = coefficients['sine'], coefficients['cosine']
-        return {'temperature': coefficients['temperature'], 'ripple': math.hypot(sine, cosine),
-                'phase': math.atan2(cosine, sine)}

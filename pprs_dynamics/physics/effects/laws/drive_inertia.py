@@ -5,9 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar
-
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.physics.effects.effect import Card, Parameter
@@ -16,10 +13,10 @@ from pprs_dynamics.physics.effects.effect import Card, Parameter
 class DriveInertia(DriveEffect):
     """Force in proportion to acceleration: rotor, coupling and screw, reflected to the slide."""
 
-    name: ClassVar[str] = 'drive_inertia'
-    idealised: ClassVar[bool] = False
+    name = 'drive_inertia'
+    idealised = False
     linear = (Parameter('mass', 'm', 'kg', 'reflected inertia', -1e4, 1e4, scale=0.1),)
-    unphysical_below: ClassVar[Mapping[str, float]] = {'mass': 0.0}
+    is_positive = True
     card = Card(
         'm q_ddot',
         "a straight line over the drive's own acceleration, and no part in its weight; largest "
@@ -30,7 +27,7 @@ class DriveInertia(DriveEffect):
         'force must grow fourfold; a payload would act on all drives and at rest, this does not',
         'Khalil and Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002, '
         'on the inertia of rotors')
-    arm_card = Card(
+    mechanism_card = Card(
         'm q_ddot',
         'an error that follows the acceleration of this joint alone',
         'the rotor: its inertia times the square of the gear ratio acts at the joint, often more '

@@ -9,7 +9,6 @@ It is linear in the stiffness k and the force at q = 0, -k q_0, so that is what 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from pprs_dynamics.physics.effects.relaxed_position import FARTHEST, relaxed_pos
 class DriveSpring(DriveEffect):
     """Force in proportion to position: cable chain, counterbalance, bellows."""
 
-    name: ClassVar[str] = 'drive_spring'
+    name = 'drive_spring'
     linear = (
         Parameter('stiffness', 'k', 'N/m', 'force per position', -1e6, 1e6, scale=10.0),
         Parameter('position', 'q_0', 'm', 'position at which it is relaxed', -FARTHEST, FARTHEST,

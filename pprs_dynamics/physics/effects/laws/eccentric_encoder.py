@@ -15,13 +15,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveRange, MeasurementEffect
-from pprs_dynamics.physics.effects.effect import ARM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter, Wave
+from pprs_dynamics.physics.mechanism.places import MECHANISM
 
 TURN = 2 * math.pi
 
@@ -29,12 +29,12 @@ TURN = 2 * math.pi
 class EccentricEncoder(MeasurementEffect):
     """Positions that are wrong by a wave once a turn of the encoder."""
 
-    name: ClassVar[str] = 'eccentric_encoder'
+    name = 'eccentric_encoder'
     # Of a joint that turns, or of a drive whose motor is known to turn so often.
-    acts_in = frozenset({ARM})
-    idealised: ClassVar[bool] = False
-    nonlinear: ClassVar[bool] = True
-    is_of_position: ClassVar[bool] = True
+    acts_in = frozenset({MECHANISM})
+    idealised = False
+    nonlinear = True
+    is_of_position = True
     linear = (
         Parameter('amplitude', 'A', 'm', 'of the wave', 0.0, 0.1, scale=1e-4, turning=(0.0, 0.5)),
         Parameter('phase', 'phi', 'rad', 'phase at position 0', -TURN, TURN, is_angle=True))
@@ -45,6 +45,7 @@ class EccentricEncoder(MeasurementEffect):
         for name, symbol, description in (
             ('sine', 'A cos phi', 'amplitude of the sine'),
             ('cosine', 'A sin phi', 'amplitude of the cosine')))
+    waves = (Wave('amplitude', 'phase', 'sine', 'cosine'),)
     card = Card(
         'measured position = q + A sin(2 pi q / p + phi)',
         'a wave over the position, always at the same places, whose height grows with the square '
@@ -71,22 +72,5 @@ class EccentricEncoder(MeasurementEffect):
 
     def position_error(self, drives: Sequence[str], position: Array) -> Array:
         """Return how far encoders are ahead, (N, D) [m, rad]."""
-        error = np.zeros_like(position)
-        for name, values in self.drives.items():
-            if name in drives:
-                k = drives.index(name)
-                error[:, k] = values['amplitude'] * np.sin(
-                    TURN * position[:, k] / values['pitch'] + values['phase'])
-        return error
-
-    @classmethod
-    def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
-        """Return A cos(phi) and A sin(phi)."""
-        A, phi = values['amplitude'], values['phase']
-        return {'sine': A * math.cos(phi), 'cosine': A * math.sin(phi)}
-
-    @classmethod
-    def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
-        """Return amplitude and phase."""
-        sine, cosine = coefficients['sine'], coefficients['cosine']
-        return {'amplitude': math.hypot(sine, cosine), 'phase': math.atan2(cosine, sine)}
+        return self.by_drive(drives, position, lambda q, own: own['amplitude'] * np.sin(
+            TURN * q / own['pitch'] + own['phase']))

@@ -1,14 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Effort that a low-pass filter has rounded off: (T/2 d/dt + 1)^2 y = F.
+"""Effort behind a low-pass filter: (T/2 d/dt + 1)^2 y = F.
 
-Two equal lags in series, since filters of amplifiers and recorders are of first order (an RC), of
-second (Butterworth, Bessel) or means over some samples: of a change at 20 Hz that each of them
-makes, this form leaves an eighth, where a single lag leaves a quarter of a Butterworth's and a
-third of a pure delay's. T is the filter's mean delay, whatever its order. What another order does
-is left open in every fit: to the second order in T d/dt a Butterworth is as far from two lags as
-these are from one.
+The form is two equal lags in series. Filters of amplifiers and recorders are of first order (an
+RC), of second order (Butterworth, Bessel) or means over some samples. At 20 Hz the residual of this
+form is an eighth of the change that each of them makes. The residual of a single lag is a quarter
+for a Butterworth filter and a third for a pure delay. T is the filter's mean delay, whatever its
+order. Every fit allows for another order: to the second order in T d/dt a Butterworth filter is as
+far from two lags as these are from one.
 
 References
 ----------
@@ -18,7 +18,7 @@ G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems, 3r
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -35,10 +35,10 @@ SHORTEST, LONGEST, TRIALS = 0.002, 0.2, 14
 class EffortFilter(MeasurementEffect):
     """The amplifier's or the recorder's effort signal is smoothed before it is recorded."""
 
-    name: ClassVar[str] = 'effort_filter'
-    nonlinear: ClassVar[bool] = True
-    shows_at_reversals: ClassVar[bool] = True
-    assumed_at_start: ClassVar[str] = 'the filter has settled at the first sample'
+    name = 'effort_filter'
+    nonlinear = True
+    shows_at_reversals = True
+    assumed_at_start = 'the filter has settled at the first sample'
     linear = ()
     shape = (Parameter('time_constant', 'T', 's', 'mean delay of the filter', 1e-4, 1.0,
                        scale=0.01),)
@@ -72,27 +72,23 @@ class EffortFilter(MeasurementEffect):
         """Return the last time, and what goes into each lag and comes out of it last."""
         return {'time': None, 'states': None}
 
-    def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
-               memory: Any = None) -> Array:
-        """Return the filtered effort, (N, D), of a filter that had settled at the first sample."""
+    @classmethod
+    def drive_sensed(cls, effort: Array, time: Array | None, parameters: Mapping[str, float],
+                     memory: Any) -> Array:
+        """Return the filtered effort, (N,), of a filter that had settled at the first sample."""
         if time is None or not len(time):
             return effort
-        filtered = effort.copy()
-        for name, values in self.drives.items():
-            index = drives.index(name)
-            past = self.drive_memory() if memory is None else memory[name]
-            is_first = past['time'] is None
-            times = time if is_first else np.concatenate(([past['time']], time))
-            step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-            signal, states = effort[:, index], []
-            for k in range(LAGS):
-                entered, left = (signal[0], signal[0]) if is_first else past['states'][k]
-                smooth = lag(signal, step, values['time_constant'] / LAGS, entered, left)
-                states.append((float(signal[-1]), float(smooth[-1])))
-                signal = smooth
-            filtered[:, index] = signal
-            past.update(time=float(time[-1]), states=states)
-        return filtered
+        is_first = memory['time'] is None
+        times = time if is_first else np.concatenate(([memory['time']], time))
+        step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+        signal, states = effort, []
+        for k in range(LAGS):
+            entered, left = (signal[0], signal[0]) if is_first else memory['states'][k]
+            smooth = lag(signal, step, parameters['time_constant'] / LAGS, entered, left)
+            states.append((float(signal[-1]), float(smooth[-1])))
+            signal = smooth
+        memory.update(time=float(time[-1]), states=states)
+        return signal
 
 
 def lag(signal: Array, step: float, time_constant: float, entered: float, left: float) -> Array:

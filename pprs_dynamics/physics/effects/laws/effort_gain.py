@@ -11,8 +11,8 @@ robots, J. Dynamic Systems, Measurement, and Control 136 (2014).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from typing import Any
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
@@ -22,9 +22,9 @@ from pprs_dynamics.physics.effects.effect import Card, Parameter
 class EffortGain(MeasurementEffect):
     """A drive constant (force per current) that is not what the amplifier thinks."""
 
-    name: ClassVar[str] = 'effort_gain'
-    idealised: ClassVar[bool] = False
-    nonlinear: ClassVar[bool] = True
+    name = 'effort_gain'
+    idealised = False
+    nonlinear = True
     # Makers state torque constants within some 10 %, as a limit. A factor of more than 1.5 is
     # another unit or motor, which belongs into the model.
     linear = (Parameter('gain', 'g', '1', 'by which effort is measured too large', -1 / 3, 0.5,
@@ -39,10 +39,8 @@ class EffortGain(MeasurementEffect):
         'Gautier and Briot, Global identification of joint drive gains and dynamic parameters '
         'of robots, 2014')
 
-    def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
-               memory: Any = None) -> Array:
+    @classmethod
+    def drive_sensed(cls, effort: Array, time: Array | None, parameters: Mapping[str, float],
+                     memory: Any) -> Array:
         """Return (1 + g) F."""
-        scaled = effort.copy()
-        for name, values in self.drives.items():
-            scaled[:, drives.index(name)] *= 1 + values['gain']
-        return scaled
+        return (1 + parameters['gain']) * effort

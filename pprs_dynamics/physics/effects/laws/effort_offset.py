@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 
 from pprs_dynamics.arrays import Array
@@ -17,8 +15,8 @@ from pprs_dynamics.physics.effects.effect import Card, Parameter
 class EffortOffset(DriveEffect):
     """Constant force: a counterbalance, a hanging cable, a biased amplifier."""
 
-    name: ClassVar[str] = 'effort_offset'
-    may_be_measurement: ClassVar[bool] = True
+    name = 'effort_offset'
+    may_be_measurement = True
     linear = (Parameter('force', 'F_0', 'N', 'constant force', -1e6, 1e6, scale=0.5),)
     card = Card(
         'F_0',

@@ -12,13 +12,13 @@ speed is as read.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect, Windup
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
 LINK_POSITION = 'link_position'
 # Usual compliances of screws and belts, of gears and shafts [m/N, rad/(N m)].
@@ -28,15 +28,15 @@ SOFT = (2e-6, 3e-4)
 class ElasticJoint(MeasurementEffect):
     """Gear, shaft or belt that winds up between an encoder on the motor and the link."""
 
-    name: ClassVar[str] = 'elastic_joint'
-    acts_in = frozenset({PLATFORM, ARM})
-    nonlinear: ClassVar[bool] = True
+    name = 'elastic_joint'
+    acts_in = frozenset({PLATFORM, MECHANISM})
+    nonlinear = True
     linear = (
         Parameter('compliance', '1/k', 'm/N', 'by which the motor leads the link per load', -1.0,
                   1.0, scale=1e-6, expected=SOFT, turning=(-10.0, 10.0)),
         Parameter('loss', 'd/k', 's', 'loss over stiffness: by which wind-up is behind its load',
                   -10.0, 10.0, 0.0, scale=0.01, expected=(0.03, 0.03)))
-    unphysical_below: ClassVar[Mapping[str, float]] = {'compliance': 0.0, 'loss': 0.0}
+    is_positive = True
     card = Card(
         'motor position = q + w, k w + d w_dot = tau',
         'weight and inertia as of a drive that stands aside, the more the more it carries, and '
@@ -55,9 +55,7 @@ class ElasticJoint(MeasurementEffect):
 
     def loaded_position_error(self, drives: Sequence[str], transmitted: Array) -> Array:
         """Return how far encoders are ahead because of loads, (N, D) [m, rad]."""
-        softness = [self.drives.get(name, {}).get('compliance', 0.0) for name in drives]
-        error: Array = transmitted * np.array(softness)
-        return error
+        return self.by_drive(drives, transmitted, lambda load, own: own['compliance'] * load)
 
     def windup_error(self, drives: Sequence[str], transmitted: Array, windup: Array) -> Array:
         """Return what the second encoder says otherwise than loads, of positions and rates."""

@@ -10,12 +10,13 @@ L.-W. Tsai, Robot Analysis, 1999, on statics by virtual work.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 
 FORCES = tuple(f'force_{axis}' for axis in 'xyz')
@@ -28,9 +29,9 @@ class ExternalWrench(BodyEffect):
     Pulled down, force_z is positive.
     """
 
-    name: ClassVar[str] = 'external_wrench'
-    acts_in = frozenset({PLATFORM, ARM})
-    nonlinear: ClassVar[bool] = True
+    name = 'external_wrench'
+    acts_in = frozenset({PLATFORM, MECHANISM})
+    nonlinear = True
     linear = (
         *(Parameter(name, f'F_{name[-1]}', 'N', f'force to overcome along {name[-1]} of base',
                     -1e6, 1e6, scale=1.0) for name in FORCES),
@@ -47,7 +48,7 @@ class ExternalWrench(BodyEffect):
         'and look whether the same force is found. Only accelerations tell a downward force '
         'from a payload',
         'Tsai, Robot Analysis, 1999')
-    arm_card = Card(
+    mechanism_card = Card(
         'tau = J^T (F, M), F and M in base at the origin of the tool',
         'errors that depend on the pose alone, whatever the speed, in the proportions of the '
         'Jacobian of the tool',

@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter, Wave
 
 SHORTEST = 8e-4  # [m], pitch tried
 FEWEST = 3  # periods over the stroke; fewer are a spring's curve as well
@@ -30,7 +29,7 @@ TURN = 2 * math.pi
 class ForceRipple(DriveEffect):
     """Force that repeats with each turn or pole: screw, gear or motor cogging."""
 
-    name: ClassVar[str] = 'force_ripple'
+    name = 'force_ripple'
     linear = (
         Parameter('force', 'A', 'N', 'amplitude', 0.0, 1e6, scale=0.3),
         Parameter('phase', 'phi', 'rad', 'phase at position 0', -TURN, TURN,
@@ -47,8 +46,10 @@ class ForceRipple(DriveEffect):
             ('second_sine', 'A_2 cos phi_2', 'amplitude of the second sine'),
             ('second_cosine', 'A_2 sin phi_2', 'amplitude of the second cosine')))
     scanned = ('sine', 'cosine')
-    is_wave: ClassVar[bool] = True
+    is_wave = True
     variants = (('sine', 'cosine'), ('sine', 'cosine', 'second_sine', 'second_cosine'))
+    waves = (Wave('force', 'phase', 'sine', 'cosine'),
+             Wave('second', 'second_phase', 'second_sine', 'second_cosine'))
     card = Card(
         'A sin(2 pi q / p + phi) + A_2 sin(4 pi q / p + phi_2)',
         'a wave over position, always at the same places, both ways and at any speed; over time '
@@ -60,7 +61,7 @@ class ForceRipple(DriveEffect):
         'coupling and repeat: cogging moves with the motor',
         'Van den Braembussche, Swevers, Van Brussel, Vanherck, Accurate tracking control of '
         'linear synchronous motor machine tool axes, Mechatronics 6, 1996')
-    arm_card = Card(
+    mechanism_card = Card(
         'A sin(2 pi q / p + phi) + A_2 sin(4 pi q / p + phi_2)',
         'a wave over the angle of the joint, always at the same places, both ways and at any '
         'speed; over time its frequency follows the speed',
@@ -120,19 +121,3 @@ class ForceRipple(DriveEffect):
         return [{'pitch': float(pitch)} for pitch in (
             *(stroke / np.arange(FEWEST, max(most, FEWEST) + STEP / 2, STEP)),
             *(of_gear if covered.gear_ratio > 1 else ()))]
-
-    @classmethod
-    def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:
-        """Return A cos(phi) and A sin(phi) of both harmonics."""
-        A, phi = values['force'], values['phase']
-        A_2, phi_2 = values['second'], values['second_phase']
-        return {'sine': A * math.cos(phi), 'cosine': A * math.sin(phi),
-                'second_sine': A_2 * math.cos(phi_2), 'second_cosine': A_2 * math.sin(phi_2)}
-
-    @classmethod
-    def from_coefficients(cls, coefficients: Mapping[str, float]) -> dict[str, float]:
-        """Return amplitudes and phases of both harmonics."""
-        a, b = coefficients['sine'], coefficients['cosine']
-        a_2, b_2 = coefficients['second_sine'], coefficients['second_cosine']
-        return {'force': math.hypot(a, b), 'phase': math.atan2(b, a),
-                'second': math.hypot(a_2, b_2), 'second_phase': math.atan2(b_2, a_2)}

@@ -24,9 +24,9 @@ from pprs_dynamics.physics.effects.first_order import first_order
 class FrictionDrift(DriveEffect):
     """Friction that changes while the robot works: cold grease, seals that warm up."""
 
-    name: ClassVar[str] = 'friction_drift'
-    assumed_at_start: ClassVar[str] = 'the drive is cold, the time of fading begins'
-    is_friction: ClassVar[bool] = True
+    name = 'friction_drift'
+    assumed_at_start = 'the drive is cold, the time of fading begins'
+    is_friction = True
     linear = (Parameter('force', 'F', 'N', 'friction at the start beyond the later one', -1e6, 1e6,
                         0.0, scale=0.5),
               Parameter('worked', 'F_w', 'N s/m', 'dry friction that comes with work, per mean '

@@ -8,7 +8,7 @@ w = T_d (1 - exp(-(T - T_0) / T_d)) is T - T_0 near the reference, and saturates
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -31,8 +31,9 @@ class FrictionTemperature(DriveEffect):
     Without a measured temperature it is not there: the model's friction is that at the reference.
     """
 
-    name: ClassVar[str] = 'friction_temperature'
-    is_friction: ClassVar[bool] = True
+    name = 'friction_temperature'
+    is_friction = True
+    unphysical_below: ClassVar[Mapping[str, float]] = {}  # warmer oil makes it negative
     linear = (Parameter('coulomb', 'F_T', 'N/K', 'dry friction per kelvin', -1e6, 1e6, 0.0,
                         scale=0.02),
               Parameter('viscous', 'c_T', 'N s/m/K', 'viscous friction per kelvin, at '

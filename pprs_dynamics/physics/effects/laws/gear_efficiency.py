@@ -5,9 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar
-
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.physics.effects.effect import Card, Parameter
@@ -17,14 +14,13 @@ from pprs_dynamics.physics.effects.open_exponent import other_exponent
 class GearEfficiency(DriveEffect):
     """A share of what a gear passes on is lost, another one where the load drives the motor."""
 
-    name: ClassVar[str] = 'gear_efficiency'
-    is_friction: ClassVar[bool] = True
-    at_one_load: ClassVar[str] = 'asymmetric_friction'
+    name = 'gear_efficiency'
+    is_friction = True
+    at_one_load = 'asymmetric_friction'
     linear = (Parameter('driving', 'mu_d', '1', 'share that is lost where the motor drives the '
                         'load: 1 / efficiency - 1', -100.0, 100.0, scale=0.05),
               Parameter('driven_back', 'mu_b', '1', 'share that is lost where the load drives the '
                         'motor: 1 - efficiency', -100.0, 100.0, scale=0.05))
-    unphysical_below: ClassVar[Mapping[str, float]] = {'driving': 0.0, 'driven_back': 0.0}
     card = Card(
         'mu_d |tau| sgn(q_dot) for tau q_dot > 0, mu_b |tau| sgn(q_dot) else, tau what gear or '
         'screw pass on',

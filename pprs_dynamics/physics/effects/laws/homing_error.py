@@ -12,24 +12,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
 
 class HomingError(MeasurementEffect):
     """The whole mechanism stands elsewhere than its encoders say."""
 
-    name: ClassVar[str] = 'homing_error'
+    name = 'homing_error'
     # No force of an axis depends on its zero.
-    acts_in = frozenset({PLATFORM, ARM})
-    idealised: ClassVar[bool] = False
-    nonlinear: ClassVar[bool] = True
-    is_of_position: ClassVar[bool] = True
+    acts_in = frozenset({PLATFORM, MECHANISM})
+    idealised = False
+    nonlinear = True
+    is_of_position = True
     # A homing switch or a mark is good for a millimetre or a degree; a joint that was put together
     # or counted wrongly may be off by any angle.
     linear = (Parameter('zero', 'z', 'm', 'by which positions are measured too large', -0.1, 0.1,
@@ -43,7 +43,7 @@ class HomingError(MeasurementEffect):
         'drive mounted a little aside',
         'home the drive again and repeat; check the zero with a gauge block',
         'Merlet, Parallel Robots, 2006')
-    arm_card = Card(
+    mechanism_card = Card(
         'measured position = q + z',
         'an error of this joint and of those before it, that depends on the pose: the weight '
         'pulls in another direction than the model thinks',
@@ -53,5 +53,4 @@ class HomingError(MeasurementEffect):
 
     def position_error(self, drives: Sequence[str], position: Array) -> Array:
         """Return z of each drive, the same at every sample, (N, D) [m, rad]."""
-        zeros = np.array([self.drives.get(name, {}).get('zero', 0.0) for name in drives])
-        return np.broadcast_to(zeros, position.shape)
+        return self.by_drive(drives, position, lambda q, own: np.full_like(q, own['zero']))

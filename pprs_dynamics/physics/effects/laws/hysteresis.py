@@ -3,17 +3,17 @@
 
 """Presliding: a friction force that builds up over a distance after each reversal (Dahl).
 
-With the drive moving by dq, the Dahl state z in [-1, 1] follows dz = (s - z) / x_d |dq|,
-s = sgn(dq), solved by z = s + (z_r - s) exp(-|q - q_r| / x_d) from a reversal at q_r, z_r on.
-The effect adds (F + mu N) (z - sgn q_dot): what presliding takes away from the Coulomb friction
-that the model already has, be it constant or in proportion to the guide's load N. Motion that
-reverses within a sample goes unseen.
+The Dahl state z in [-1, 1] follows dz = (s - z) / x_d |dq|, s = sgn(dq). From a reversal at q_r,
+z_r on, the solution is z = s + (z_r - s) exp(-|q - q_r| / x_d). The effect adds
+(F + mu N) (z - sgn q_dot): the difference of presliding from the Coulomb friction of the model,
+which is constant or proportional to the guide's load N. A motion that reverses within a sample is
+not seen.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -28,16 +28,15 @@ PUSHED, TURNED = (3e-5, 5e-3), (2e-4, 5e-2)  # [m], [rad]
 class Hysteresis(DriveEffect):
     """Elastic give of the contacts before they slide: preloaded ball guides, seals, belts."""
 
-    name: ClassVar[str] = 'hysteresis'
-    assumed_at_start: ClassVar[str] = 'the contacts are relaxed, friction builds up first'
-    is_friction: ClassVar[bool] = True
+    name = 'hysteresis'
+    assumed_at_start = 'the contacts are relaxed, friction builds up first'
+    is_friction = True
     linear = (Parameter('force', 'F', 'N', 'friction force that builds up', -1e6, 1e6, 0.0, 0.5),
               Parameter('coefficient', 'mu', '1', 'friction per guide load that builds up', -1e3,
                         1e3, 0.0, 0.05))
     variants = (('force',), ('coefficient',), ('force', 'coefficient'))
     shape = (Parameter('distance', 'x_d', 'm', 'distance over which it builds up', 1e-7, 0.1,
                        scale=1e-4, turning=(1e-6, 1.0)),)
-    unphysical_below: ClassVar[Mapping[str, float]] = {'force': 0.0, 'coefficient': 0.0}
     card = Card(
         '(F + mu N) (z - sgn q_dot), dz/dq = (1 - z sgn q_dot) / x_d',
         'a spike after each reversal, where the model already asks for full friction and the '

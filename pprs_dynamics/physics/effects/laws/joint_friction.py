@@ -19,9 +19,10 @@ from functools import cache
 from typing import Any, ClassVar
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Effect, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 from pprs_dynamics.physics.mechanism.alike import alike_joints
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 
 RADIUS = 0.01  # [m] at which a load rubs where the model does not say
@@ -34,10 +35,10 @@ class JointFrictionEffect(PassiveJointEffect):
     goes to the drives by virtual power of the whole mechanism, whatever friction.approach is.
     """
 
-    name: ClassVar[str] = 'joint_friction'
-    acts_in = frozenset({PLATFORM, ARM})
-    is_friction: ClassVar[bool] = True
-    is_of_one_place: ClassVar[bool] = True
+    name = 'joint_friction'
+    acts_in = frozenset({PLATFORM, MECHANISM})
+    is_friction = True
+    is_of_one_place = True
     linear = ()
     radii: ClassVar[Mapping[str, float]] = {}
     card = Card(
@@ -50,7 +51,7 @@ class JointFrictionEffect(PassiveJointEffect):
         'uncouple a rod from the platform, swing it by hand and turn its ball; grease the joint '
         'and repeat; run the robot warm and compare',
         'Itul, Pisla, 2007, Eq. (9) and (12)')
-    arm_card = Card(
+    mechanism_card = Card(
         'tau -> tau + T\' (c w + (T + mu r N) sgn(w)), of one passive joint',
         'errors of several drives at once, in the proportions in which they move the joint, with '
         'the sign of its rate or growing with it',
@@ -114,7 +115,7 @@ class ModelJointFriction(Effect):
         `viscous`, `torque`, `coulomb` and `radius` by joint.
     """
 
-    name: ClassVar[str] = 'passive_friction'
+    name = 'passive_friction'
 
     def __init__(self, blocks: Mapping[str, Mapping[str, float]]) -> None:
         self.blocks = {name: dict(one) for name, one in blocks.items()}

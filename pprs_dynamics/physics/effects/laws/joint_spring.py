@@ -16,10 +16,11 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.relaxed_position import FARTHEST, relaxed_position
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.alike import alike_joints
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 
 
@@ -29,9 +30,9 @@ class JointSpring(BodyEffect):
     On a 3-PPRS in its joints C_i, between lift and rod, alike in all chains.
     """
 
-    name: ClassVar[str] = 'joint_spring'
-    acts_in = frozenset({PLATFORM, ARM})
-    is_of_one_place: ClassVar[bool] = True
+    name = 'joint_spring'
+    acts_in = frozenset({PLATFORM, MECHANISM})
+    is_of_one_place = True
     linear = ()
     joints: ClassVar[tuple[str, ...]] = ()
     card = Card(
@@ -42,7 +43,7 @@ class JointSpring(BodyEffect):
         'that is bent',
         'free the loom or take off the boot and repeat; move slowly: the error must stay',
         'Howell, Compliant Mechanisms, 2001')
-    arm_card = Card(
+    mechanism_card = Card(
         'tau -> tau + T\' k (q - q_0), of one passive joint',
         'errors of several drives at once, in the proportions in which they move the joint, that '
         'follow its position whatever the speed: the same at every pass, in both directions',

@@ -11,11 +11,12 @@ parameters.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 from pprs_dynamics.physics.effects.added_body import AddedBody, Place
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card
+from pprs_dynamics.physics.effects.effect import Card
 from pprs_dynamics.physics.mechanism.alike import alike_links
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
 
 class LinkMass(AddedBody):
@@ -25,9 +26,9 @@ class LinkMass(AddedBody):
     that carries the tool is left to the payload.
     """
 
-    name: ClassVar[str] = 'link_mass'
-    acts_in = frozenset({PLATFORM, ARM})
-    is_of_one_place: ClassVar[bool] = True
+    name = 'link_mass'
+    acts_in = frozenset({PLATFORM, MECHANISM})
+    is_of_one_place = True
     linear = ()
     card = Card(
         'm_b -> m_b + m_+, uniform along each rod',
@@ -37,7 +38,7 @@ class LinkMass(AddedBody):
         'the other way round',
         'weigh a rod with all that swings with it',
         'Khalil, Dombre, Modeling, Identification and Control of Robots, 2002')
-    arm_card = Card(
+    mechanism_card = Card(
         'tau -> tau + what moves a body on the link: m_+ at c, with [I] about c, in its axes',
         'errors of this joint and of those that carry it, as large as the weight of the link '
         'times its distance from each axis, and in the same proportion to their accelerations; '

@@ -5,9 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar
-
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.physics.effects.effect import Card, Parameter
@@ -20,12 +17,11 @@ from pprs_dynamics.physics.effects.open_exponent import other_exponent
 class LoadFriction(DriveEffect):
     """Force against the motion in proportion to the guide's load: mu is not what was assumed."""
 
-    name: ClassVar[str] = 'load_friction'
-    is_friction: ClassVar[bool] = True
-    at_one_load: ClassVar[str] = 'coulomb_friction'
+    name = 'load_friction'
+    is_friction = True
+    at_one_load = 'coulomb_friction'
     linear = (Parameter('coefficient', 'dmu', '1', "friction coefficient beyond the model's",
                         -100.0, 100.0, scale=0.02),)
-    unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}
     card = Card(
         'dmu N sgn(q_dot), N the load of the guide',
         'a step at each reversal, like coulomb_friction, but higher where the guide carries more: '
@@ -36,7 +32,7 @@ class LoadFriction(DriveEffect):
         'grow with the load (if it does not: coulomb_friction); clean and lubricate, and repeat',
         'Hamon, Gautier, Garrec, Dynamic identification of robots with a dry friction model '
         'depending on load and velocity, IROS, 2010')
-    arm_card = Card(
+    mechanism_card = Card(
         'dmu |tau| sgn(q_dot), tau what the gear transmits: without friction and the rotor',
         'a step at each reversal that is higher where the joint carries more weight or accelerates '
         'more',

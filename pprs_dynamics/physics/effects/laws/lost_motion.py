@@ -4,10 +4,10 @@
 """Lost motion between encoder and link: the encoder is not where the link is.
 
 The encoder reads q + e. With backlash, e is half of it towards the side to which the load pushes
-the gear, b / 2 sgn(tau): the link falls from one flank to the other while the motor, and with it
-the encoder, goes on as before. With play, the link stays behind at reversals: the encoder first
-travels all of the play without it, and what the link does meanwhile no encoder says; it is taken
-to go on smoothly from its motion before to that after. What winds up is `elastic_joint`.
+the gear, b / 2 sgn(tau). The link falls from one flank to the other, while motor and encoder go on
+as before. With play, the link stays behind at reversals: the encoder first travels all of the play
+without it. No encoder measures the link meanwhile: its motion is taken as smooth between those
+before and after. `elastic_joint` is the effect of a gear that winds up.
 
 References
 ----------
@@ -18,14 +18,15 @@ M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash - a survey
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Self
+from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
 # On either side of the travel through the play, of its length: there the link may separate from the
 # flank. A polynomial through its motion before and after, as long as that, determines it.
@@ -39,9 +40,9 @@ USUAL = (5e-4, math.radians(1.0))
 class LostMotion(MeasurementEffect):
     """Backlash or play of what is between an encoder and the link that it is to measure."""
 
-    name: ClassVar[str] = 'lost_motion'
-    acts_in = frozenset({PLATFORM, ARM})
-    nonlinear: ClassVar[bool] = True
+    name = 'lost_motion'
+    acts_in = frozenset({PLATFORM, MECHANISM})
+    nonlinear = True
     not_linear_in: ClassVar[tuple[str, ...]] = ('play',)
     linear = (
         Parameter('backlash', 'b', 'm', 'distance between the flanks, of which the load chooses '
@@ -49,7 +50,7 @@ class LostMotion(MeasurementEffect):
         Parameter('play', 'b_r', 'm', 'travel of the encoder without the link at each reversal',
                   -0.1, 0.1, 0.0, 5e-4, expected=USUAL, turning=(-0.5, 0.5)))
     variants = (('backlash',), ('play',))
-    unphysical_below: ClassVar[Mapping[str, float]] = {'backlash': 0.0, 'play': 0.0}
+    is_positive = True
     card = Card(
         'measured position = q + e, e = b sgn(tau) / 2, or b_r sgn(q_dot) / 2 once the encoder '
         'has come back by b_r',
@@ -64,31 +65,15 @@ class LostMotion(MeasurementEffect):
         'Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica '
         '38, 2002')
 
-    @classmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
-        """Build it from `{drive: {parameter: value}}`; a wind-up of 0, once in files, is none."""
-        return super().from_file({drive: (
-            {name: value for name, value in block.items() if (name, value) != ('windup', 0.0)}
-            if isinstance(block, Mapping) else block) for drive, block in values.items()}
-            if isinstance(values, Mapping) else values, complete)
-
     def position_error(self, drives: Sequence[str], position: Array) -> Array:
         """Return how far encoders are ahead because of play, (N, D) [m, rad]."""
-        error = np.zeros_like(position)
-        for name, values in self.drives.items():
-            if values['play'] and name in drives:
-                k = drives.index(name)
-                error[:, k] = position[:, k] - behind_play(position[:, k], values['play'])
-        return error
+        return self.by_drive(drives, position, lambda q, own: (
+            q - behind_play(q, own['play']) if own['play'] else np.zeros_like(q)))
 
     def loaded_position_error(self, drives: Sequence[str], transmitted: Array) -> Array:
         """Return how far encoders are ahead because of loads, (N, D) [m, rad]."""
-        error = np.zeros_like(transmitted)
-        for name, values in self.drives.items():
-            if name in drives:
-                k = drives.index(name)
-                error[:, k] = values['backlash'] / 2 * np.sign(transmitted[:, k])
-        return error
+        return self.by_drive(drives, transmitted, lambda load, own: (
+            own['backlash'] / 2 * np.sign(load)))
 
 
 def behind_play(position: Array, play: float) -> Array:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.physics.effects.effect import Card
-from pprs_dynamics.physics.mechanism.drive_states import DriveStates
+from pprs_dynamics.physics.mechanism.state import MechanismState
 
 OWN = ('position', 'velocity', 'acceleration', 'load')  # of the drive itself
 OF = ('position', 'velocity')  # of another drive: 'position of lift_1'
@@ -104,7 +104,7 @@ def spline_basis(
 class MeasuredCurve(DriveEffect):
     """A drive's force over one variable, as it was measured: a table, not a cause."""
 
-    name: ClassVar[str] = 'measured_curve'
+    name = 'measured_curve'
     linear = ()
     variants = ((),)
     card = Card(
@@ -126,7 +126,7 @@ class MeasuredCurve(DriveEffect):
         """Return none: a curve is adopted as a whole, not scaled."""
         return ()
 
-    def force(self, state: DriveStates, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the curves' forces [N, N m], (N, D)."""
         force = np.zeros_like(state.velocity)
         for drive, curve in self.curves.items():
@@ -134,7 +134,7 @@ class MeasuredCurve(DriveEffect):
                 variable_of(state, drive, curve.variable))
         return force
 
-    def left(self, state: DriveStates) -> str | None:
+    def left(self, state: MechanismState) -> str | None:
         """Return which measured range a state is outside of, as a sentence, or None."""
         for drive, curve in self.curves.items():
             x = variable_of(state, drive, curve.variable)
@@ -166,7 +166,7 @@ class MeasuredCurve(DriveEffect):
         return blocks
 
 
-def variable_of(state: DriveStates, drive: str, variable: str) -> Array:
+def variable_of(state: MechanismState, drive: str, variable: str) -> Array:
     """Return the variable of a drive's curve at all samples, (N,)."""
     name, _, other = variable.partition(' of ')
     column = state.drives.index(other or drive)

@@ -12,17 +12,18 @@ IEEE Control Systems Magazine 27 (2007), on payload identification.
 from __future__ import annotations
 
 from math import inf
-from typing import Any, ClassVar
+from typing import Any
 
 from pprs_dynamics.physics.effects.added_body import AddedBody, Place, body_parameters
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card
+from pprs_dynamics.physics.effects.effect import Card
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
 
 class PayloadMass(AddedBody):
     """A body more at the tool: at the centre of mass of a 3-PPRS' platform, as a point."""
 
-    name: ClassVar[str] = 'payload_mass'
-    acts_in = frozenset({PLATFORM, ARM})
+    name = 'payload_mass'
+    acts_in = frozenset({PLATFORM, MECHANISM})
     places = (Place('', 'the tool', (0.0, 0.0, 0.0), inf, is_spread=True),)
     linear = body_parameters('', 'the tool', (0.0, 0.0, 0.0), inf)[:1]
     card = Card(
@@ -35,7 +36,7 @@ class PayloadMass(AddedBody):
         'change by just that weight. Only accelerations tell it from a constant downward force, '
         'so move fast',
         'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
-    arm_card = Card(
+    mechanism_card = Card(
         'tau -> tau + what moves a body at the tool: m_+ at c, with [I] about c',
         'an error of the joints that carry the arm, as large as its weight times its distance from '
         'each axis, and with it one that follows the accelerations of the tool',

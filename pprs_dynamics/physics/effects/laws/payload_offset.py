@@ -11,7 +11,7 @@ IEEE Control Systems Magazine 27 (2007), on payload identification.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
@@ -23,9 +23,9 @@ class PayloadOffset(BodyEffect):
     The forces are quadratic in the offset, by its square in the moment of inertia about o.
     """
 
-    name: ClassVar[str] = 'payload_offset'
-    idealised: ClassVar[bool] = False
-    nonlinear: ClassVar[bool] = True
+    name = 'payload_offset'
+    idealised = False
+    nonlinear = True
     linear = tuple(
         Parameter(axis, f'd_{axis}', 'm', f'offset of the centre of mass along {axis} of platform',
                   -1.0, 1.0, scale=0.003)

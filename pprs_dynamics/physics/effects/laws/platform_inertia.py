@@ -11,7 +11,7 @@ IEEE Control Systems Magazine 27 (2007), on payload identification.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
@@ -22,8 +22,8 @@ MOMENTS, PRODUCTS = ('xx', 'yy', 'zz'), ('xy', 'xz', 'yz')
 class PlatformInertia(BodyEffect):
     """Inertia more about the centre of mass, without mass."""
 
-    name: ClassVar[str] = 'platform_inertia'
-    idealised: ClassVar[bool] = False
+    name = 'platform_inertia'
+    idealised = False
     linear = (
         *(Parameter(axes, f'I_{axes}', 'kg m^2', f'moment of inertia beyond {axes} of the model',
                     -1e3, 1e3, scale=0.005) for axes in MOMENTS),

@@ -5,9 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar
-
 import numpy as np
 
 from pprs_dynamics.arrays import Array
@@ -18,11 +15,10 @@ from pprs_dynamics.physics.effects.effect import Card, Parameter
 class QuadraticFriction(DriveEffect):
     """Force in proportion to velocity squared: churning lubricant, air in a closed housing."""
 
-    name: ClassVar[str] = 'quadratic_friction'
-    is_friction: ClassVar[bool] = True
+    name = 'quadratic_friction'
+    is_friction = True
     linear = (Parameter('coefficient', 'c', 'N s^2/m^2', 'force per squared velocity', -1e6, 1e6,
                         scale=20.0),)
-    unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}
     card = Card(
         'c q_dot |q_dot|',
         'over velocity, a parabola that bends away from the line of viscous friction, turned '

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 import numpy as np
 
@@ -23,13 +22,13 @@ REACHES = (0.03, 0.07, 0.13, 0.22)
 class StopContact(DriveEffect):
     """One-sided stiffness from a position on: a bumper, a stop, a cable that gets taut."""
 
-    name: ClassVar[str] = 'stop_contact'
+    name = 'stop_contact'
     linear = (Parameter('upper', 'k_u', 'N/m', 'stiffness above q_s', -1e9, 1e9, 0.0, scale=100.0),
               Parameter('lower', 'k_l', 'N/m', 'stiffness below q_s', -1e9, 1e9, 0.0, scale=100.0))
     shape = (Parameter('position', 'q_s', 'm', 'position at which it is touched', -FARTHEST,
                        FARTHEST, scale=0.01),)
     variants = (('upper',), ('lower',))
-    unphysical_below: ClassVar[Mapping[str, float]] = {'upper': 0.0, 'lower': 0.0}
+    is_positive = True
     card = Card(
         'k_u (q - q_s) for q > q_s, k_l (q - q_s) for q < q_s',
         'nothing over most of the stroke, and beyond one position near an end a force that grows '

@@ -9,7 +9,6 @@ No load changes its size, or it follows the load.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
 
 import numpy as np
 
@@ -26,8 +25,8 @@ EXPONENTS = (2.0, 1.0)
 class StribeckFriction(DriveEffect):
     """Extra friction at low speed: boundary lubrication in greased guides and screws."""
 
-    name: ClassVar[str] = 'stribeck_friction'
-    is_friction: ClassVar[bool] = True
+    name = 'stribeck_friction'
+    is_friction = True
     linear = (Parameter('force', 'F_s', 'N', 'breakaway force beyond Coulomb friction', -1e6, 1e6,
                         0.0, scale=0.5),
               Parameter('coefficient', 'mu_s', '1', 'the same per load', -100.0, 100.0, 0.0,
@@ -37,7 +36,6 @@ class StribeckFriction(DriveEffect):
              Parameter('exponent', 'd', '1', 'steepness: 2 Gaussian, 1 exponential', 0.5, 4.0,
                        default=2.0))
     variants = (('force',), ('coefficient',), ('force', 'coefficient'))
-    unphysical_below: ClassVar[Mapping[str, float]] = {'force': 0.0, 'coefficient': 0.0}
     card = Card(
         '(F_s + mu_s N) exp(-|q_dot / v_s|^d) sgn(q_dot)',
         'a peak on either side of each reversal and wherever the drive creeps, none at speed; '

@@ -12,7 +12,7 @@ on delays of sampling and filtering.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -30,11 +30,11 @@ SHORT = (STEP / 8, STEP / 4, STEP / 2)
 class TimeDelay(MeasurementEffect):
     """The recorder's effort is not of the recorder's positions' time."""
 
-    name: ClassVar[str] = 'time_delay'
-    assumed_at_start: ClassVar[str] = 'the effort changed before the first sample as after it'
-    nonlinear: ClassVar[bool] = True
-    idealised: ClassVar[bool] = False
-    shows_at_reversals: ClassVar[bool] = True
+    name = 'time_delay'
+    assumed_at_start = 'the effort changed before the first sample as after it'
+    nonlinear = True
+    idealised = False
+    shows_at_reversals = True
     linear = ()
     shape = (Parameter('delay', 'd', 's', 'by which effort is late; negative: early', -1.0, 1.0,
                        scale=0.001),)
@@ -67,21 +67,18 @@ class TimeDelay(MeasurementEffect):
         """Return the past: times and efforts that are not yet measured."""
         return {'time': np.zeros(0), 'effort': np.zeros(0)}
 
-    def sensed(self, effort: Array, time: Array | None, drives: Sequence[str],
-               memory: Any = None) -> Array:
+    @classmethod
+    def drive_sensed(cls, effort: Array, time: Array | None, parameters: Mapping[str, float],
+                     memory: Any) -> Array:
         """Return F(t - d) by straight lines between samples and beyond them."""
         if time is None:
             return effort
-        late = effort.copy()
-        for name, values in self.drives.items():
-            index = drives.index(name)
-            past = self.drive_memory() if memory is None else memory[name]
-            t = np.concatenate((past['time'], time))
-            F = np.concatenate((past['effort'], effort[:, index]))
-            late[:, index] = shifted(t, F, values['delay'])[len(past['time']):]
-            kept = t >= t[-1] - 1.1 * max(values['delay'], 0.0) - 0.01
-            past['time'], past['effort'] = t[kept], F[kept]
-        return late
+        before = len(memory['time'])
+        t = np.concatenate((memory['time'], time))
+        F = np.concatenate((memory['effort'], effort))
+        kept = t >= t[-1] - 1.1 * max(parameters['delay'], 0.0) - 0.01
+        memory['time'], memory['effort'] = t[kept], F[kept]
+        return shifted(t, F, parameters['delay'])[before:]
 
 
 def shifted(time: Array, values: Array, delay: float) -> Array:

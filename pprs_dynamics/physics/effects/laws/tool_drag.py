@@ -10,29 +10,29 @@ F. M. White, Fluid Mechanics, on creeping flow.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from pprs_dynamics.physics.effects.effect import ARM, PLATFORM, Card, Parameter
+from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
+from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 
 
 class ToolDrag(BodyEffect):
     """Force c v against the velocity of the tool's origin, moment c_r omega against its turning."""
 
-    name: ClassVar[str] = 'tool_drag'
-    acts_in = frozenset({PLATFORM, ARM})
-    is_friction: ClassVar[bool] = True
-    needs_several_drives: ClassVar[bool] = True  # of a single one it is viscous friction
+    name = 'tool_drag'
+    acts_in = frozenset({PLATFORM, MECHANISM})
+    is_friction = True
+    needs_several_drives = True  # of a single one it is viscous friction
     linear = (
         Parameter('coefficient', 'c', 'N s/m', 'force per velocity of the tool', -1e6, 1e6,
                   scale=1.0),
         Parameter('rotational', 'c_r', 'N m s/rad', 'moment per angular velocity of the tool',
                   -1e6, 1e6, 0.0, scale=0.01))
     variants = (('coefficient',), ('coefficient', 'rotational'))
-    unphysical_below: ClassVar[dict[str, float]] = {'coefficient': 0.0, 'rotational': 0.0}
     card = Card(
         'Q = [J]^T (c v, c_r omega)',
         'errors on several drives that follow the velocity of the platform and not that of one '
@@ -42,7 +42,7 @@ class ToolDrag(BodyEffect):
         'repeat with the tool out of the medium; repeat at half the speed: the error must halve, '
         'where dry friction would stay',
         'White, Fluid Mechanics')
-    arm_card = Card(
+    mechanism_card = Card(
         'tau = J^T (c v, c_r omega)',
         'errors on several drives that follow the velocity of the tool, in the proportions of its '
         'Jacobian, and not that of one drive',

@@ -5,9 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar
-
 import numpy as np
 
 from pprs_dynamics.arrays import Array
@@ -21,10 +18,9 @@ DIRECTIONS = 0.1  # share by which real viscous friction differs by direction
 class ViscousFriction(DriveEffect):
     """Force in proportion to velocity: lubricant, motor damping, a current loop's back-EMF."""
 
-    name: ClassVar[str] = 'viscous_friction'
-    is_friction: ClassVar[bool] = True
+    name = 'viscous_friction'
+    is_friction = True
     linear = (Parameter('coefficient', 'c', 'N s/m', 'force per velocity', -1e6, 1e6, scale=5.0),)
-    unphysical_below: ClassVar[Mapping[str, float]] = {'coefficient': 0.0}
     card = Card(
         'c q_dot',
         'a straight line through zero over velocity, the same forwards and backwards; nothing '

@@ -15,34 +15,42 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 
-from pprs_dynamics import MechanismModel
+from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.mechanism.description import body_at
+from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.model.model_file import build_model
-from pprs_dynamics.simulation.injected_effect import InjectedEffectError
-from pprs_dynamics.simulation.joint_forms import FORMS
-from pprs_dynamics.simulation.mechanism_engine import MechanismEngine
-from pprs_dynamics.simulation.mechanism_run import NAMES, draw_motion, simulate_mechanism
+from pprs_dynamics.simulation.engine import MechanismEngine
+from pprs_dynamics.simulation.injected_forms import FORMS, UNKNOWN, InjectedEffectError
+from pprs_dynamics.simulation.injection import (
+    NAMES,
+    Choice,
+    Injection,
+    PlainRobot,
+    draw_motion,
+    named,
+    simulate_mechanism,
+)
+from pprs_dynamics.simulation.platform import as_mechanism
 
 
 @pytest.fixture(scope='module')
-def model(tmp_path_factory: pytest.TempPathFactory) -> MechanismModel:
+def model(tmp_path_factory: pytest.TempPathFactory) -> DriveModel:
     """Return an arm whose links are not those of its URDF, and with joints in another order."""
     described = arm.real_arm(tmp_path_factory.mktemp('arm'))
     mass = np.array(described.robot.inertial) * np.array([1.3, 0.9, 1.1])[:, None]
-    found = build_model({
+    found = DriveModel.from_parameters({
         **described.values, 'links.mass': tuple(mass[:, 0]),
         'links.moment': tuple(mass[:, 1:4].ravel()),
         'links.inertia': tuple(mass[:, 4:][:, [0, 2, 5, 1, 3, 4]].ravel()),
         'robot.armature': (0.4, 0.2, 1.0)}, described.source)
-    assert isinstance(found, MechanismModel)
     return found
 
 
-def test_the_engine_moves_the_bodies_of_the_model(model: MechanismModel) -> None:
+def test_the_engine_moves_the_bodies_of_the_model(model: DriveModel) -> None:
     motion = draw_motion(model, 10.0, 0)
     engine = MechanismEngine(model)
     assert engine.torques(motion) == pytest.approx(
@@ -52,26 +60,26 @@ def test_the_engine_moves_the_bodies_of_the_model(model: MechanismModel) -> None
 
 def test_the_engine_moves_an_arm_whose_last_joint_stands(tmp_path: Path) -> None:
     arm.write_arm(tmp_path, joints=arm.JOINTS[:2])
-    standing = MechanismModel.load(tmp_path / 'arm.yaml')
+    standing = DriveModel.load(tmp_path / 'arm.yaml')
     motion = draw_motion(standing, 10.0, 0)
     assert MechanismEngine(standing).torques(motion) == pytest.approx(
         standing.drive_forces(motion).parts['rigid_body'], abs=1e-8)
 
 
-def test_a_hidden_payload_is_a_point_at_the_tool(model: MechanismModel) -> None:
+def test_a_hidden_payload_is_a_point_at_the_tool(model: DriveModel) -> None:
     motion = draw_motion(model, 10.0, 1)
     engine = MechanismEngine(model)
     before = engine.torques(motion)
-    engine.add_payload(1.5, np.zeros(3))
-    loaded = build_model({**model.values, 'effects.active': ['payload_mass'],
+    engine.carry(model.robot.structure.tool, body_at(1.5, (0.0, 0.0, 0.0), np.zeros((3, 3))))
+    loaded = DriveModel.from_parameters({**model.values, 'effects.active': ['payload_mass'],
                           'effects.payload_mass.mass': 1.5}, model.source)
     assert engine.torques(motion) - before == pytest.approx(
         loaded.drive_forces(motion).parts['payload_mass'], abs=1e-8)
 
 
 @pytest.mark.parametrize('of', ['arm', 'hexapod'])
-def test_a_wrench_at_the_tool_is_that_of_the_engine(model: MechanismModel, of: str) -> None:
-    robot = model if of == 'arm' else MechanismModel.load('config/hexapod.yaml')
+def test_a_wrench_at_the_tool_is_that_of_the_engine(model: DriveModel, of: str) -> None:
+    robot = model if of == 'arm' else DriveModel.load('config/hexapod.yaml')
     motion = draw_motion(robot, 2.0, 1)
     engine = MechanismEngine(robot)
     before = engine.torques(motion)
@@ -82,12 +90,16 @@ def test_a_wrench_at_the_tool_is_that_of_the_engine(model: MechanismModel, of: s
         loaded.rigid_force - state.rigid_force, abs=1e-8)
 
 
-def test_a_hidden_link_mass_is_that_of_the_model(model: MechanismModel) -> None:
+def test_a_hidden_link_mass_is_that_of_the_model(model: DriveModel) -> None:
     motion = draw_motion(model, 10.0, 1)
     engine = MechanismEngine(model)
     before = engine.torques(motion)
-    engine.add_to_link(1, 0.7)
-    loaded = build_model({**model.values, 'effects.active': ['link_mass'],
+    robot = model.robot
+    m, *moment = robot.inertial[1, :4]
+    frame = robot.structure.links[robot.body_names[1]][1].inverse
+    engine.carry(robot.body_names[1], body_at(0.7, tuple(frame.of_point(
+        np.array(moment) / m)), np.zeros((3, 3))))
+    loaded = DriveModel.from_parameters({**model.values, 'effects.active': ['link_mass'],
                           'effects.link_mass.beam.mass': 0.7}, model.source)
     assert engine.torques(motion) - before == pytest.approx(
         loaded.drive_forces(motion).parts['link_mass'], abs=1e-8)
@@ -95,33 +107,34 @@ def test_a_hidden_link_mass_is_that_of_the_model(model: MechanismModel) -> None:
 
 @pytest.mark.parametrize('name', ['slider', 'nowhere'])
 def test_a_link_that_is_the_payloads_or_not_there_is_refused(
-    model: MechanismModel, name: str,
+    model: DriveModel, name: str,
 ) -> None:
     with pytest.raises(ModelError, match=f'unknown key effects.link_mass.{name}.mass'):
-        build_model({**model.values, 'effects.active': ['link_mass'],
+        DriveModel.from_parameters({**model.values, 'effects.active': ['link_mass'],
                      f'effects.link_mass.{name}.mass': 0.7}, model.source)
 
 
-def test_without_effects_the_model_leaves_noise(model: MechanismModel) -> None:
+def test_without_effects_the_model_leaves_noise(model: DriveModel) -> None:
     run = simulate_mechanism(model, (), 0, noise=0.3)
     error = run.effort - model.drive_forces(run.motion).total
     assert np.std(error, axis=0) == pytest.approx(np.full(3, 0.3), rel=0.1)
 
 
-def test_an_arm_has_no_passive_joint_that_could_rub(model: MechanismModel) -> None:
+def test_an_arm_has_no_passive_joint_that_could_rub(model: DriveModel) -> None:
     with pytest.raises(InjectedEffectError, match='needs a passive joint'):
         simulate_mechanism(model, ('joint_friction',), 4, duration=10.0)
 
 
 @pytest.fixture(scope='module')
-def plain_of(wrist: MechanismModel) -> Callable[[float], Any]:
+def plain_of(wrist: DriveModel) -> Callable[[float], Any]:
     """Return how to get what is recorded where nothing is hidden, by duration [s]."""
     return cache(lambda duration: simulate_mechanism(wrist, (), 4, noise=0.0, duration=duration))
 
 
-@pytest.mark.parametrize('name', [name for name in NAMES if name != 'joint_friction'])
+@pytest.mark.parametrize('name', [
+    name for name in NAMES if name not in ('joint_friction', 'joint_spring')])
 def test_every_hidden_effect_shows(
-    wrist: MechanismModel, plain_of: Callable[[float], Any], name: str,
+    wrist: DriveModel, plain_of: Callable[[float], Any], name: str,
 ) -> None:
     # A slow motion turns the joints farther, as a cylinder needs.
     duration = 30.0 if name == 'counterbalance' else 10.0
@@ -136,14 +149,15 @@ def test_every_hidden_effect_shows(
         assert pushed > 0.05
     assert hidden.effects[0]['name'] == name
     assert (hidden.effects[0]['drives'] is None) == (
-        name not in {*FORMS, 'eccentric_encoder', 'effort_gain', 'effort_filter', 'time_delay',
-                     'homing_error', 'lost_motion', 'current_gain',
+        name not in {*FORMS, *UNKNOWN, 'eccentric_encoder', 'effort_gain', 'effort_filter',
+                     'time_delay', 'homing_error', 'lost_motion', 'current_gain',
                      'elastic_joint'})
 
 
-AXIS = MechanismModel.load('config/single_axis.yaml')
+AXIS = DriveModel.load('config/single_axis.yaml')
 NOT_ON_AN_AXIS = ('counterbalance', 'link_mass', 'base_tilt', 'external_wrench',
-                  'eccentric_encoder', 'joint_friction', 'coupled_drives')
+                  'eccentric_encoder', 'joint_friction', 'coupled_drives', 'payload_offset',
+                  'platform_inertia', 'payload_pick_up', 'joint_spring', 'tool_drag')
 
 
 def test_a_simulated_axis_moves_its_mass_against_the_friction_of_its_file() -> None:
@@ -151,8 +165,9 @@ def test_a_simulated_axis_moves_its_mass_against_the_friction_of_its_file() -> N
     values, v = AXIS.values, run.motion.velocity
     width = values['friction.reversal_velocity']
     assert run.effort == pytest.approx(
-        values['axis.mass'] * run.motion.acceleration + values['axis.viscous'] * v
-        + values['axis.coulomb'] * np.tanh(v / width) + values['axis.offset'], abs=1e-8)
+        values['links.mass'][0] * run.motion.acceleration + values['friction.viscous'][0] * v
+        + values['friction.coulomb'][0] * np.tanh(v / width) + values['friction.offset'][0],
+        abs=1e-8)
 
 
 @pytest.mark.parametrize('name', NAMES)
@@ -168,17 +183,16 @@ def test_effects_are_injected_into_an_axis_or_refused(name: str) -> None:
             or np.abs(run.position - plain.position).max() > 1e-3)
 
 
-def test_motors_without_a_map_rub_nowhere(model: MechanismModel) -> None:
+def test_motors_without_a_map_rub_nowhere(model: DriveModel) -> None:
     with pytest.raises(InjectedEffectError, match=r'friction: \{motors:'):
         simulate_mechanism(model, ('coupled_drives',), 4, duration=10.0)
 
 
 @pytest.fixture(scope='module')
-def wrist(model: MechanismModel) -> MechanismModel:
+def wrist(model: DriveModel) -> DriveModel:
     """Return the arm with a motor that turns with two joints."""
-    found = build_model({**model.values, 'friction.motors.wrist.turn': 1.0,
+    found = DriveModel.from_parameters({**model.values, 'friction.motors.wrist.turn': 1.0,
                          'friction.motors.wrist.swing': 1.0}, model.source)
-    assert isinstance(found, MechanismModel)
     return found
 
 
@@ -186,7 +200,7 @@ def wrist(model: MechanismModel) -> MechanismModel:
     ('payload_mass', 1), ('link_mass', 1), ('viscous_friction', 2), ('coulomb_friction', 3),
     ('friction_temperature', 1), ('friction_temperature', 2), ('friction_drift', 1),
     ('counterbalance', 1), ('coupled_drives', 1), ('current_gain', 1), ('effort_gain', 1)])
-def test_what_is_hidden_is_named(wrist: MechanismModel, name: str, seed: int) -> None:
+def test_what_is_hidden_is_named(wrist: DriveModel, name: str, seed: int) -> None:
     model = wrist
     run = simulate_mechanism(model, (name,), seed, thermometers=True)
     assert run.motion.time is not None
@@ -208,13 +222,14 @@ def test_the_command_writes_recording_and_truth(tmp_path: Path,
                  '--duration', '5', '--json', str(truth)]) == 0
     assert json.loads(truth.read_text())['effects'][0]['parameters']['mass'] > 0
     assert main(['simulate', '--model', path, '--output', output + '2.csv', '--effect',
-                 'tool_drag']) == 2
-    assert 'no injected effect of such a robot' in capsys.readouterr().err
+                 'joint_spring']) == 2
+    assert 'needs a passive joint' in capsys.readouterr().err
 
 
-def test_statements_have_the_units_of_joints(model: MechanismModel, tmp_path: Path,
+def test_statements_have_the_units_of_joints(model: DriveModel, tmp_path: Path,
                                              capsys: pytest.CaptureFixture[str]) -> None:
-    without = build_model({**model.values, 'friction.coulomb': (0.0, 4.0, 0.0)}, model.source)
+    without = DriveModel.from_parameters(
+        {**model.values, 'friction.coulomb': (0.0, 4.0, 0.0)}, model.source)
     from pprs_dynamics.inference.diagnosis.localisation import localise
     from pprs_dynamics.inference.residuals.measuring import measure_residuals
     run = simulate_mechanism(model, (), 0)
@@ -226,3 +241,56 @@ def test_statements_have_the_units_of_joints(model: MechanismModel, tmp_path: Pa
     assert 'N m' in said['turn']
     assert 'N m' not in said['reach']
     assert ' N' in said['reach']
+
+
+PLATFORM = DriveModel.load('config/paper.yaml')
+
+
+@pytest.mark.parametrize('change', [
+    {}, {'masses.centre': [0.01, -0.02, 0.03], 'masses.rods': [0.1, 0.3, 0.5]},
+    {'gravity': [1.0, -2.0, -9.0], 'friction.reversal_velocity': 0.0002},
+    {'geometry.platform_angles': [0.1, 2.2, 4.1], 'masses.slides': [0.0, 0.2, 1.0]},
+    {'geometry.elbow': 'down', 'limits.lift_stroke': [-0.1, 1.5]},
+], ids=['paper', 'masses', 'gravity', 'angles', 'elbow down'])
+def test_a_simulated_platform_needs_the_forces_of_the_paper(change: dict[str, Any]) -> None:
+    model = DriveModel.from_parameters({**PLATFORM.values, **change})
+    motion = Excitation(seed=3).motion(6.0 + np.arange(200) / 100)
+    forces, state = model.drive_forces(motion), model.mechanism(motion)
+    plain = PlainRobot(as_mechanism(model), JointMotion(
+        state.position, state.velocity, state.acceleration, motion.time))
+    assert np.abs(plain.effort - forces.total).max() < 1e-8
+
+
+@pytest.mark.parametrize('name', [name for name in NAMES if name not in (
+    'counterbalance', 'eccentric_encoder', 'coupled_drives', 'elastic_joint')])
+def test_an_injected_effect_changes_its_drives_alone_and_repeats(name: str) -> None:
+    plain, effect = plain_platform(), Choice(name, np.random.default_rng(1))
+    first, again = (Injection(plain, [effect], np.random.default_rng(2)) for _ in range(2))
+    np.testing.assert_array_equal(first.efforts, again.efforts)
+    added = np.abs(first.efforts - plain.effort).max(axis=0)
+    shifted = np.abs(first.beside).max(axis=0)
+    (truth,) = first.truths
+    acts = np.isin(PLATFORM.drives, truth['drives'] or PLATFORM.drives)
+    assert added.max() > 0.01 or shifted.max() > 1e-4
+    assert np.all(added[~acts] < 1e-9)
+    assert np.all(shifted[~acts] == 0)
+
+
+@cache
+def plain_platform() -> PlainRobot:
+    time = np.arange(300) / 100
+    state = PLATFORM.mechanism(Excitation(seed=3).motion(time))
+    return PlainRobot(as_mechanism(PLATFORM), JointMotion(
+        state.position, state.velocity, state.acceleration, time))
+
+
+def test_given_drives_have_the_effect() -> None:
+    run = Injection(plain_platform(), [named('effort_offset:lift_1,slide_2',
+                                             np.random.default_rng(0), 1.0)],
+                    np.random.default_rng(2))
+    assert run.truths[0]['drives'] == ['lift_1', 'slide_2']
+    for words, text in (('viscous', 'did you mean'), ('base_tilt:lift_1', 'acts in no drive'),
+                        ('effort_offset:x', 'acts in a drive')):
+        with pytest.raises(InjectedEffectError, match=text):
+            Injection(plain_platform(), [named(words, np.random.default_rng(0), 1.0)],
+                      np.random.default_rng(2))

@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Injected forces on the drives of a mechanism: equations, and how their parameters are drawn.
+"""Injected forces on drives: equations, and how their parameters are drawn.
 
 Sizes are drawn in units of each joint's largest effort and speed, to fit robots of any size.
 """
@@ -10,17 +10,32 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.simulation.injected_effect import algebraic_sign, eyring
 from pprs_dynamics.simulation.temperatures import REFERENCE, thinner
 
 CROSSED = 0.02  # of a joint's top speed or load, within which a clearance is crossed
 STEEPNESS = 0.005  # of a joint's top speed, within which hidden dry friction turns over
+
+
+class InjectedEffectError(PprsError, ValueError):
+    """An injected effect that does not exist, or that a robot cannot have."""
+
+
+def algebraic_sign(velocity: Array, width: float) -> Array:
+    """Return v / sqrt(v^2 + w^2): another change of direction than the tanh of the model."""
+    sign: Array = velocity / np.sqrt(velocity * velocity + width * width)
+    return sign
+
+
+def eyring(velocity: Array, thinning_velocity: float) -> Array:
+    """Return v_1 asinh(v / v_1): the speed as grease shows it that thins with the shear rate."""
+    felt: Array = thinning_velocity * np.arcsinh(velocity / thinning_velocity)
+    return felt
 
 
 @dataclass(frozen=True)
@@ -36,6 +51,10 @@ class JointMoment:
     gear_ratio : float
     temperature : (N,) array
         [degC]
+    pressed : (N,) array
+        Load that friction follows: of a guide the force across it, else the size of `load`.
+    next_velocity : (N,) array
+        Velocity of the next drive.
     """
 
     time: Array
@@ -47,16 +66,20 @@ class JointMoment:
     speed: float
     gear_ratio: float
     temperature: Array
+    pressed: Array
+    next_velocity: Array
 
     @classmethod
     def along(cls, motion: JointMotion, joint: int, load: Array, effort: float, gear_ratio: float,
-              temperature: Array) -> JointMoment:
+              temperature: Array, pressed: Array | None = None) -> JointMoment:
         """Return a joint along a motion, under loads (N,) and with a largest effort."""
         assert motion.time is not None
         velocity = motion.velocity[:, joint]
         return cls(motion.time, motion.position[:, joint], velocity,
                    motion.acceleration[:, joint], load, float(effort),
-                   float(np.abs(velocity).max()), float(gear_ratio), temperature[:, joint])
+                   float(np.abs(velocity).max()), float(gear_ratio), temperature[:, joint],
+                   np.abs(load) if pressed is None else pressed,
+                   motion.velocity[:, (joint + 1) % motion.velocity.shape[1]])
 
     @property
     def sign(self) -> Array:
@@ -145,9 +168,9 @@ FORMS: dict[str, JointForm] = {
         'c v |v|', lambda rng, m: {'coefficient': 2 * SIZE(rng) * m.effort / m.speed ** 2},
         lambda p, m: p['coefficient'] * m.velocity * np.abs(m.velocity)),
     'load_friction': JointForm(
-        'dmu |tau|^(2/3) tau_0^(1/3) v / sqrt(v^2 + w^2)',
+        'dmu |N|^(2/3) tau_0^(1/3) v / sqrt(v^2 + w^2), N the effort, of guides the load across',
         lambda rng, m: {'coefficient': 2 * SIZE(rng), 'reference': m.effort},
-        lambda p, m: p['coefficient'] * np.cbrt(m.load ** 2 * p['reference']) * m.sign),
+        lambda p, m: p['coefficient'] * np.cbrt(m.pressed ** 2 * p['reference']) * m.sign),
     'gear_efficiency': JointForm(
         'mu tau_0 (|tau| / tau_0)^0.9 v / sqrt(v^2 + w^2), mu_b in the place of mu_d by the share '
         '(1 - tau v / sqrt((tau v)^2 + (0.01 tau_0 v_0)^2)) / 2',
@@ -205,12 +228,29 @@ FORMS: dict[str, JointForm] = {
             np.abs(m.acceleration).max())},
         lambda p, m: p['mass'] * m.acceleration),
 }
+UNKNOWN: dict[str, JointForm] = {
+    'local_bump': JointForm(
+        'F / (1 + ((q - q_0) / w)^4)',
+        lambda rng, m: {'force': SIZE(rng) * m.effort, 'place': float(np.quantile(
+            m.position, rng.uniform(0.3, 0.7))), 'width': 0.05 * float(np.ptp(m.position))},
+        lambda p, m: p['force'] / (1 + ((m.position - p['place']) / p['width']) ** 4)),
+    'vibration': JointForm(
+        'A sin(2 pi f t + phi)',
+        lambda rng, m: {'force': SIZE(rng) * m.effort, 'frequency': 6 * 5 ** float(rng.random()),
+                        'phase': float(rng.uniform(-np.pi, np.pi))},
+        lambda p, m: p['force'] * np.sin(2 * np.pi * p['frequency'] * m.time + p['phase'])),
+    'drive_coupling': JointForm(
+        'c v of the next drive',
+        lambda rng, m: {'coefficient': 2 * SIZE(rng) * m.effort / m.speed},
+        lambda p, m: p['coefficient'] * m.next_velocity),
+}
+"""Forces that no effect of the catalogue explains."""
 
 
-def draw_form(name: str, random: np.random.Generator, moment: JointMoment, scale: float,
+def draw_form(form: JointForm, random: np.random.Generator, moment: JointMoment, scale: float,
               ) -> dict[str, float]:
     """Return the parameters of a form, its size times a scale."""
-    drawn = FORMS[name].draw(random, moment)
+    drawn = form.draw(random, moment)
     drawn[next(iter(drawn))] *= scale
     return drawn
 
@@ -236,9 +276,3 @@ def ahead(span: float, driver: Array, largest: float) -> Array:
     """
     lead: Array = span / 2 * driver / np.hypot(driver, CROSSED * largest)
     return lead
-
-
-def truth(name: str, drives: list[str] | None, parameters: Mapping[str, Any], form: str,
-          ) -> dict[str, Any]:
-    """Return what was hidden, as data for JSON."""
-    return {'name': name, 'drives': drives, 'parameters': dict(parameters), 'form': form}

@@ -1,0 +1,32 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Write the rules outside the cost in docs/diagnosis.md: python docs/outside_cost.py."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+from pprs_dynamics.inference.search.decisions import OUTSIDE_COST
+
+import_module('pprs_dynamics.inference.adoption.adopt')  # lists all rules
+PAGE = Path(__file__).parent / 'diagnosis.md'
+BEGIN, END = '<!-- rules: written by docs/outside_cost.py -->', '<!-- end of rules -->'
+
+
+def table() -> str:
+    """Return the rules as a table in Markdown."""
+    rows = [f'| {rule} | `{name}` |' for name, rule in sorted(OUTSIDE_COST.items())]
+    return '\n'.join(['| rule | code |', '|---|---|', *rows])
+
+
+def main() -> None:
+    """Replace the table in the page."""
+    before, _, rest = PAGE.read_text(encoding='utf-8').partition(BEGIN)
+    PAGE.write_text(f'{before}{BEGIN}\n\n{table()}\n\n{END}{rest.partition(END)[2]}',
+                    encoding='utf-8')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,270 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The state of a robot along a motion, as effects take it, and what it asks its robot for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol, Self
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.places import BodyPlace, PassiveJoint
+from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
+from pprs_dynamics.physics.mechanism.structure import Structure
+from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
+from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
+from pprs_dynamics.physics.mechanism.tree_tables import JOINT_EFFORT, TRANSMITTED, JointFriction
+from pprs_dynamics.system.parallel import lazy
+
+
+class Robot(Protocol):
+    """Protocol of a robot with its bodies: `Mechanism`, or the closed form of the 3-PPRS.
+
+    Kinematics, loads and friction tables are the robot's own: they only pass through the state.
+    """
+
+    @property
+    def structure(self) -> Structure | None:
+        """Joints and links; None for the closed form."""
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Names of the drives."""
+
+    @property
+    def kind(self) -> str:
+        """Kind of the robot: effects say on which kinds they act."""
+
+    @property
+    def turning(self) -> tuple[str, ...]:
+        """Drives that turn."""
+
+    @property
+    def motions(self) -> tuple[type, ...]:
+        """Kinds of motion that have forces."""
+
+    @property
+    def armature(self) -> Array:
+        """Inertia of the rotors, seen at the drives [kg m^2, kg], (D,)."""
+
+    @property
+    def gravity(self) -> tuple[float, float, float]:
+        """Gravity in the base [m/s^2]."""
+
+    @property
+    def motors(self) -> Mapping[str, tuple[float, ...]]:
+        """Turns of motors per turn of each drive, of motors that move more than one."""
+
+    @property
+    def passive_joints(self) -> tuple[PassiveJoint, ...]:
+        """Joints without a drive."""
+
+    @property
+    def tool_place(self) -> BodyPlace:
+        """Where a payload is."""
+
+    @property
+    def link_places(self) -> tuple[BodyPlace, ...]:
+        """Links that may be heavier."""
+
+    @property
+    def moved_mass(self) -> float:
+        """Mass of what carries a load, or of all links [kg]."""
+
+    @property
+    def numbers(self) -> Array:
+        """All numbers besides the structure that determine efforts, in one row."""
+
+    @property
+    def position_step(self) -> float:
+        """Step of a drive for derivatives by its position [rad, m]."""
+
+    def friction_table(self, blocks: Mapping[str, Mapping[str, float]], reversal: Reversal) -> Any:
+        """Return friction of joints as `MechanismState.against_friction` takes it."""
+
+    def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
+                         seed: Any = None) -> Any:
+        """Return the motion, of the first kind in `motions`, that belongs to one of the drives."""
+
+    def at_home(self, samples: int) -> Any:
+        """Return a motion at rest where the robot is put together, one sample a second."""
+
+    def state(self, motion: Any, reversal: Reversal, friction: Any, closed: Any) -> MechanismState:
+        """Return the state for a motion, with the model's own friction of joints."""
+
+    def remember(self, state: MechanismState, closed: dict[Any, Array]) -> None:
+        """Store what makes the next state easier to compute."""
+
+    def kinematics(self, state: MechanismState) -> Any:
+        """Return the kinematics of a state that lacks them."""
+
+    def loads(self, links: Any, load: StructureLoad | None) -> Any:
+        """Return frictionless efforts and reactions."""
+
+    def inverse_dynamics(self, state: MechanismState) -> InverseDynamicsResult | None:
+        """Return efforts in one pass, None where kinematics and loads are to be used."""
+
+    def friction_load(self, state: MechanismState) -> Array:
+        """Return the loads of the drives' guides or gears [N m, N], (N, D)."""
+
+    def moved(self, state: MechanismState, position: Array, acceleration: Array) -> MechanismState:
+        """Return the state at other positions and accelerations of the drives."""
+
+    def singularity_margin(self, state: MechanismState) -> float | None:
+        """Return how far a motion stays from singular states: 0 at the limit, at most 1."""
+
+    def variables(self, state: MechanismState) -> dict[str, Array]:
+        """Return the variables that an error may depend on, except time and drive motion."""
+
+    def require_bodies(self, key: str, value: Any) -> None:
+        """Raise ModelError, of a key and its value, for bodies that cannot be."""
+
+
+@dataclass(frozen=True, eq=False)
+class MechanismState(JointMotion):
+    """The motion of a robot's drives with the quantities that effects take, (N, D) each.
+
+    Kinematics and loads are computed when an effect asks for them.
+
+    Parameters
+    ----------
+    robot : Robot
+    reversal : Reversal
+    load : StructureLoad, optional
+    known : LinkMotion or PlatformKinematics, optional
+        The kinematics, where they are known.
+    friction : JointFriction
+        The model's own, which is computed together with the efforts.
+    start, nearby : (N, C) and (C,) arrays, optional
+        See `Evaluation.forward_kinematics`.
+    motion : PlatformMotion, optional
+        The motion of the tool, where the state was made from it.
+    """
+
+    robot: Any = field(kw_only=True)
+    reversal: Reversal = field(default_factory=Reversal, kw_only=True)
+    load: StructureLoad | None = field(default=None, kw_only=True)
+    known: Any = field(default=None, kw_only=True)
+    friction: JointFriction = field(default=NO_FRICTION, kw_only=True)
+    start: Array | None = field(default=None, kw_only=True)
+    nearby: Array | None = field(default=None, kw_only=True)
+    motion: Any = field(default=None, kw_only=True)
+
+    def __getitem__(self, samples: Any) -> Self:
+        """Return the samples that a slice, a mask or indices select, with their load."""
+        return replace(super().__getitem__(samples), known=None, start=None, nearby=None,
+                       motion=None if self.motion is None else self.motion[samples],
+                       load=None if self.load is None else self.load.at(samples))
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Names of the drives."""
+        drives: tuple[str, ...] = self.robot.drives
+        return drives
+
+    @lazy
+    def inverse_dynamics(self) -> InverseDynamicsResult | None:
+        """Closed coordinates, efforts and own friction in one pass; None where links are needed."""
+        if self.known is not None or self.load is not None:
+            return None
+        found: InverseDynamicsResult | None = self.robot.inverse_dynamics(self)
+        return found
+
+    @lazy
+    def links(self) -> Any:
+        """The kinematics: a `LinkMotion`, or a `PlatformKinematics` of the closed form."""
+        return self.robot.kinematics(self) if self.known is None else self.known
+
+    @property
+    def closed(self) -> Array:
+        """Closed coordinates, (N, C)."""
+        closed: Array = (self.links.motion.q if self.inverse_dynamics is None
+                         else self.inverse_dynamics.q)
+        return closed
+
+    @lazy
+    def reactions(self) -> Any:
+        """Frictionless efforts and reactions: `Loads`, or a `RigidBody` of the closed form."""
+        return self.robot.loads(self.links, self.load)
+
+    @lazy
+    def direction(self) -> Array:
+        """Sign of the velocity, sgn, turning over within the reversal velocity."""
+        direction: Array = smooth_sign(self.velocity, np.asarray(self.reversal.velocity))
+        return direction
+
+    @lazy
+    def rigid_force(self) -> Array:
+        """Efforts without friction [N m, N]."""
+        efforts: Array = self.transmitted + self.robot.armature * self.acceleration
+        return efforts
+
+    @property
+    def transmitted(self) -> Array:
+        """Efforts that the drives' gears pass on, without friction [N m, N].
+
+        The motor accelerates its rotor on its own side of the gear.
+        """
+        efforts: Array = (self.reactions.efforts if self.inverse_dynamics is None
+                          else self.inverse_dynamics.efforts[TRANSMITTED])
+        return efforts
+
+    @lazy
+    def friction_load(self) -> Array:
+        """Load of a drive's guide or gear [N m, N], without a sign; 0 if it is not known."""
+        load: Array = self.robot.friction_load(self)
+        return load
+
+    @property
+    def tool_velocity(self) -> Array:
+        """Linear velocity of the tool's origin and angular velocity, in `base`, (N, 6)."""
+        velocity: Array = self.links.tool_velocity
+        return velocity
+
+    def joint_position(self, joint: str) -> Array:
+        """Return the position of a passive joint [rad, m], (N,), or (N, 3) of three alike."""
+        position: Array = self.links.joint_position(joint)
+        return position
+
+    def perturbed(self, drive: int, step: float) -> MechanismState:
+        """Return the state with a drive at other positions, to first order; all move as before."""
+        position = self.position.copy()
+        position[:, drive] += step
+        return self._moved(position, self.acceleration)
+
+    def accelerated(self, drive: int, change: float) -> MechanismState:
+        """Return the state with another acceleration of a drive."""
+        acceleration = self.acceleration.copy()
+        acceleration[:, drive] += change
+        return self._moved(self.position, acceleration)
+
+    def _moved(self, position: Array, acceleration: Array) -> MechanismState:
+        state: MechanismState = self.robot.moved(self, position, acceleration)
+        return state
+
+    def against_friction(self, friction: Any) -> Array:
+        """Return the drives' efforts against friction of joints, (N, D)."""
+        efforts: Array = (
+            self.inverse_dynamics.efforts[JOINT_EFFORT]
+            if friction is self.friction and self.inverse_dynamics is not None
+            else self.links.friction(self.reactions, friction))
+        return efforts
+
+    def with_smoothing(self, reversal: Reversal) -> MechanismState:
+        """Return the state with a sgn of other widths; all else is computed once for both."""
+        state = replace(self, reversal=reversal, known=self.links)
+        vars(state)['reactions'] = self.reactions
+        return state
+
+    def with_load(self, robot: Robot, load: StructureLoad | None = None) -> MechanismState:
+        """Return a state of this motion with other bodies, and with an additional load."""
+        if load is None:
+            load = self.load
+        elif self.load is not None:
+            load = self.load + load
+        return replace(self, robot=robot, load=load, known=self.links)

@@ -1,0 +1,77 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The blocks of a model file that describe a 3-PPRS: geometry, masses, friction and limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.drives import COUNT, DRIVES
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.effects.effect import Effect
+from pprs_dynamics.physics.mechanism.reversal import Reversal
+from pprs_dynamics.physics.model.limits import DriveLimits
+from pprs_dynamics.physics.model.recorded_names import gravity_in_efforts
+from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
+from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
+from pprs_dynamics.physics.three_pprs.passive_friction import (
+    IndependentChainsFriction,
+    JointCoefficients,
+    PassiveFriction,
+    WholeMechanismFriction,
+)
+from pprs_dynamics.physics.three_pprs.robot import SingularityBounds, ThreePprs
+
+STROKES = ('limits.slide_stroke',) * 3 + ('limits.lift_stroke',) * 3  # keys, by drive
+
+
+def read_platform(values: Mapping[str, Any],
+                  ) -> tuple[ThreePprs, tuple[Effect, ...], Reversal, DriveLimits]:
+    """Return a 3-PPRS, its own friction, its smoothing and limits, from checked values."""
+    for stroke in dict.fromkeys(STROKES):
+        if not values[stroke][0] < values[stroke][1]:
+            raise ModelError(stroke, values[stroke], 'be a lower and a higher position [m]')
+    printed = values['equations'] == 'printed'
+    passive = _passive_friction(values, printed)
+    is_independent = isinstance(passive, IndependentChainsFriction)
+    robot = ThreePprs(
+        Geometry(**_group(values, 'geometry.')), Masses(**_group(values, 'masses.')),
+        gravity_in_efforts(values, 'gravity'),
+        (values['friction.revolute.diameter'] / 2, values['friction.spherical.diameter'] / 2),
+        SingularityBounds(values['limits.rod_sine'], values['limits.condition_number'],
+                          values['limits.rod_cosine'] if is_independent else 0.0), printed)
+    return (robot, (ActiveFriction(**_group(values, 'friction.drives.')), passive),
+            Reversal(_reversal_velocity(values), values['friction.reversal_rate']),
+            platform_limits(values))
+
+
+def platform_limits(values: Mapping[str, Any]) -> DriveLimits:
+    """Return the strokes and efforts in the values of a 3-PPRS."""
+    lower, upper = np.array([values[key] for key in STROKES]).T
+    return DriveLimits(DRIVES, ('m',) * COUNT, ('N',) * COUNT, lower, upper,
+                       np.array(values['limits.effort']), STROKES, 'limits.effort')
+
+
+def _group(values: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    """Return the keys and values right below a prefix."""
+    return {name.removeprefix(prefix): value for name, value in values.items()
+            if name.startswith(prefix) and '.' not in name.removeprefix(prefix)}
+
+
+def _passive_friction(values: Mapping[str, Any], printed: bool) -> PassiveFriction:
+    joints = (JointCoefficients(**_group(values, 'friction.revolute.')),
+              JointCoefficients(**_group(values, 'friction.spherical.')))
+    if values['friction.approach'] == WholeMechanismFriction.approach:
+        return WholeMechanismFriction(*joints, printed)
+    return IndependentChainsFriction(*joints, printed, values['limits.rod_cosine'])
+
+
+def _reversal_velocity(values: Mapping[str, Any]) -> float | tuple[float, ...]:
+    """Return the width that all drives share, or one for each."""
+    common: float = values['friction.reversal_velocity']
+    own: tuple[float, ...] = values['friction.reversal_velocities']
+    return tuple(width or common for width in own) if any(own) else common

@@ -1,0 +1,165 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Geometry and masses of the 3-PPRS."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import ModelError
+from pprs_dynamics.physics.mechanism.evaluation import KernelParameters
+from pprs_dynamics.physics.mechanism.vectors import ChainVector, in_base
+from pprs_dynamics.physics.three_pprs.kernel_parameters import Chain, GeometryParameters
+
+ELBOWS = ('up', 'down')
+
+
+class ChainFrames:
+    """The three chain frames (e_i, n_i, k) in `base`.
+
+    Parameters
+    ----------
+    angles : sequence of 3 floats
+        Chain angles delta_i [rad].
+    """
+
+    def __init__(self, angles: tuple[float, float, float]) -> None:
+        self.cos = np.cos(angles)
+        self.sin = np.sin(angles)
+
+    def base(self, vector: ChainVector) -> Array:
+        """Return one vector per chain in `base`, (N, 3, 3): samples, chains, components."""
+        result = np.empty((*np.shape(vector.e), 3))
+        result[..., 0], result[..., 1], result[..., 2] = in_base(self, vector)
+        return result
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Lengths and angles of the mechanism.
+
+    Parameters
+    ----------
+    base_radius, platform_radius, rod_length : float
+        R, r and l [m].
+    chain_angles, platform_angles : 3 floats
+        delta_i on the base and delta'_i on the platform [rad].
+    elbow : {'up', 'down'}
+        Branch of the inverse kinematics: 'up' has sin u_i > 0, the carriage below the platform.
+    """
+
+    base_radius: float
+    platform_radius: float
+    rod_length: float
+    chain_angles: tuple[float, float, float]
+    platform_angles: tuple[float, float, float]
+    elbow: str = 'up'
+
+    def __post_init__(self) -> None:
+        for name in ('base_radius', 'platform_radius', 'rod_length'):
+            _require(f'geometry.{name}', getattr(self, name), getattr(self, name) > 0,
+                     'be greater than 0 m')
+        for name in ('chain_angles', 'platform_angles'):
+            angles = np.asarray(getattr(self, name), dtype=float)
+            _require(f'geometry.{name}', getattr(self, name), angles.shape == (3,),
+                     'hold three angles [rad]')
+            distance = np.abs(np.exp(1j * angles) - np.exp(1j * np.roll(angles, 1)))
+            _require(f'geometry.{name}', getattr(self, name), bool(np.all(distance > 1e-6)),
+                     'hold three different directions')
+        _require('geometry.elbow', self.elbow, self.elbow in ELBOWS, 'be one of up, down')
+        turned = np.subtract(self.platform_angles, self.chain_angles)
+        span = np.abs(self.base_radius - self.platform_radius * np.cos(turned)).max()
+        _require('geometry.rod_length', self.rod_length, bool(span < self.rod_length),
+                 f'be greater than {span:.6g} m, for the platform to stand unturned above the '
+                 'base')
+
+    @property
+    def elbow_sign(self) -> float:
+        """Sign of sin u_i."""
+        return 1.0 if self.elbow == 'up' else -1.0
+
+    @cached_property
+    def frames(self) -> ChainFrames:
+        """The frames of the chains."""
+        return ChainFrames(self.chain_angles)
+
+    @cached_property
+    def kernel_parameters(self) -> KernelParameters[GeometryParameters]:
+        """Lengths and the constants of the chains."""
+        frames, delta = self.frames, np.asarray(self.chain_angles)
+        joints = self.platform_radius * np.exp(1j * np.asarray(self.platform_angles))
+        left = np.linalg.pinv(np.stack((-frames.sin, frames.cos), axis=1))
+        # The weights with which the three directions n_i add up to nothing.
+        balance = np.sin(np.roll(delta, -2) - np.roll(delta, -1))
+        constants = np.stack((frames.cos, frames.sin, joints.real, joints.imag, *left, balance),
+                             axis=1).tolist()
+        first, second, third = (Chain(*chain) for chain in constants)
+        return KernelParameters(GeometryParameters(
+            self.base_radius, self.rod_length, self.elbow_sign, (first, second, third)))
+
+
+@dataclass(frozen=True)
+class Masses:
+    """Masses and the inertia of the platform with its payload.
+
+    Parameters
+    ----------
+    platform, payload : float
+        M and m [kg].
+    slides, lifts, rods : 3 floats each
+        m_1..m_3, m_4..m_6 and m_b of each chain [kg].
+    centre : 3 floats
+        Centre of mass of platform and payload from o, in `platform` [m].
+    inertia : 6 floats
+        Elements xx, yy, zz, xy, xz, yz of the inertia tensor of both about that centre, in
+        `platform` [kg m^2]; products as tensor elements (-integral of x y dm), as in a URDF.
+    """
+
+    platform: float
+    payload: float
+    slides: tuple[float, float, float]
+    lifts: tuple[float, float, float]
+    rods: tuple[float, float, float]
+    centre: tuple[float, float, float]
+    inertia: tuple[float, float, float, float, float, float]
+
+    def __post_init__(self) -> None:
+        for name, value in (('platform', self.platform), ('payload', self.payload)):
+            _require(f'masses.{name}', value, value >= 0, 'be at least 0 kg')
+        for name in ('slides', 'lifts', 'rods'):
+            value = getattr(self, name)
+            _require(f'masses.{name}', value, len(value) == 3 and min(value) >= 0,
+                     'hold three masses of at least 0 kg')
+        _require('masses.platform', self.platform, self.total > 0,
+                 'with masses.payload be greater than 0 kg')
+        # A body's tensor has principal moments that satisfy the triangle inequality; a point
+        # mass has none at all. Tolerance: a thin disc lies exactly on the border.
+        moments = np.linalg.eigvalsh(self.inertia_tensor)
+        slack = 1e-9 * max(float(moments[2]), 1e-300)
+        _require('masses.inertia', self.inertia, bool(moments[0] >= -slack),
+                 'be a positive semi-definite tensor')
+        triangle = bool(moments[0] + moments[1] >= moments[2] - slack)
+        _require('masses.inertia', self.inertia, triangle,
+                 'have principal moments of which each two sum to at least the third')
+
+    @property
+    def total(self) -> float:
+        """M + m [kg]."""
+        return self.platform + self.payload
+
+    @property
+    def inertia_tensor(self) -> Array:
+        """Inertia tensor about the centre of mass, in `platform`, (3, 3) [kg m^2]."""
+        xx, yy, zz, xy, xz, yz = self.inertia
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _require(key: str, value: Any, condition: bool, rule: str) -> None:
+    if not condition:
+        raise ModelError(key, value, rule)

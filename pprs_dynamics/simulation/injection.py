@@ -1,0 +1,879 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Effects injected into a robot along a motion: MuJoCo's inverse dynamics and sensor faults.
+
+Friction is that of the model file. Injected effects have equations of their own
+(`injected_forms`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import WorkspaceError, suggestion
+from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
+from pprs_dynamics.physics.mechanism.description import body_at
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.joint_series import JointSeries
+from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.simulation.engine import Carried, MechanismEngine
+from pprs_dynamics.simulation.engine_loops import ClosedMotion
+from pprs_dynamics.simulation.injected_forms import (
+    CROSSED,
+    FORMS,
+    SIZE,
+    STEEPNESS,
+    UNKNOWN,
+    InjectedEffectError,
+    JointMoment,
+    ahead,
+    algebraic_sign,
+    draw_form,
+    eyring,
+    tilted,
+)
+from pprs_dynamics.simulation.platform import BALLS, HINGES, RODS, PlatformMechanism
+from pprs_dynamics.simulation.sensors import ButterworthFilter
+from pprs_dynamics.simulation.temperatures import REFERENCE, Climate, read_thermometers
+
+RATE = 100.0  # [Hz]
+CLIMATE, SECOND = 45, 46  # second seeds: of temperatures, of second encoders
+MOUNTED = 0.01  # [rad, m], by which second encoders have other zeros
+HARMONICS = 8
+FASTEST, WIDEST = 0.35, 1.5  # of the top speed; from the middle of the range [rad, m]
+QUICKEST = 3.0  # [rad/s^2, m/s^2]
+SHIFT_OF_SLIDE = 0.1  # [m/rad], zero errors of a robot's legs over those of turning joints
+# Of an encoder's radius, beside its axis; and the step for derivatives [rad].
+ON_JOINT, ON_MOTOR = (0.01, 0.03), (0.02, 0.08)
+ANGLE_STEP = 1e-3
+SHRINK, SHRINKS = 0.8, 20  # of a motion until its loops close throughout
+ENCODER = 2e-5  # [rad, m]
+COLOURED, CORRELATION = 0.36, 0.95  # share of the noise's variance, and from sample to sample
+PICK_UP_TIME = 0.2  # [s], in which the tool takes the weight of a payload
+RANDOM = 'random'
+
+
+@dataclass(frozen=True)
+class MechanismRun:
+    """A simulated recording.
+
+    Parameters
+    ----------
+    motion : JointMotion
+    position, effort : (N, n) arrays
+        As measured.
+    effects : tuple of dict
+        What was injected.
+    channels : mapping of str to (N, n) array
+        Readings of thermometers, where temperature matters, and of second encoders.
+    """
+
+    motion: JointMotion
+    position: Array
+    effort: Array
+    effects: tuple[dict[str, Any], ...]
+    channels: Mapping[str, Array]
+
+
+def draw_motion(model: DriveModel, duration: float, seed: int, rate: float = RATE,
+                ) -> JointMotion:
+    """Return a random Fourier series of all drives within their limits and the workspace.
+
+    It begins and ends at rest, in the middle of the drives' room; see `Structure.room`.
+    """
+    structure, random = model.robot.structure, np.random.default_rng(seed)
+    middle, room = structure.room(np.pi)
+    reach = np.minimum(0.9 * room, WIDEST)
+    shape = random.normal(size=(len(model.drives), JointSeries.size(HARMONICS)))
+    time = np.arange(0.0, duration, 1 / rate)
+    raw = JointSeries(shape, middle, duration, HARMONICS)
+    motion = raw.motion(time)
+    top = np.where(np.isfinite(structure.speed), structure.speed, np.pi)
+    uses = np.max([np.abs(values).max(axis=0) / bound for values, bound in (
+        (motion.position - raw.middle, reach), (motion.velocity, FASTEST * top),
+        (motion.acceleration, QUICKEST))], axis=0)
+    for _ in range(SHRINKS):
+        motion = JointSeries(shape / uses[:, None], raw.middle, duration, HARMONICS).motion(time)
+        try:
+            model.robot.at(motion.position, motion.velocity, motion.acceleration)
+        except WorkspaceError:
+            uses = uses / SHRINK
+        else:
+            return motion
+    raise InjectedEffectError('no motion about home stays within the workspace')
+
+
+class Injected(NamedTuple):
+    """The truth about an injected effect: its drives, or None; its parameters; its equation."""
+
+    drives: list[str] | None
+    parameters: dict[str, Any]
+    form: str
+
+
+@dataclass
+class Choice:
+    """An effect to inject.
+
+    Parameters
+    ----------
+    name : str
+    random : numpy.random.Generator
+        Of its sizes.
+    scale : float
+        Multiplies these.
+    drives : tuple of str
+        Where given; else they are drawn.
+    sizes : dict, optional
+        Drawn by the first injection, for the motion there; later injections take the same.
+    """
+
+    name: str
+    random: np.random.Generator
+    scale: float = 1.0
+    drives: tuple[str, ...] = ()
+    sizes: dict[str, Any] | None = None
+
+
+class PlainRobot:
+    """A robot along a motion without injected effects.
+
+    Parameters
+    ----------
+    model : DriveModel
+    motion : JointMotion
+        Of the drives.
+    rounds : int
+        1: friction follows loads without friction, as in the model; more: with friction.
+    closed : ClosedMotion, optional
+        The motion with closed loops, where it is known of a robot of the same kinematics.
+    """
+
+    def __init__(self, model: DriveModel, motion: JointMotion, rounds: int = 1,
+                 closed: ClosedMotion | None = None) -> None:
+        self.model, self.motion, self.rounds = model, motion, rounds
+        self.engine = MechanismEngine(model)
+        if closed is not None:
+            self.engine.use(motion, closed)
+        self.closed = self.engine.closed(motion)
+
+    @cached_property
+    def carried(self) -> Carried:
+        """Inverse dynamics of the bodies."""
+        return self.engine.carried(self.closed)
+
+    @cached_property
+    def friction(self) -> Array:
+        """Efforts of friction, offset and armature, (N, D)."""
+        return own_friction(self.model, self.engine, self.motion, self.rounds)
+
+    @property
+    def effort(self) -> Array:
+        """Efforts of the drives, (N, D)."""
+        return self.carried.efforts + self.friction
+
+
+class Injection:
+    """A robot along a motion while effects are injected into it.
+
+    Parameters
+    ----------
+    plain : PlainRobot
+        Its motion is what the encoders measure.
+    choices : sequence of Choice
+    climate : numpy.random.Generator
+        Of temperatures.
+    progress : callable, optional
+        Called with the share that is done.
+
+    Attributes
+    ----------
+    motion : JointMotion
+        Of the joints.
+    bodies, efforts, temperature : (N, D) arrays
+        Efforts without friction but with injected bodies; measured efforts without noise.
+    windup, lead, shift : (N, D) or (D,) arrays
+        By which encoders lead their links: under load, in a clearance, at the zero.
+    largest : (D,) array
+        Largest efforts.
+    passive : (N, nv) array
+        Efforts of the tree's joints against injected forces in passive joints.
+    truths : list of dict
+        What was injected.
+
+    Raises
+    ------
+    InjectedEffectError
+        For another name, or a robot that cannot have an effect.
+    """
+
+    def __init__(self, plain: PlainRobot, choices: Sequence[Choice], climate: np.random.Generator,
+                 progress: Callable[[float], None] | None = None) -> None:
+        assert plain.motion.time is not None
+        self.plain, self.model, self.climate = plain, plain.model, climate
+        self.motion, self.time = plain.motion, plain.motion.time
+        self.engine = MechanismEngine(plain.model) if {
+            one.name for one in choices} & CHANGING else plain.engine
+        self.engine.use(plain.motion, plain.closed)
+        self.windup, self.lead = (np.zeros_like(plain.motion.position) for _ in range(2))
+        self.shift = np.zeros(len(self.model.drives))
+        self.passive = np.zeros_like(plain.closed.velocity)
+        self.picked: tuple[Array, Array] | None = None
+        self.truths: list[dict[str, Any]] = []
+        for choice in choices:
+            if choice.name not in NAMES:
+                raise InjectedEffectError(
+                    f'{choice.name} is no injected effect of such a robot'
+                    f'{suggestion(choice.name, NAMES)}, must be one of {", ".join(NAMES)}')
+        for share, (start, effects) in enumerate(STAGES, 1):
+            start(self)
+            # Forces of drives are drawn in the order in which they were named.
+            for choice in sorted((one for one in choices if one.name in effects),
+                                 key=lambda one: 0 if effects is FORCES
+                                 else list(effects).index(one.name)):
+                self.choice, self.given = choice, self.drives_of(choice)
+                self.random, self.scale = choice.random, choice.scale
+                drives, parameters, form = effects[choice.name](self)
+                self.truths.append({'name': choice.name, 'drives': drives,
+                                    'parameters': parameters, 'form': form})
+            if progress is not None:
+                progress(share / len(STAGES))
+
+    def drives_of(self, choice: Choice) -> list[int]:
+        """Return the numbers of the drives that are given with an effect."""
+        for name in choice.drives:
+            if name not in self.model.drives:
+                raise InjectedEffectError(f'{choice.name} acts in a drive, not in {name!r}')
+        if choice.drives and choice.name in NOT_IN_DRIVES:
+            raise InjectedEffectError(f'{choice.name} acts in no drive, so that '
+                                      f'{",".join(choice.drives)} must not follow')
+        return [self.model.drives.index(name) for name in choice.drives]
+
+    def sizes(self, draw: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """Return the sizes of the effect, drawn where it is injected for the first time."""
+        if self.choice.sizes is None:
+            self.choice.sizes = draw()
+        return self.choice.sizes
+
+    def size(self, low: float, high: float) -> float:
+        """Return a random size, times the scale."""
+        return self.scale * float(self.random.uniform(low, high))
+
+    def joint(self, least: int = 0) -> int:
+        """Return the given drive, or a random one from a number on where there are others."""
+        count = len(self.model.drives)
+        drawn = int(self.random.integers(min(least, count - 1), count))
+        return self.given[0] if self.given else drawn
+
+    def shift_unit(self, joint: int) -> float:
+        """Return the unit of a joint's zero errors and clearances [m/rad or 1]."""
+        slides_in_loop = self.model.robot.structure.loops and not self.model.units[joint].turns
+        return SHIFT_OF_SLIDE if slides_in_loop else 1.0
+
+    def share_of_largest(self, rates: Array) -> float:
+        """Return a force in the structure that a drive feels like an injected force on a drive.
+
+        Parameters
+        ----------
+        rates : (N, D) array
+            Motion of the structure per motion of each drive.
+        """
+        felt = np.abs(rates).max(axis=0)
+        d = int(np.argmax(felt))
+        rigid = self.plain.carried.efforts
+        return self.scale * SIZE(self.random) * float(np.abs(rigid[:, d]).max()) / float(felt[d])
+
+    def start_gears(self) -> None:
+        """Compute the efforts with injected bodies."""
+        self.carried = self.plain.carried
+        if self.truths:
+            self.carried = self.engine.carried(self.engine.closed(self.motion), self.passive)
+        self.bodies = self.carried.efforts
+        if self.picked is not None:
+            share, parameters = self.picked
+            self.engine.carry(self.model.robot.structure.tool, parameters)
+            loaded = self.engine.torques(self.motion, self.passive)
+            self.bodies = self.bodies + share[:, None] * (loaded - self.bodies)
+
+    def start_efforts(self) -> None:
+        """Compute the drives' efforts with the friction of the model, and temperatures."""
+        if self.windup.any():
+            wound = np.gradient(self.windup, self.time, axis=0)
+            friction = own_friction(self.model, self.engine, replace(
+                self.motion, velocity=self.motion.velocity + wound,
+                acceleration=self.motion.acceleration + np.gradient(wound, self.time, axis=0)))
+        elif self.engine is not self.plain.engine or self.motion is not self.plain.motion:
+            friction = own_friction(self.model, self.engine, self.motion, self.plain.rounds)
+        else:
+            friction = self.plain.friction
+        self.efforts = self.bodies + friction
+        self.largest = np.abs(self.efforts).max(axis=0)
+        self.temperature = Climate.draw(self.climate, len(self.largest)).along(
+            self.time, self.motion.velocity)
+
+    def moment(self, joint: int) -> JointMoment:
+        """Return a joint along the motion."""
+        name, pressed = self.model.drives[joint], None
+        if name in guides(self.model):
+            pressed = np.linalg.norm(self.engine.across([name], self.carried)[:, 0], axis=1)
+        return JointMoment.along(self.motion, joint, self.bodies[:, joint], self.largest[joint],
+                                 self.model.gear_ratios[joint], self.temperature, pressed)
+
+    @property
+    def beside(self) -> Array:
+        """By how much encoders lead their links, (N, D)."""
+        return self.lead + self.shift + self.windup
+
+    @property
+    def position(self) -> Array:
+        """Positions as encoders of any resolution measure them, (N, D)."""
+        return self.plain.motion.position + self.beside
+
+
+def simulate_mechanism(
+    model: DriveModel, names: Sequence[str], seed: int, scale: float = 1.0,
+    noise: float | None = None, duration: float = 40.0, path_seed: int = 0,
+    progress: Callable[[float], None] | None = None, thermometers: bool = False,
+    link_encoders: bool = False, motion: JointMotion | None = None,
+    nominal: JointMotion | None = None,
+) -> MechanismRun:
+    """Return a recording of a mechanism with injected effects.
+
+    Parameters
+    ----------
+    model : DriveModel
+        Its added effects are part of the model, not of the simulated robot.
+    names : sequence of str
+        Of `NAMES`, or 'random'. Drives may follow after a colon: 'coulomb_friction:a,b'.
+    seed : int
+        Of effects and noise.
+    scale : float
+        Multiplies the size of effects.
+    noise : float, optional
+        Standard deviation of all efforts [N m, N]; by default half a percent of the largest.
+    duration : float
+        [s]
+    path_seed : int
+        Of the motion.
+    progress : callable, optional
+    thermometers, link_encoders : bool
+        Whether they are recorded where no effect needs them.
+    motion : JointMotion, optional
+        In place of a random one.
+    nominal : JointMotion, optional
+        Motion whose efforts and speeds determine the sizes of the effects, by default the same.
+
+    Raises
+    ------
+    InjectedEffectError
+        For another name, or a robot that cannot have an effect.
+    """
+    random = np.random.default_rng(seed)
+    read = draw_motion(model, duration, path_seed) if motion is None else motion
+    choices = sorted((*(name for name in FORMS if able_joints(name, model, read)), 'payload_mass'))
+    chosen = [str(random.choice(choices)) if name == RANDOM else name for name in names]
+    effects = [named(name, random, scale) for name in chosen]
+    # Generators of their own, so that no other draw depends on temperatures and second encoders.
+    if nominal is not None and effects:
+        Injection(PlainRobot(model, nominal), effects, np.random.default_rng((seed, CLIMATE)))
+    run = Injection(PlainRobot(model, read), effects, np.random.default_rng((seed, CLIMATE)),
+                    progress)
+    sigma = np.full(len(run.largest), noise) if noise is not None else 0.005 * run.largest
+    measured = run.efforts + noise_like(random, run.efforts.shape) * sigma
+    channels = {}
+    if thermometers or {*chosen} & {'friction_temperature', 'current_gain'}:
+        channels['temperature'] = read_thermometers(run.time, run.temperature)
+    if link_encoders or 'elastic_joint' in chosen:
+        second = np.random.default_rng((seed, SECOND))  # mounted at another angle
+        channels['link_position'] = (
+            run.motion.position + run.lead + run.shift
+            + second.normal(0, MOUNTED, len(run.shift))
+            + ENCODER * second.uniform(-0.5, 0.5, run.lead.shape))
+    position = run.position + ENCODER * random.uniform(-0.5, 0.5, run.lead.shape)
+    return MechanismRun(run.motion, position, measured, tuple(run.truths), channels)
+
+
+def named(words: str, random: np.random.Generator, scale: float) -> Choice:
+    """Return the effect of a name, which drives may follow: 'coulomb_friction:a,b'."""
+    name, _, drives = words.partition(':')
+    return Choice(name, random, scale, tuple(drives.split(',')) if drives else ())
+
+
+# ------------------------------------------------------------------------------ encoders, bodies
+
+
+def _eccentric_encoder(run: Injection) -> Injected:
+    """Inject an eccentric encoder, which the robot's control follows."""
+    model, read, random = run.model, run.motion, run.random
+    able = [j for j, unit in enumerate(model.units) if unit.turns or model.gear_ratios[j] > 1]
+    if not able:
+        raise InjectedEffectError('eccentric_encoder needs a joint that turns, or the gear_ratio '
+                                  'of one that slides')
+
+    def draw() -> dict[str, Any]:
+        j = able[int(random.integers(len(able)))]
+        ratio = model.gear_ratios[j]
+        # On the motor, or on the joint behind its gear.
+        if ratio == 1 or (model.units[j].turns and random.random() < 0.5):
+            ratio = 1.0
+        return {'j': j, 'ratio': ratio,
+                'beside': run.size(*(ON_JOINT if ratio == 1 else ON_MOTOR)),
+                'phase': float(random.uniform(-np.pi, np.pi))}
+
+    j, ratio, beside, phase = run.sizes(draw).values()
+
+    def behind(q: Array) -> Array:
+        """Return the angles of the disc, of radius 1, of which the head reads q."""
+        x = ratio * q + phase
+        found: Array = q - np.arctan2(beside * np.sin(x), 1 + beside * np.cos(x)) / ratio
+        return found
+
+    position, velocity, acceleration = (
+        np.array(values) for values in (read.position, read.velocity, read.acceleration))
+    q, v, step = read.position[:, j], read.velocity[:, j], ANGLE_STEP / ratio
+    before, at, after = (behind(q + move) for move in (-step, 0.0, step))
+    slope = (after - before) / (2 * step)
+    position[:, j], velocity[:, j] = at, slope * v
+    acceleration[:, j] = (slope * read.acceleration[:, j]
+                          + (after - 2 * at + before) / step ** 2 * v ** 2)
+    run.motion = replace(read, position=position, velocity=velocity, acceleration=acceleration)
+    return Injected([model.drives[j]], {model.drives[j]: {
+        'amplitude': beside / ratio, 'phase': phase, 'pitch': 2 * np.pi / ratio}},
+        'q - atan(e sin(x) / (1 + e cos(x))) / n, x = n q + phi, behind what is read as q')
+
+
+def _payload_mass(run: Injection) -> Injected:
+    size = run.sizes(lambda: {'share': run.size(0.05, 0.12)})
+    return inject_payload(run.engine, size['share'], 0.05)
+
+
+def _link_mass(run: Injection) -> Injected:
+    return inject_link_mass(run.engine, **run.sizes(
+        lambda: link_sizes(run.model, run.random, run.scale)))
+
+
+def _payload_offset(run: Injection) -> Injected:
+    """Inject another centre of mass of what carries the tool."""
+    _require_tool(run.model, 'payload_offset')
+    offset = run.sizes(lambda: {
+        axis: run.size(0.003, 0.015) * float(run.random.choice((-1.0, 1.0))) for axis in 'xyz'})
+    run.engine.shift_tool(np.array([*offset.values()]))
+    return Injected(None, offset, 'the centre of mass elsewhere')
+
+
+def _platform_inertia(run: Injection) -> Injected:
+    """Inject a beam across the tool, whose inertia about one axis in its plane is 0."""
+    _require_tool(run.model, 'platform_inertia')
+    sizes = run.sizes(lambda: {
+        'inertia': run.scale * float(np.exp(run.random.uniform(np.log(0.01), np.log(0.04)))),
+        'angle': float(run.random.uniform(0.0, np.pi))})
+    inertia, angle = sizes.values()
+    along = np.array([np.cos(angle), np.sin(angle), 0.0])
+    run.engine.carry(run.model.robot.structure.tool, body_at(
+        0.0, (0.0,) * 3, inertia * (np.eye(3) - np.outer(along, along))))
+    return Injected(None, sizes, 'I (E - a a^T), a = (cos beta, sin beta, 0)')
+
+
+def _payload_pick_up(run: Injection) -> Injected:
+    """Inject a payload that the tool takes in the middle of the motion. Not in the catalogue."""
+    _require_tool(run.model, 'payload_pick_up')
+    sizes = run.sizes(lambda: {
+        'mass': run.size(0.05, 0.12) * float(run.engine.robot.masses.sum()),
+        'time': float(np.quantile(run.time, run.random.uniform(0.1, 0.4)))})
+    share = np.clip((run.time - sizes['time']) / PICK_UP_TIME, 0.0, 1.0)
+    run.picked = share, body_at(sizes['mass'], (0.0, 0.0, 0.05), np.zeros((3, 3)))
+    return Injected(None, sizes, 'a point 5 cm before the tool from t on')
+
+
+def _joint_friction(run: Injection) -> Injected:
+    """Inject dry friction of a passive joint, of all of a kind in a 3-PPRS."""
+    structure = run.model.robot.structure
+    groups = {'revolute': HINGES, 'spherical': BALLS} if isinstance(
+        run.model, PlatformMechanism) else {
+            name: (name,) for name, (row, _) in friction_rows(structure).items()
+            if row >= 0 and name not in structure.drives}
+    if not groups:
+        raise InjectedEffectError('joint_friction needs a passive joint')
+    closed = run.engine.closed(run.motion)
+
+    def rows_of(name: str) -> Array:
+        return run.engine.friction(run.model.robot.friction_table(
+            {joint: {} for joint in groups[name]}, run.model.reversal), closed,
+            run.plain.carried).rows
+
+    def speed_of(rows: Array) -> Array:
+        return np.linalg.norm(np.einsum('nkiv,nv->nki', rows, closed.velocity), axis=2)
+
+    def draw() -> dict[str, Any]:
+        name = str(run.random.choice(list(groups)))
+        rows = rows_of(name)
+        felt = np.linalg.norm(np.einsum('nkiv,nvd->nkid', rows, closed.rates), axis=2)
+        return {'name': name, 'torque': run.share_of_largest(felt.max(axis=1)),
+                'width': STEEPNESS * float(speed_of(rows).max())}
+
+    name, torque, width = run.sizes(draw).values()
+    rows = rows_of(name)
+    run.passive += np.einsum('nk,nki,nkiv->nv', torque / np.hypot(speed_of(rows), width),
+                             np.einsum('nkiv,nv->nki', rows, closed.velocity), rows)
+    return Injected(None, {f'{name}.torque': torque}, 'T w / sqrt(w^2 + w_0^2)')
+
+
+def _joint_spring(run: Injection) -> Injected:
+    """Inject springs in passive joints, in all hinges of a 3-PPRS."""
+    structure, closed = run.model.robot.structure, run.engine.closed(run.motion)
+    groups = {'revolute': HINGES} if isinstance(run.model, PlatformMechanism) else {
+        name: (name,) for name in structure.rows if name not in structure.drives
+        and name in friction_rows(structure)}
+    if not groups:
+        raise InjectedEffectError('joint_spring needs a passive joint')
+
+    def draw() -> dict[str, Any]:
+        name = str(run.random.choice(list(groups)))
+        angle = closed.position[:, [run.engine.state.place(joint) for joint in groups[name]]]
+        felt = np.abs(closed.rates[:, [run.engine.state.dof(joint) for joint in groups[name]]])
+        way = float(np.ptp(angle))
+        return {'name': name, 'stiffness': 2 * run.share_of_largest(felt.max(axis=1)) / way,
+                'rest': float(angle.mean()), 'way': way}
+
+    name, stiffness, rest, way = run.sizes(draw).values()
+    off = closed.position[:, [run.engine.state.place(joint) for joint in groups[name]]] - rest
+    run.passive[:, [run.engine.state.dof(joint) for joint in groups[name]]] += (
+        stiffness * off * (1 + (off / way) ** 2))
+    return Injected(None, {f'{name}.stiffness': stiffness, f'{name}.position': rest},
+                    'k x (1 + (x / x_h)^2), x = u - u_0')
+
+
+def _base_tilt(run: Injection) -> Injected:
+    _require_tool(run.model, 'base_tilt')
+    return inject_tilt(run.engine, run.sizes(lambda: {'x': run.size(0.01, 0.03)})['x'])
+
+
+def _external_wrench(run: Injection) -> Injected:
+    _require_tool(run.model, 'external_wrench')
+    force = run.sizes(lambda: {
+        'force_z': run.scale * 0.05 * float(np.abs(run.plain.effort).max())})['force_z']
+    run.engine.wrench = run.engine.wrench + np.array([0.0, 0.0, force, 0.0, 0.0, 0.0])
+    return Injected(None, {'force_z': force}, 'at the tool')
+
+
+def _tool_drag(run: Injection) -> Injected:
+    """Inject a liquid or a curtain that the tool moves through."""
+    _require_tool(run.model, 'tool_drag')
+    velocity = run.engine.tool_velocity(run.engine.closed(run.motion))
+    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
+    top = float(speed.max())
+    sizes = run.sizes(lambda: {'turbulent_velocity': 2 * top, 'coefficient': run.size(
+        0.03, 0.1) * float(np.abs(run.plain.effort).max()) / top})
+    turbulent, coefficient = sizes.values()
+    drag = coefficient * np.hypot(1.0, speed / turbulent) * velocity
+    run.engine.wrench = run.engine.wrench + np.concatenate((drag, np.zeros_like(drag)), axis=1)
+    return Injected(None, sizes, 'c v sqrt(1 + (|v| / v_1)^2)')
+
+
+def _require_tool(model: DriveModel, name: str) -> None:
+    """Raise InjectedEffectError for an axis, which a force across it does not move."""
+    if not model.is_described:
+        raise InjectedEffectError(f'{name} does not act along a single axis: choose effort_offset')
+
+
+def inject_payload(engine: MechanismEngine, share: float, ahead: float) -> Injected:
+    """Hang a point of a share of the robot's mass on the tool, along its z axis [m]."""
+    mass = share * float(engine.robot.masses.sum())
+    engine.carry(engine.structure.tool, body_at(mass, (0.0, 0.0, ahead), np.zeros((3, 3))))
+    return Injected(None, {'mass': mass}, f'a point {100 * ahead:g} cm before the tool'
+                    if ahead else "a point at the tool's origin")
+
+
+def link_sizes(model: DriveModel, random: np.random.Generator, scale: float,
+               first: int = 1) -> dict[str, Any]:
+    """Return a random link and a share of its mass; the rods of a 3-PPRS.
+
+    Links of a robot without loops are drawn from a number on.
+    """
+    name = 'rods'
+    if not isinstance(model, PlatformMechanism):
+        able = links_that_weigh(model, first)
+        if not able:
+            raise InjectedEffectError('link_mass needs a link between the first and the tool')
+        name = model.robot.body_names[int(random.choice(able))]
+    return {'name': name, 'share': scale * float(random.uniform(0.1, 0.3))}
+
+
+def inject_link_mass(engine: MechanismEngine, name: str, share: float) -> Injected:
+    """Make a link heavier by a share of its mass, or all rods of a 3-PPRS."""
+    robot = engine.robot
+    for link in RODS if isinstance(engine.model_file, PlatformMechanism) else (name,):
+        parameters = robot.inertial[robot.body_names.index(link)]
+        mass = share * float(parameters[0])
+        frame = engine.structure.links[link][1].inverse
+        centre = frame.of_point(parameters[1:4] / parameters[0])
+        engine.carry(link, body_at(mass, tuple(centre), np.zeros((3, 3))))
+    return Injected(None, {f'{name}.mass': mass}, 'a point at its centre')
+
+
+def inject_tilt(engine: MechanismEngine, angle: float) -> Injected:
+    """Tilt the base about its x axis [rad]."""
+    engine.gravity = tilted(engine.gravity, angle)
+    return Injected(None, {'x': angle, 'y': 0.0}, 'about x')
+
+
+# ----------------------------------------------------------------------------------------- gears
+
+
+def _elastic_joint(run: Injection) -> Injected:
+    """Inject a gear that winds up under load.
+
+    A harmonic drive that stiffens, w + (w / w_1)^2 w = tau / k, and creeps: a share of it comes
+    late, by a relaxation (a standard linear solid). It is in a joint that turns, where there is
+    one behind the first: a slide that carries no weight would not feel it.
+    """
+    model, random = run.model, run.random
+    later = range(min(1, len(model.drives) - 1), len(model.drives))
+
+    def draw() -> dict[str, Any]:
+        drawn = int(random.choice([j for j in later if model.units[j].turns] or later))
+        joint = run.given[0] if run.given else drawn
+        return {'joint': joint, 'largest': float(np.abs(run.bodies[:, joint]).max()),
+                'span': run.size(0.02, 0.05) * run.shift_unit(joint),
+                'late': float(random.uniform(0.05, 0.2)), 'time': float(random.uniform(0.02, 0.1))}
+
+    joint, largest, span, late, time = run.sizes(draw).values()
+    load = run.bodies[:, joint] / largest
+    kept, crept = np.exp(-float(np.median(np.diff(run.time))) / time), load.copy()
+    for k in range(1, len(load)):
+        crept[k] = kept * crept[k - 1] + (1 - kept) * load[k]
+    felt = (1 - late) * load + late * crept
+    # The real root of x + x^3 / 4 = felt, x = w / span.
+    x = 4 / np.sqrt(3) * np.sinh(np.arcsinh(0.75 * np.sqrt(3) * felt) / 3)
+    run.windup[:, joint] = span * x
+    return Injected([model.drives[joint]], {model.drives[joint]: {
+        'compliance': span / largest, 'loss': late * time}},
+        'tau / tau_0 = x + x^3 / 4, x = w / w_0, a share of it late by a relaxation')
+
+
+def _lost_motion(run: Injection) -> Injected:
+    """Inject a clearance, crossed by the load on half of the joints whose load changes sign."""
+
+    def draw() -> dict[str, Any]:
+        joint = run.joint(1)
+        span, load = run.size(0.01, 0.03) * run.shift_unit(joint), run.bodies[:, joint]
+        # The link falls behind in its position alone, on which no force of an axis depends.
+        by_load = bool(run.model.is_described and load.min() < -CROSSED * load.max() < 0
+                       and run.random.integers(2))
+        driver = load if by_load else run.motion.velocity[:, joint]
+        return {'joint': joint, 'span': span, 'by_load': by_load,
+                'largest': float(np.abs(driver).max())}
+
+    joint, span, by_load, largest = run.sizes(draw).values()
+    lead = np.zeros_like(run.bodies)
+    lead[:, joint] = ahead(
+        span, (run.bodies if by_load else run.motion.velocity)[:, joint], largest)
+    if by_load:  # the motor moves as before, and the link falls behind it
+        run.bodies = run.engine.torques(replace(
+            run.motion, position=run.motion.position - lead), run.passive)
+    else:
+        run.lead = lead
+    name = run.model.drives[joint]
+    return Injected([name], {name: {'backlash' if by_load else 'play': span}},
+                    'b / 2 x / sqrt(x^2 + (0.02 x_max)^2), x the load or the speed')
+
+
+# --------------------------------------------------------------------------- drives, amplifiers
+
+
+def _force(name: str, run: Injection) -> Injected:
+    """Inject a force on one drive, or on all."""
+    model, random, form = run.model, run.random, {**FORMS, **UNKNOWN}[name]
+
+    def draw() -> dict[str, Any]:
+        everywhere = bool(random.random() < 0.25)
+        chosen = run.given or (able_joints(name, model, run.motion) if everywhere else
+                               [one_able_joint(name, model, run.motion, random)])
+        moments = {j: run.moment(j) for j in chosen}
+        return {model.drives[j]: (m.effort, m.speed, draw_form(form, random, m, run.scale))
+                for j, m in moments.items()}
+
+    sizes = run.sizes(draw)
+    for drive, (effort, speed, drawn) in sizes.items():
+        j = model.drives.index(drive)
+        run.efforts[:, j] += form.force(drawn, replace(run.moment(j), effort=effort, speed=speed))
+    return Injected([*sizes], {drive: drawn for drive, (_, _, drawn) in sizes.items()}, form.form)
+
+
+def _coupled_drives(run: Injection) -> Injected:
+    """Inject friction of a motor that moves several joints."""
+    motors = run.model.robot.motors
+    if not motors:
+        raise InjectedEffectError('coupled_drives needs a motor that moves several joints: write '
+                                  'friction: {motors: {MOTOR: {JOINT: 1.0, OTHER: 1.0}}}')
+
+    def draw() -> dict[str, Any]:
+        name = str(run.random.choice(sorted(motors)))
+        row = np.array(motors[name])
+        # As large on the joint that feels it most as an injected force on a drive is.
+        felt = float(np.min(run.largest[row != 0] / np.abs(row[row != 0])))
+        return {'name': name, 'top': float(np.abs(run.motion.velocity @ row).max()),
+                'dry': run.scale * SIZE(run.random) * felt,
+                'viscous': run.scale * SIZE(run.random) * felt}
+
+    name, top, dry, viscous = run.sizes(draw).values()
+    row = np.array(motors[name])
+    speed = run.motion.velocity @ row
+    friction = (dry * algebraic_sign(speed, STEEPNESS * top)
+                + viscous * eyring(speed, 2 * top) / top)
+    run.efforts += np.outer(friction, row)
+    return Injected(None, {f'{name}.coulomb': dry, f'{name}.viscous': viscous / top},
+                    "A' (F v / sqrt(v^2 + w^2) + c v_1 asinh(v / v_1)), v the speed of the motor")
+
+
+def _effort_gain(run: Injection) -> Injected:
+    joint, gain = run.sizes(
+        lambda: {'joint': run.joint(), 'gain': run.size(0.04, 0.1)}).values()
+    run.efforts[:, joint] *= 1 + gain
+    return Injected([run.model.drives[joint]], {'gain': gain}, '1 + gain')
+
+
+def _current_gain(run: Injection) -> Injected:
+    """Inject a torque constant that changes with the motor's temperature or angle."""
+    model, random = run.model, run.random
+
+    def draw() -> dict[str, Any]:
+        j = run.joint()
+        ratio = model.gear_ratios[j]
+        if ratio > 1 and random.random() < 0.5:
+            height, waves = run.size(0.03, 0.08), int(random.integers(1, 7))
+            return {'j': j, 'parameters': {
+                'ripple': height, 'phase': float(random.uniform(-np.pi, np.pi)),
+                'pitch': 2 * np.pi / (waves * ratio)}}
+        return {'j': j, 'parameters': {'temperature': run.size(0.0015, 0.003),
+                                       'reference': float(random.uniform(*REFERENCE))}}
+
+    j, p = run.sizes(draw).values()
+    if 'ripple' in p:
+        turn = 2 * np.pi / p['pitch'] * run.motion.position[:, j] + p['phase']
+        constant = 1 + p['ripple'] * (np.sin(turn) + 0.2 * np.sin(3 * turn))
+        form = 'F / (1 + a (sin(x) + sin(3 x) / 5)), x = 2 pi q / p + phi'
+    else:
+        warmer = run.temperature[:, j] - p['reference']
+        constant = 1 - p['temperature'] * warmer * (1 + warmer / 300)
+        form = 'F / (1 - kappa (T - T_0) (1 + (T - T_0) / 300 K))'
+    run.efforts[:, j] /= constant
+    return Injected([model.drives[j]], {model.drives[j]: p}, form)
+
+
+def _time_delay(run: Injection) -> Injected:
+    delay = run.sizes(lambda: {'delay': run.size(0.008, 0.03)})['delay']
+    run.efforts = np.stack([np.interp(run.time - delay, run.time, column)
+                            for column in run.efforts.T], axis=1)
+    return Injected(list(run.model.drives), {'delay': delay}, 'all efforts late')
+
+
+def _effort_filter(run: Injection) -> Injected:
+    time_constant = run.sizes(
+        lambda: {'time_constant': run.size(0.01, 0.04)})['time_constant']
+    run.efforts = ButterworthFilter(np.full(len(run.largest), time_constant), float(
+        np.median(np.diff(run.time)))).samples(run.efforts)
+    return Injected(list(run.model.drives), {'time_constant': time_constant},
+                    'low-pass of second order (Butterworth), T = sqrt(2) / (2 pi f_c)')
+
+
+def _homing_error(run: Injection) -> Injected:
+
+    def draw() -> dict[str, Any]:
+        joint = run.joint(1)
+        return {'joint': joint, 'zero': run.size(0.01, 0.03) * run.shift_unit(joint)}
+
+    joint, zero = run.sizes(draw).values()
+    run.shift[joint] = zero
+    name = run.model.drives[joint]
+    return Injected([name], {name: {'zero': zero}}, 'positions shifted')
+
+
+Effects = Mapping[str, Callable[[Injection], Injected]]
+FORCES: Effects = {name: partial(_force, name) for name in (*FORMS, *UNKNOWN)}
+BODIES: Effects = {
+    'payload_mass': _payload_mass, 'payload_offset': _payload_offset,
+    'platform_inertia': _platform_inertia, 'payload_pick_up': _payload_pick_up,
+    'link_mass': _link_mass, 'joint_friction': _joint_friction, 'joint_spring': _joint_spring,
+    'base_tilt': _base_tilt, 'external_wrench': _external_wrench, 'tool_drag': _tool_drag}
+# What is computed before, and the effects that it does not contain yet.
+STAGES: tuple[tuple[Callable[[Injection], None], Effects], ...] = (
+    (lambda run: None, {'eccentric_encoder': _eccentric_encoder}),
+    (lambda run: None, BODIES),
+    (Injection.start_gears, {'elastic_joint': _elastic_joint, 'lost_motion': _lost_motion}),
+    (Injection.start_efforts, FORCES),
+    (lambda run: None, {
+        'coupled_drives': _coupled_drives, 'effort_gain': _effort_gain,
+        'current_gain': _current_gain, 'time_delay': _time_delay, 'effort_filter': _effort_filter,
+        'homing_error': _homing_error}))
+NAMES = tuple(sorted((name for _, effects in STAGES for name in effects),
+                     key=lambda name: name not in FORCES))
+NOT_IN_CATALOGUE = (*UNKNOWN, 'payload_pick_up')
+"""Effects that no catalogue effect explains."""
+CHANGING = {*BODIES}  # effects that change MuJoCo's model
+NOT_IN_DRIVES = {*BODIES, 'coupled_drives', 'time_delay', 'effort_filter', 'eccentric_encoder'}
+
+
+def guides(model: DriveModel) -> set[str]:
+    """Return the drives whose friction follows the load across them."""
+    return {name for effect in model.effects if isinstance(effect, ModelJointFriction)
+            for name in effect.blocks if name in model.drives}
+
+
+def own_friction(model: DriveModel, engine: MechanismEngine, motion: JointMotion,
+                 rounds: int = 1) -> Array:
+    """Return friction, offset and armature as the model file has them, under the true loads."""
+    v = motion.velocity
+    friction: Array = (
+        model.robot.armature * motion.acceleration + np.asarray(model.friction.viscous) * v
+        + np.asarray(model.friction.coulomb) * np.tanh(v / np.asarray(model.reversal.velocity))
+        + np.asarray(model.offset.value))
+    for effect in model.effects:
+        if isinstance(effect, ModelJointFriction):
+            friction = friction + engine.joint_friction(
+                motion, effect.table(model.robot, model.reversal), rounds)
+    return friction
+
+
+def links_that_weigh(model: DriveModel, first: int = 1) -> list[int]:
+    """Return the links whose mass can be hidden.
+
+    What turns about an upright axis shows in no weight, and the last link is the payload's.
+    """
+    return [j for j in range(len(model.robot.bodies)) if j != model.robot.carrier
+            and (j >= first or model.robot.structure.loops)]
+
+
+def able_joints(name: str, model: DriveModel, motion: JointMotion) -> list[int]:
+    """Return the joints that a hidden force can act in along a motion."""
+    turn, stroke = {**FORMS, **UNKNOWN}[name].needs_turn, np.ptp(motion.position, axis=0)
+    return [j for j, unit in enumerate(model.units)
+            if not turn or (unit.turns and stroke[j] >= turn)]
+
+
+def one_able_joint(name: str, model: DriveModel, motion: JointMotion,
+                   random: np.random.Generator) -> int:
+    """Return one of the joints that a hidden force can act in along a motion."""
+    able = able_joints(name, model, motion)
+    if not able:
+        raise InjectedEffectError(f'{name} needs a joint that turns by '
+                                f'{FORMS[name].needs_turn:g} rad')
+    return able[int(random.integers(len(able)))]
+
+
+def noise_like(random: np.random.Generator, shape: tuple[int, ...]) -> Array:
+    """Return noise of unit variance, part of it correlated from sample to sample."""
+    from scipy.signal import lfilter
+
+    white = random.normal(size=shape)
+    slow: Array = lfilter([np.sqrt(1 - CORRELATION ** 2)], [1, -CORRELATION],
+                          random.normal(size=shape), axis=0)
+    return np.sqrt(1 - COLOURED) * white + np.sqrt(COLOURED) * slow

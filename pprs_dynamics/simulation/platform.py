@@ -1,0 +1,57 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The 3-PPRS as a mechanism that MuJoCo simulates like every other robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.physics.effects.effect import Effect
+from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
+from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
+from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.simulation.export.exported_robot import described, platform_mechanism
+from pprs_dynamics.simulation.export.expressed import MJCF
+from pprs_dynamics.simulation.export.writers import written
+
+CHAINS = (1, 2, 3)
+HINGES, BALLS, RODS = (tuple(f'{part}_{n}' for n in CHAINS) for part in ('hinge', 'ball', 'rod'))
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlatformMechanism(DriveModel):
+    """The 3-PPRS as a tree of bodies with three closures.
+
+    Friction of its guides follows the load across them, as in the model of the paper.
+    """
+
+    block: ClassVar[str] = 'three_pprs'
+
+    @classmethod
+    def of(cls, model: DriveModel) -> PlatformMechanism:
+        """Return the mechanism of a model file, without added effects."""
+        values = model.values
+        blocks = {drive: {key: values[f'friction.drives.{key}'][d]
+                          for key in ('viscous', 'coulomb')} for d, drive in enumerate(DRIVES)}
+        for kind, joints in (('revolute', HINGES), ('spherical', BALLS)):
+            block = {key: values[f'friction.{kind}.{key}'] for key in ('viscous', 'coulomb')}
+            block['radius'] = values[f'friction.{kind}.diameter'] / 2
+            blocks |= dict.fromkeys(joints, block)
+        effects: tuple[Effect, ...] = (AxisFriction(0.0, 0.0), AxisOffset(0.0),
+                                       ModelJointFriction(blocks))
+        return cls(robot=platform_mechanism(model.robot, model, MJCF), effects=effects,
+                   reversal=model.reversal, limits=model.limits, values=values)
+
+    @cached_property
+    def mjcf(self) -> str:
+        """The robot in MuJoCo's format."""
+        return written(described(self.block, self.robot), MJCF)
+
+
+def as_mechanism(model: DriveModel) -> DriveModel:
+    """Return a model as a mechanism."""
+    return model if model.moves_joints else PlatformMechanism.of(model)

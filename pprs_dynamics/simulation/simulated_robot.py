@@ -1,0 +1,102 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The simulated robot: plant, control of the drives and sensors, advanced tick by tick."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.errors import WorkspaceError
+from pprs_dynamics.simulation.drive_control import ControlSettings, DriveControl, Note, Setpoint
+from pprs_dynamics.simulation.plant import Plant, UnsolvedError
+from pprs_dynamics.simulation.sensors import Measurement, Sensors, SensorSettings
+
+BANDWIDTH, DAMPING_RATIO = 7.0, 0.9  # of the drives' loops, by default [Hz, 1]
+
+
+class SimulatedRobot:
+    """A robot to run against; it starts at home and holds.
+
+    Call `command` whenever a command arrives, and `tick` at the rate at which it publishes.
+
+    Parameters
+    ----------
+    plant : Plant
+    seed : int
+        Of the noise.
+    rate : float
+        Ticks per second [Hz].
+    control, sensors : settings, optional
+    """
+
+    def __init__(self, plant: Plant, *, seed: int = 0, rate: float = 500.0,
+                 control: ControlSettings | None = None, sensors: SensorSettings | None = None,
+                 ) -> None:
+        self.plant, step = plant, plant.time_step
+        self.steps_per_tick = max(1, round(1 / (rate * step)))
+        if abs(self.steps_per_tick * step * rate - 1) > 1e-9:
+            raise ValueError(f'{rate} Hz is no whole number of time steps of {step} s')
+        self.sensors = Sensors(sensors or SensorSettings(), step, np.random.default_rng(seed),
+                               plant.largest)
+        self.control = DriveControl(
+            plant.limits, plant.holding, control or plant.gains(BANDWIDTH, DAMPING_RATIO), step,
+            self.sensors.smoothing)
+        self._ticks = 0
+        self.place(plant.position)
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return self._ticks * self.steps_per_tick * self.plant.time_step
+
+    @property
+    def notes(self) -> list[Note]:
+        """Messages of the robot so far."""
+        return self.control.notes
+
+    def place(self, position: Array, velocity: Array | None = None) -> None:
+        """Put the drives at positions (D,) [m, rad], at rest or with velocities [m/s, rad/s].
+
+        Raises
+        ------
+        WorkspaceError
+            Where the mechanism cannot go there.
+        """
+        self.plant.place(position, velocity)
+        self.sensors.start(self.plant.position, self.plant.velocity)
+        self.control.start(self.sensors.position)
+        self._effort: Array | None = None
+        self._stopped = False
+
+    def command(self, setpoint: Setpoint, following: Setpoint | None = None) -> bool:
+        """Take a command for now, and the next tick's where it is known; False if refused."""
+        return self.control.command(
+            self.time, setpoint, following, self.steps_per_tick * self.plant.time_step)
+
+    def tick(self) -> Measurement:
+        """Return the readings now, and advance to the next tick."""
+        now, step, plant = self.time, self.plant.time_step, self.plant
+        measured: Measurement | None = None
+        for k in range(self.steps_per_tick):
+            effort = self.control.effort(now + k * step, self.sensors.position,
+                                         self.sensors.velocity)
+            if measured is None:
+                # Efforts are constant over a time step: at its border the mean of both belongs to
+                # the motion there. Either one alone would be half a step late or early.
+                before = effort if self._effort is None else self._effort
+                measured = self.sensors.measure(now, (before + effort) / 2)
+            self._effort = effort
+            if not self._stopped:
+                try:
+                    plant.step(effort)
+                except (WorkspaceError, UnsolvedError) as error:
+                    self._stopped = True
+                    plant.velocity = np.zeros_like(plant.velocity)
+                    self.notes.append(Note(now + k * step, 'STOPPED',
+                                           f'the robot stopped: {error.found}'))
+            self.sensors.read_encoders(plant.position, plant.velocity)
+        self._ticks += 1
+        assert measured is not None
+        return measured

@@ -1,0 +1,273 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The simulated robot: control of the drives, limits, sensors and their noise."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pprs_dynamics
+from pprs_dynamics import DriveModel
+from pprs_dynamics.errors import MissingLibraryError
+from pprs_dynamics.simulation.drive_control import (
+    LONGEST_LATE,
+    ControlSettings,
+    DriveControl,
+    Setpoint,
+)
+from pprs_dynamics.simulation.plant import Plant
+from pprs_dynamics.simulation.sensors import EffortNoise, Measurement, SensorSettings
+from pprs_dynamics.simulation.simulated_robot import SimulatedRobot
+
+AXIS = DriveModel.load('config/single_axis.yaml')
+QUIET = SensorSettings(quantisation=0.0, true_velocity=True, white_noise=0.0, coloured_noise=0.0)
+RATE = 500.0
+ZERO = np.zeros(1)
+
+
+def axis(sensors: SensorSettings = QUIET, seed: int = 0, **settings: float | bool,
+         ) -> SimulatedRobot:
+    plant = Plant(AXIS)
+    return SimulatedRobot(plant, seed=seed, control=plant.gains(7.0, 0.9, **settings),
+                          sensors=sensors)
+
+
+def wave(robot: SimulatedRobot, duration: float, feedforward: bool = True,
+         ) -> tuple[list[Measurement], np.ndarray]:
+    """Let a robot follow a sine; return the readings and the true positions and velocities."""
+    rate, size = 2 * np.pi, 0.05
+    measured, true = [], []
+    for k in range(round(duration * RATE)):
+        points = []
+        for t in (k / RATE, (k + 1) / RATE):
+            q, v, a = (size * (1 - np.cos(rate * t)), size * rate * np.sin(rate * t),
+                       size * rate ** 2 * np.cos(rate * t))
+            effort = AXIS.drive_forces(pprs_dynamics.JointMotion([[q]], [[v]], [[a]])).total[0]
+            points.append(Setpoint(np.array([q]), np.array([v]), effort if feedforward else ZERO))
+        assert robot.command(*points)
+        true.append((robot.plant.position[0], robot.plant.velocity[0], points[0].position[0]))
+        measured.append(robot.tick())
+    return measured, np.array(true)
+
+
+# Control.
+
+def test_feedforward_lowers_the_tracking_error() -> None:
+    errors = [np.abs(true[:, 0] - true[:, 2]).max() for true in (
+        wave(axis(), 1.0, feedforward)[1] for feedforward in (False, True))]
+    assert errors[0] > 20 * errors[1]
+
+
+def test_the_lag_of_differentiated_velocities_is_no_tracking_error() -> None:
+    _, true = wave(axis(dataclasses.replace(QUIET, true_velocity=False)), 1.0)
+    assert np.abs(true[:, 0] - true[:, 2]).max() < 5e-5
+
+
+def test_the_goal_moves_on_beyond_the_last_setpoint_that_is_known() -> None:
+    """Setpoints every 5 ms fall between ticks every 2 ms: up to one tick passes before the next."""
+    speed, period, step = 0.2, 0.005, 0.0005
+    control = DriveControl(AXIS.limits, np.zeros_like, ControlSettings(), step)
+
+    def setpoint(time: float) -> Setpoint:
+        return Setpoint(np.array([speed * time]), np.array([speed]))
+
+    control.command(0.0, setpoint(0.0), setpoint(period), period)
+    for time in np.arange(0.0, period + 0.0015, step):
+        effort = control.effort(time, np.array([speed * time]), np.array([speed]))
+        np.testing.assert_allclose(effort, 0.0, atol=1e-9)  # a goal at rest costs up to 1.2 N
+
+
+@pytest.mark.parametrize('late', [0.05, 0.15, 1e4])
+def test_setpoints_that_come_late_are_followed_as_long_as_they_come(late: float) -> None:
+    speed, period = np.array([0.2]), 0.01
+    control = DriveControl(AXIS.limits, np.zeros_like, ControlSettings(), period)
+    led = min(late, LONGEST_LATE) * speed  # its velocity leads on from its own time
+    for now in np.arange(late, late + 0.5, period):
+        goal = speed * (now - late)
+        assert control.command(now - late, Setpoint(goal, speed), taken=now)
+        np.testing.assert_allclose(control.effort(now, goal + led, speed), 0.0, atol=1e-6)
+    assert not control.notes
+    control.effort(now + 0.11, goal, ZERO)
+    assert [note.code for note in control.notes] == ['HOLD']
+    assert 'no command for 0.11 s' in control.notes[0].message
+
+
+def test_without_commands_the_robot_holds_where_it_is() -> None:
+    robot = axis()
+    wave(robot, 0.4)
+    for _ in range(300):
+        robot.tick()
+    held = robot.plant.position.copy()
+    for _ in range(50):
+        robot.tick()
+    assert [note.code for note in robot.notes] == ['HOLD']
+    assert np.abs(robot.plant.position - held).max() < 1e-4
+
+
+def test_efforts_beyond_limits_are_limited_and_reported() -> None:
+    limits = AXIS.limits.with_efforts([13.0])
+    control = DriveControl(limits, np.zeros_like, ControlSettings(), 0.002)
+    control.command(0.0, Setpoint(effort=np.array([50.0])))
+    assert [control.effort(k * 0.002, ZERO, ZERO)[0] for k in range(5)] == [13.0] * 5
+    assert control.saturated_steps.tolist() == [5]
+    assert [note.code for note in control.notes] == ['SATURATED']
+    assert 'axis would need 50 N' in control.notes[0].message
+
+
+def test_efforts_alone_are_applied_as_they_are() -> None:
+    robot = axis()
+    for _ in range(3):
+        assert robot.command(Setpoint(effort=np.array([7.0])))
+        measured = robot.tick()
+    assert measured.effort[0] == 7.0
+
+
+@pytest.mark.parametrize('setpoint', [
+    Setpoint(ZERO, np.array([np.nan])), Setpoint(np.zeros(2), ZERO),
+    Setpoint(effort=np.array([np.inf])), Setpoint(ZERO), Setpoint(ZERO, np.array([1e308]))],
+    ids=['nan', 'two', 'inf', 'no velocity', 'overflow'])
+def test_impossible_commands_are_refused(setpoint: Setpoint) -> None:
+    robot = axis()
+    assert not robot.command(setpoint)
+    assert robot.notes[-1].code == 'REFUSED'
+    assert robot.control.holding
+    assert np.all(np.isfinite(robot.tick().position))
+
+
+@pytest.mark.parametrize('following', [1e308, 1e300, 1e9])
+@pytest.mark.parametrize('size', [1e9, 1.0, -1e9])
+def test_the_largest_commands_leave_every_number_finite(size: float, following: float) -> None:
+    robot = axis(SensorSettings())
+    large = np.array([size])
+    assert robot.command(Setpoint(ZERO, large, -large),
+                         Setpoint(ZERO, np.array([-following]), np.array([following])))
+    for _ in range(60):
+        measured = robot.tick()
+        for values in (measured.position, measured.velocity, measured.effort):
+            assert np.all(np.isfinite(values))
+
+
+def test_actuation_delay_makes_efforts_come_late() -> None:
+    robot = axis(actuation_delay=0.004)
+    held = robot.tick().effort[0]
+    applied = []
+    for _ in range(5):
+        robot.command(Setpoint(effort=np.array([1.0])))
+        applied.append(robot.tick().effort[0])
+    # An effort is measured at the border of two time steps: half of each.
+    assert applied[:2] == [held] * 2
+    assert applied[3:] == [1.0] * 2
+
+
+def test_stops_end_the_strokes() -> None:
+    plant = Plant(DriveModel.load('config/delta.yaml'))
+    robot = SimulatedRobot(plant, sensors=QUIET)
+    for _ in range(300):
+        robot.command(Setpoint(effort=np.full(len(plant.position), 0.2) * plant.largest))
+        robot.tick()
+    assert np.all(plant.position < plant.upper + 0.1)
+
+
+# Sensors.
+
+def test_a_seed_repeats_a_recording_bit_for_bit() -> None:
+    one, same, other = (wave(axis(SensorSettings(), seed), 0.1)[0][-1] for seed in (1, 1, 2))
+    assert np.array_equal(one.effort, same.effort)
+    assert not np.array_equal(one.effort, other.effort)
+
+
+def test_encoders_count_in_whole_steps() -> None:
+    measured, true = wave(axis(dataclasses.replace(QUIET, quantisation=1e-5)), 0.6)
+    position = np.array([each.position[0] for each in measured])
+    np.testing.assert_allclose(position / 1e-5, np.round(position / 1e-5), atol=1e-6)
+    assert np.abs(position - true[:, 0]).max() <= 0.5e-5 * (1 + 1e-9)
+
+
+def test_differentiated_velocities_follow_the_true_ones() -> None:
+    measured, true = wave(axis(SensorSettings(white_noise=0.0, coloured_noise=0.0)), 0.5)
+    error = np.array([each.velocity[0] for each in measured]) - true[:, 1]
+    # They lag by 2 ms behind 2 m/s^2.
+    assert 1e-4 < np.sqrt(np.mean(error ** 2)) < 0.01
+
+
+def noise(samples: int, **settings: float) -> np.ndarray:
+    chosen = SensorSettings(**{'white_noise': 0.0, 'coloured_noise': 0.0, **settings})
+    return EffortNoise(chosen, np.random.default_rng(11)).samples(samples)
+
+
+def test_noise_has_its_size_and_its_correlation() -> None:
+    white = noise(4000, white_noise=0.2)
+    # 24 000 samples: the standard error of a standard deviation is 0.5 %, of a correlation 0.7 %.
+    assert white.std() == pytest.approx(0.2, rel=0.03)
+    assert abs(np.mean(white[1:] * white[:-1])) / 0.04 < 0.04
+    coloured = noise(8000, coloured_noise=0.2, noise_correlation=0.9)
+    # Ten samples tell as much as one: the standard errors are thrice those of white noise.
+    assert coloured.std() == pytest.approx(0.2, rel=0.06)
+    for lag in (1, 5):
+        found = np.mean(coloured[lag:] * coloured[:-lag]) / coloured.var()
+        assert found == pytest.approx(0.9 ** lag, abs=0.04)
+
+
+@pytest.mark.parametrize('exponent', [1.0, 1.5])
+def test_pink_noise_falls_with_its_exponent(exponent: float) -> None:
+    samples = noise(16384, pink_noise=1.0, pink_exponent=exponent)
+    power = np.mean(np.abs(np.fft.rfft(samples * np.hanning(16384)[:, None], axis=0)) ** 2, axis=1)
+    frequency = np.fft.rfftfreq(16384)
+    band = (frequency > 2e-3) & (frequency < 2e-2)
+    slope = np.polyfit(np.log(frequency[band]), np.log(power[band]), 1)[0]
+    # About 300 lines of six drives in the band: the standard error of the slope is 0.03.
+    assert slope == pytest.approx(-exponent, abs=0.2)
+
+
+def test_noise_at_once_is_the_noise_sample_by_sample_and_has_the_stated_covariance() -> None:
+    settings = SensorSettings(white_noise=0.05, coloured_noise=0.06, noise_correlation=0.8,
+                              pink_noise=0.02)
+    one, all_of_it = (EffortNoise(settings, np.random.default_rng(4)) for _ in range(2))
+    np.testing.assert_allclose([one.sample() for _ in range(30)],
+                               np.vstack((all_of_it.samples(10), all_of_it.samples(20))),
+                               rtol=0, atol=1e-14)
+    lags = np.array([0, 1, 3, 10])
+    quick = SensorSettings(white_noise=0.05, coloured_noise=0.06, noise_correlation=0.8)
+    source = EffortNoise(quick, np.random.default_rng(5))
+    samples = source.samples(200_000)
+    found = [np.mean(samples[lag:] * samples[:len(samples) - lag]) for lag in lags]
+    np.testing.assert_allclose(found, source.autocovariance(lags), atol=3e-5)
+
+
+# House rules.
+
+# The plant takes numbers and motions from the model, no equations: its own are compared with them.
+CONTAINERS = (
+    'drives', 'physics.mechanism.motion', 'physics.mechanism.joint_motion',
+    'physics.mechanism.joint_series', 'physics.mechanism.description', 'physics.mechanism.urdf',
+    'physics.mechanism.mjcf', 'physics.mechanism.structure', 'physics.mechanism.tree_equations',
+    'physics.mechanism.passive_joints', 'physics.model.drive_model',
+    'physics.model.drive_model', 'physics.model.drive_model', 'physics.model.limits',
+    'physics.model.robot_block', 'physics.effects.effect', 'physics.effects.laws.axis_friction',
+    'physics.effects.laws.joint_friction', 'errors', 'arrays')
+# Of the equations, which are compiled functions over tables, names and kinds of rows alone.
+NAMES_OF_TABLES = {'AXES', 'KIND', 'LOOP', 'TRANSLATION', 'JointFriction'}
+
+
+def test_the_simulation_shares_no_physics_with_the_model() -> None:
+    for file in (Path(pprs_dynamics.__file__).parent / 'simulation').glob('*.py'):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or '').startswith(
+                    'pprs_dynamics.'):
+                name = str(node.module).removeprefix('pprs_dynamics.')
+                assert name.startswith('simulation') or name in CONTAINERS, file
+                if name.endswith('tree_equations'):
+                    assert {each.name for each in node.names} <= NAMES_OF_TABLES, file
+
+
+def test_a_missing_engine_is_reported_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, 'mujoco', None)
+    with pytest.raises(MissingLibraryError, match=r'mujoco.*pprs_dynamics\[sim\]'):
+        Plant(AXIS)
