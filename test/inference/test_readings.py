@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up_files import ARM, arm_efforts, motion
 from pprs_command import pprs
-from test_reading_files import ARM, arm_efforts, motion
 
 from pprs_dynamics.app.api.diagnose import diagnose
 from pprs_dynamics.app.api.first_model import first_model
