@@ -64,14 +64,14 @@ def rotation_vector(motion):
 
 
 def solve(geometry, motion):
-    """Return chains and [B]^-1 of a motion."""
+    """Return chains and [B] of a motion."""
     state = ThreePprs(geometry, paper_model().robot.masses).state(motion, Reversal())
-    return state.links.chains, state.links.inverse_table.reshape(-1, 6, 6)
+    return state.links.chains, np.linalg.inv(state.links.inverse_table.reshape(-1, 6, 6))
 
 
 def home_determinant(geometry):
     """Return det [B] of the home pose."""
-    return np.linalg.det(solve(geometry, home_pose())[1].B)[0]
+    return np.linalg.det(solve(geometry, home_pose())[1])[0]
 
 
 # Inverse and forward -------------------------------------------------------------------------
@@ -133,9 +133,9 @@ def test_other_solutions_of_random_poses_are_refused():
             pose = PlatformMotion.at_rest(
                 found.x[:3], Rotation.from_rotvec(found.x[3:]).as_quat()[None])
             # The inverse takes sin u > 0: only such solutions come back to the same drives.
-            chains, jacobians = solve(geometry, pose)
+            chains, B = solve(geometry, pose)
             same_elbow = np.abs(chains.position[0] - q[sample]).max() < 1e-8
-            if same_elbow and np.sign(np.linalg.det(jacobians)[0]) != sign_at_home:
+            if same_elbow and np.sign(np.linalg.det(B)[0]) != sign_at_home:
                 others += 1
                 assert_right_or_refused(geometry, q[sample], pose, position[sample])
     assert others >= 10
@@ -184,7 +184,7 @@ def yaw_with_share(geometry, share):
             home_position(geometry.elbow), Rotation.from_rotvec((0, 0, yaw)).as_quat()[None])
 
     def excess(yaw):
-        determinant = np.linalg.det(solve(geometry, pose(yaw))[1].B)[0]
+        determinant = np.linalg.det(solve(geometry, pose(yaw))[1])[0]
         return determinant / home_determinant(geometry) - share
 
     return pose(brentq(excess, 0.0, 2.0, xtol=1e-14))
