@@ -375,7 +375,7 @@ class Answer:
                      for fitted in self.table.alone.values())
 
     def _suspects(self) -> tuple[RankedEffect, ...]:
-        """Return effects that are nearly worth their prior cost beside the reported ones."""
+        """Return effects nearly worth their prior cost in addition to the reported ones."""
         return tuple(
             self._ranked(row.fits, row.fitted, candidate, self.table.best.cost - row.cost)
             for candidate, row in self.table.suspects(self.decisions.suspect_margin))

@@ -250,7 +250,7 @@ def _compare_drive(
         # What no pattern explains is an upper bound of the noise.
         floor = min(floor, noise.rms)
     most = max((statement.mean_square for statement in findings.statements
-                if statement.kind not in ('scatter', 'level')), default=0.0)
+                if statement.kind != 'level'), default=0.0)
     parts = [root_mean_square(part[known, index] - part[known, index].mean())
              for part in residuals.parts.values()]
     return DriveComparison(
