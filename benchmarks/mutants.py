@@ -171,6 +171,7 @@ def _tried(module: str, count: int) -> Iterator[Mutant]:
             change = '\n'.join(line for line in (result.diff or '').splitlines()
                                if line[:1] in '+-' and line[:3] not in ('+++', '---'))
             what = result.test_outcome or TestOutcome.INCOMPETENT
+            print(f'{module} line {mutation.start_pos[0]}: {what.value}', flush=True)
             yield Mutant(module, mutation.operator_name.removeprefix('core/'),
                          mutation.definition_name or '', mutation.start_pos[0], what.value, change)
 

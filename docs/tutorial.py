@@ -47,7 +47,7 @@ COMMANDS = {
              '--report adopt.html --json adopt.json',
     'again': 'compare run.mcap --model adopted.yaml --report after.html --json after.json',
     'wrong': 'adopt drive_spring run.mcap --validate other.mcap --output wrong.yaml',
-    'history': 'history adopted.yaml --picture history.png',
+    'history': 'history adopted.yaml --report history.html',
 }
 
 # Of what a command says: from the first line that begins so to the next that begins so.
@@ -55,7 +55,7 @@ EXCERPTS = {
     'COMPARE': ('compare', ' ', '1. '), 'WHERE': ('compare', '1. ', 'Next'),
     'DIAGNOSE': ('diagnose', '╭', 'Why'), 'ADOPT': ('adopt', '╭', 'page'),
     'WRONG': ('wrong', '╭', '  error'), 'AGAIN': ('again', ' ', 'page'),
-    'HISTORY': ('history', 'Error', 'picture'),
+    'HISTORY': ('history', 'Error', 'page'),
 }
 
 

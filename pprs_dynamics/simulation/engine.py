@@ -26,7 +26,7 @@ from pprs_dynamics.physics.mechanism.description import (
 )
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.mjcf import readable_spec
-from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
+from pprs_dynamics.physics.mechanism.tree_tables import JointFriction
 from pprs_dynamics.physics.mechanism.urdf import WORLD, expanded
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.robot_block import described_gravity

@@ -22,7 +22,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.mechanism.description import Frame
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.tree_equations import AXES, KIND, LOOP, TRANSLATION
+from pprs_dynamics.physics.mechanism.tree_tables import AXES, KIND, LOOP, TRANSLATION
 from pprs_dynamics.simulation.engine_state import LEAST_SINGULAR, EngineState
 
 CLOSED = 1e-11  # [m, rad], of Newton's last step

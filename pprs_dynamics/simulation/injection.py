@@ -343,6 +343,7 @@ def simulate_mechanism(
     noise: float | None = None, duration: float = 40.0, path_seed: int = 0,
     progress: Callable[[float], None] | None = None, thermometers: bool = False,
     link_encoders: bool = False, motion: JointMotion | None = None,
+    nominal: JointMotion | None = None,
 ) -> MechanismRun:
     """Return a recording of a mechanism with injected effects.
 
@@ -367,6 +368,8 @@ def simulate_mechanism(
         Whether they are recorded where no effect needs them.
     motion : JointMotion, optional
         In place of a random one.
+    nominal : JointMotion, optional
+        Motion whose efforts and speeds determine the sizes of the effects, by default the same.
 
     Raises
     ------
@@ -377,9 +380,12 @@ def simulate_mechanism(
     read = draw_motion(model, duration, path_seed) if motion is None else motion
     choices = sorted((*(name for name in FORMS if able_joints(name, model, read)), 'payload_mass'))
     chosen = [str(random.choice(choices)) if name == RANDOM else name for name in names]
+    effects = [named(name, random, scale) for name in chosen]
     # Generators of their own, so that no other draw depends on temperatures and second encoders.
-    run = Injection(PlainRobot(model, read), [named(name, random, scale) for name in chosen],
-                    np.random.default_rng((seed, CLIMATE)), progress)
+    if nominal is not None and effects:
+        Injection(PlainRobot(model, nominal), effects, np.random.default_rng((seed, CLIMATE)))
+    run = Injection(PlainRobot(model, read), effects, np.random.default_rng((seed, CLIMATE)),
+                    progress)
     sigma = np.full(len(run.largest), noise) if noise is not None else 0.005 * run.largest
     measured = run.efforts + noise_like(random, run.efforts.shape) * sigma
     channels = {}

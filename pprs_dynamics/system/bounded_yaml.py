@@ -70,7 +70,7 @@ def parse(text: str, path: str | PathLike[str] = '') -> Any:
 
 
 class _StrictLoader(_SafeLoader):  # type: ignore[misc]
-    """YAML with numbers as ROS 2 reads them. An alias may stand for 10^9 values."""
+    """YAML with numbers as ROS 2 reads them. An alias may expand to 10^9 values."""
 
     yaml_implicit_resolvers: ClassVar[Any] = {
         first: [(tag, pattern) for tag, pattern in resolvers if tag not in NUMBERS]

@@ -203,6 +203,8 @@ def test_a_simulation_hides_what_it_says_and_is_written(tmp_path: Path) -> None:
     difference = np.abs((run.recording.effort - plain.recording.effort).mean(axis=0))
     drives = [run.recording.drives[d] for d in np.flatnonzero(difference > 0.05)]
     assert drives == hidden['drives']
+    other = simulate('config/paper.yaml', 'effort_offset', seed=3, duration=2.0, path_seed=1)
+    assert other.effects == run.effects
     run.save(tmp_path / 'run.csv')
     read = pprs_dynamics.read_recording(tmp_path / 'run.csv')
     assert read.effort == pytest.approx(run.recording.effort)

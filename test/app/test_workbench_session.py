@@ -28,11 +28,8 @@ from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.jobs import DesignedMotion
 from pprs_dynamics.app.workbench.masks import (
     MOST_POINTS,
-    Share,
     drawn_samples,
     region_mask,
-    shares_in,
-    span_mask,
 )
 from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
@@ -68,12 +65,6 @@ def session(shared: Session) -> Session:
 
 def steps_of(session: Session) -> list[str]:
     return [step.effect for step in read_steps(session.ticks.model.values)]
-
-
-def shares(session: Session, start: float, end: float, drives: list[str] | None = None,
-           ) -> list[Share]:
-    ticks = session.ticks
-    return shares_in(span_mask(ticks, start, end, drives), ticks.fits, ticks.view)
 
 
 def compared(folder: Path, recording: Path, model: Path) -> dict[str, Any]:
@@ -139,19 +130,19 @@ def test_a_value_that_is_typed_holds_and_costs_what_it_departs(session: Session)
 
 
 def test_shares_say_where_an_error_is_from_less_its_prior_cost(session: Session) -> None:
-    lifts = shares(session, 2.0, 6.0, ['lift_1', 'lift_3'])
+    lifts = session.shares(2.0, 6.0, ['lift_1', 'lift_3'])
     assert lifts[0].net > 0.8
     assert 'payload_mass' in {one.effect for one in lifts if one.net > 0.9 * lifts[0].net}
     session.ticks.tick('payload_mass')
     session.ticks.settle()
-    of_lift_2 = shares(session, 2.0, 6.0, ['lift_2'])
+    of_lift_2 = session.shares(2.0, 6.0, ['lift_2'])
     assert of_lift_2[0].effect in ('coulomb_friction', 'asymmetric_friction', 'load_friction')
     assert of_lift_2[0].net > 0.8
     assert all(one.net <= max(one.explained, 0.0) + 1e-12 for one in of_lift_2)
     session.ticks.tick('coulomb_friction', ['lift_2'])
     session.ticks.settle()
     # Nothing is left to be explained: what fits to noise does not pay.
-    assert all(one.net < 0.05 for one in shares(session, 2.0, 6.0))
+    assert all(one.net < 0.05 for one in session.shares(2.0, 6.0))
 
 
 def test_a_region_of_a_scatter_is_found_in_time(session: Session) -> None:
@@ -214,10 +205,8 @@ def test_everything_on_the_screen_is_json(session: Session) -> None:
     assert found['errors']['lift_1']['now'] < found['errors']['lift_1']['before']
 
 
-def test_an_effect_is_adopted_refused_exported_and_taken_back(
-    recording: Path, tmp_path: Path,
-) -> None:
-    other = write_hidden(tmp_path / 'other.csv', 2)
+def test_an_effect_is_adopted_refused_exported_and_taken_back(tmp_path: Path) -> None:
+    recording, other = (write_hidden(tmp_path / f'{seed}.csv', seed, 6.0) for seed in (1, 2))
     session = Session.open([recording], validation=[other])
     given = dict(session.ticks.model.values)
     session.jobs.diagnose().result(300)

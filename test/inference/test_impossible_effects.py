@@ -26,7 +26,8 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
 
 MODEL = DriveModel.load('config/single_axis.yaml')
-MASS, VISCOUS, COULOMB = (MODEL.values[f'axis.{key}'] for key in ('mass', 'viscous', 'coulomb'))
+OWN = 'links.mass', 'friction.viscous', 'friction.coulomb'
+MASS, VISCOUS, COULOMB = (MODEL.values[key][0] for key in OWN)
 TIME = np.arange(0, 20, 0.005)
 
 
@@ -53,7 +54,7 @@ def test_no_more_is_taken_away_than_there_is(name: str, names: tuple[str, ...], 
     recording = recorded(MODEL.drive_forces(moved).total + share * own * columns)
     # The model's own numbers are known, so that what is missing is the effect's alone.
     exact = DriveModel.from_parameters({**MODEL.values, **dict.fromkeys(
-        (f'tolerances.axis.{key}' for key in ('mass', 'viscous', 'coulomb')), 1e-6)})
+        (f'tolerances.{key}' for key in OWN), 1e-6)})
     fits = FittedSets(Design.of(exact, [recording]), DECISIONS)
     component = Component.of(catalogue()[name], 0, {}, names)
     found = fits.evaluate((EffectCandidate.of([component]),))

@@ -200,7 +200,8 @@ def test_tables_by_their_own_columns(run: Any, tmp_path: Path, suffix: str) -> N
     time, position, effort = run
     path = written(tmp_path / f'run{suffix}', time, 1e3 * position, effort)
     scales = {f'columns.{drive}.position_scale': 1e-3 for drive in DRIVES}
-    recording = read_with(with_keys(**COLUMNS, **scales, **{'columns.lift_3.scale': 2.0}), path)
+    keys = {**COLUMNS, **scales, 'columns.lift_3.effort_scale': 2.0}
+    recording = read_with(with_keys(**keys), path)
     np.testing.assert_allclose(recording.position, position, rtol=1e-12)
     np.testing.assert_allclose(recording.effort[:, :5], effort[:, :5], rtol=1e-12)
     np.testing.assert_allclose(recording.effort[:, 5], 2 * effort[:, 5], rtol=1e-12)
@@ -227,7 +228,7 @@ def test_what_is_no_such_table_is_one_sentence(
     {'joint_map.slide_1': 'lift_1'}, {'columns.slide_1.position': 0},
     {'columns.time': True}, {'columns.rate': -100.0}, {'columns.decimal': ';'},
     {'columns.files.effort': 'tau.csv'}, {'columns.files.torque': 'tau.csv'},
-    {**COLUMNS, 'columns.slide_1.colour': 'c'}, {**COLUMNS, 'columns.slide_1.scale': 0.0}])
+    {**COLUMNS, 'columns.slide_1.colour': 'c'}, {**COLUMNS, 'columns.slide_1.effort_scale': 0.0}])
 def test_names_that_are_none_are_refused(keys: dict[str, Any]) -> None:
     values = {**DriveModel.load().values, **keys}
     read = joint_names if any(key.startswith('joint') for key in keys) else recorded_columns

@@ -45,7 +45,6 @@ from sensor_msgs.msg import JointState
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MissingLibraryError, MotionError, UnreadableFileError
 from pprs_dynamics.measurement.files.joint_state_cdr import (
-    MOST_LAYOUTS,
     JointStateBlocks,
     Layout,
     serialised,
@@ -205,33 +204,22 @@ def test_reading_bytes_by_layout_agrees_with_rosbags(
         state = message(shuffle.randrange(2**31 * 10**9), names, *arrays)
         little = not (big_endian and k % 3 == 0)
         data.append(bytes(STORE.serialize_cdr(state, STATE, little_endian=little)))
-    received = list(range(120))
-    fast, slow = JointStateBlocks(DRIVES), JointStateBlocks(DRIVES, use_layouts=False)
-    for blocks in (fast, slow):
-        blocks.add(data[:70], received[:70])
-        blocks.add(data[70:], received[70:])
-    assert fast.names == slow.names == set(joints)
-    assert 0 < fast.samples == slow.samples < 120 or fast.samples == slow.samples
-    for found, expected in zip(fast.arrays(), slow.arrays(), strict=True):
-        np.testing.assert_array_equal(found, expected)
-
-
-def test_more_orders_of_names_than_layouts_are_kept_are_read_all_the_same() -> None:
-    orders = [DRIVES[k:] + DRIVES[:k] for k in range(6)]
-    orders += [order[::-1] for order in orders] + [(*order, 'x') for order in orders]
-    assert len(orders) > MOST_LAYOUTS
     blocks = JointStateBlocks(DRIVES)
-    data = [bytes(STORE.serialize_cdr(
-        message(k, order, [float(f'{k}.{sorted(order).index(name)}') for name in order],
-                [], [1.0] * len(order)), STATE)) for k, order in enumerate(orders * 3)]
-    blocks.add(data, range(len(data)))
-    stamps, _, position, velocity, effort = blocks.arrays()
-    np.testing.assert_array_equal(stamps, np.arange(len(data)))
-    place = [float(f'0.{sorted(DRIVES).index(name)}') for name in DRIVES]
-    np.testing.assert_allclose(position - np.arange(len(data))[:, None], [place] * len(data),
-                               atol=1e-12)
-    assert np.all(np.isnan(velocity))
-    assert np.all(effort == 1)
+    blocks.add(data[:70], list(range(70)))
+    blocks.add(data[70:], list(range(70, 120)))
+    assert blocks.names == set(joints)
+    states = [STORE.deserialize_cdr(one, STATE) for one in data]
+    whole = [k for k, state in enumerate(states)
+             if {*DRIVES} <= {*state.name} and len(state.position) == len(state.name)]
+    stamps, received, *arrays = blocks.arrays()
+    assert received.tolist() == whole
+    assert stamps.tolist() == [states[k].header.stamp.sec * 10**9 + states[k].header.stamp.nanosec
+                               for k in whole]
+    for quantity, found in zip(QUANTITIES, arrays, strict=True):
+        values = [getattr(states[k], quantity) for k in whole]
+        np.testing.assert_array_equal(found, np.array([
+            [one[list(states[k].name).index(drive)] for drive in DRIVES] if len(one) else
+            [np.nan] * 6 for k, one in zip(whole, values, strict=True)]).reshape(-1, 6))
 
 
 @pytest.mark.parametrize('absent', [(), ('velocity',), ('effort',), ('velocity', 'effort')])

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -52,7 +53,7 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.physics.mechanism.urdf import expanded, read_urdf
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import parse_parameters
-from pprs_dynamics.physics.model.recorded_names import EFFORT_KINDS
+from pprs_dynamics.physics.model.recorded_names import EFFORT_KINDS, EXTERNAL, MEASURED
 from pprs_dynamics.physics.model.robot_block import coupled
 from pprs_dynamics.system.plain_yaml import scalar
 
@@ -63,7 +64,8 @@ SCALE_KEYS = {POSITION: 'position_scale', VELOCITY: 'velocity_scale', EFFORT: 'e
 
 
 # Mistakes of which a model file may have the line without a question.
-SURE_KINDS = {'position_unit', 'effort_unit', 'effort_sign', 'effort_sign_bit', 'time_unit'}
+SURE_KINDS = {'position_unit', 'effort_unit', 'effort_sign', 'effort_sign_bit', 'time_unit',
+              'velocity'}
 
 
 class FirstModelError(PprsError, ValueError):
@@ -180,10 +182,10 @@ def first_model(
     def written() -> tuple[str, DriveModel]:
         text = _text(path, Path(output), is_mjcf, description, base or root_of(description),
                      branch, chosen, names, columns, guessed, [path.name for path in given],
-                     CURRENT in found, questions)
+                     CURRENT in found, EXTERNAL in found, questions)
         return text, DriveModel.from_parameters(parse_parameters(text, output), source=str(output))
 
-    has_efforts = bool({EFFORT, CURRENT} & {*found})
+    has_efforts = bool({EFFORT, CURRENT} & {*found}) and EXTERNAL not in found
     text, model = written()
     corrected: set[str] = set()
     while has_efforts:
@@ -196,7 +198,7 @@ def first_model(
     if CURRENT in found:
         notes.append('efforts are currents [A]: they stay amperes until gain is given in '
                      f'{Path(output).name}')
-    if given and not has_efforts:
+    if given and not has_efforts and EXTERNAL not in found:
         notes.append('no efforts were found: compare, diagnose and fit need them')
     return FirstModel(Path(output), text, model, tuple(notes), tuple(given), has_efforts,
                       tuple(questions))
@@ -427,7 +429,7 @@ def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: N
     if guess.time is None and not is_bag:
         lines.append(_rate(path, guess.rate))
     return ([*lines, *_drive_lines(guess, drives, contents.decimal)], guess.notes,
-            {kind for _, kind in guess.columns})
+            {*(kind for _, kind in guess.columns), guess.effort_kind})
 
 
 def _rate(path: Path, rate: float | None) -> str:
@@ -461,10 +463,33 @@ def _file_columns(path: Path, files: Mapping[str, Path], drives: Sequence[str],
             lines.append(f'time: {scalar(merged.time)}')
     else:
         lines.append(_rate(path, rate))
-    lines.append('files: {' + ', '.join(f'{kind}: {scalar(file.name)}'
-                                        for kind, file in files.items()) + '}')
+    names = {kind: file.name for kind, file in files.items()} if path.is_dir() else _pattern(files)
+    lines.append('files: {' + ', '.join(
+        f'{kind}: {scalar(name)}' for kind, name in names.items()) + '}'
+        + '  # * is what recordings in one folder differ in' * ('*' in names[POSITION]))
     return ([*lines, *_drive_lines(merged, drives, inside[POSITION].decimal)], merged.notes,
             {*files})
+
+
+def _pattern(files: Mapping[str, Path]) -> dict[str, str]:
+    """Return names of files with * for what they have in common: the name of the recording."""
+    stems = [file.name.partition('.')[0] for file in files.values()]
+
+    def common(letters: Sequence[str]) -> str:
+        return ''.join(each[0] for each in takewhile(
+            lambda each: len({*each}) == 1, zip(*letters, strict=False)))
+
+    head, tail = common(stems), common([stem[::-1] for stem in stems])[::-1]
+    found = {}
+    for (kind, file), stem in zip(files.items(), stems, strict=True):
+        if tail and not tail[0].isalpha():
+            star = stem.removesuffix(tail) + tail[:not tail[0].isalnum()] + '*'
+        elif head and not head[-1].isalpha():
+            star = '*' + head[len(head) - (not head[-1].isalnum()):] + stem.removeprefix(head)
+        else:
+            star = f'{stem}*'
+        found[kind] = star + file.name.removeprefix(stem)
+    return found
 
 
 def _in_turn(files: Mapping[str, Path], inside: Mapping[str, Contents], count: int,
@@ -500,7 +525,7 @@ def _drive_lines(guess: Guess, drives: Sequence[str], decimal: str) -> Iterator[
 
 def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, base: str,
           branch: Branch, drives: Sequence[str], names: Names, columns: Sequence[str],
-          guessed: Sequence[str], recordings: Sequence[str], currents: bool,
+          guessed: Sequence[str], recordings: Sequence[str], currents: bool, external: bool,
           questions: Sequence[str] = ()) -> str:
     place = os.path.relpath(robot.resolve(), output.resolve().parent)
     slides = all(description.joints[name].kind == PRISMATIC for name in drives)
@@ -527,8 +552,8 @@ def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, ba
     lines += [f'      # loop {loop.name}: {loop.kind}, {loop.a} to {loop.b}, from the '
               'description' for loop in description.loops]
     lines += [
-        f'    effort_kind: {"current" if currents else "measured"}  # not known from the files: '
-        f'what efforts are, one of {", ".join(EFFORT_KINDS)}',
+        f'    effort_kind: {CURRENT if currents else EXTERNAL if external else MEASURED}'
+        '  # not known from the files: what efforts are, one of ' + ', '.join(EFFORT_KINDS),
         '    # `pprs fit` finds friction and masses, and writes them into a copy of this file.']
     if names.prefix:
         lines.append(f'    joint_prefix: {scalar(names.prefix)}  # recordings call {drives[0]} '

@@ -137,24 +137,38 @@ def simulate(model: Model, effects: str | Sequence[str] = (), *, seed: int = 0,
     PprsError
         For an unknown effect, a motion beyond the strokes, or a model that cannot be simulated.
     """
-    from pprs_dynamics.simulation.injection import simulate_mechanism
+    from pprs_dynamics.simulation.injection import draw_motion, simulate_mechanism
     from pprs_dynamics.simulation.platform import as_mechanism
 
     found = model if isinstance(model, DriveModel) else DriveModel.load(find_file(model))
     names = [effects] if isinstance(effects, str) else list(effects)
-    share_done, drives = stage(progress, 'simulating'), None
-    if not found.moves_joints:
-        if motion is None:
-            path = Excitation(duration=duration, seed=path_seed)
-            motion = path.motion(np.arange(0.0, path.duration, 1 / RATE))
-        state = found.mechanism(motion)
-        found.limits.check_strokes(state.position)
-        drives = JointMotion(state.position, state.velocity, state.acceleration, motion.time)
-    run = simulate_mechanism(as_mechanism(found), names, seed, scale, noise, duration, path_seed,
-                             share_done, thermometers, link_encoders, drives)
+    share_done, robot = stage(progress, 'simulating'), as_mechanism(found)
+    # With one seed the effects are the same on every path.
+    drives = nominal = None
+    if found.moves_joints:
+        nominal = draw_motion(robot, duration, 0) if path_seed else None
+    else:
+        if path_seed or motion is not None:
+            nominal = _of_drives(found, _excitation(duration, 0))
+        motion = _excitation(duration, path_seed) if motion is None else motion
+        drives = _of_drives(found, motion)
+    run = simulate_mechanism(robot, names, seed, scale, noise, duration, path_seed, share_done,
+                             thermometers, link_encoders, drives, nominal)
     time = run.motion.time
     assert time is not None
     recording = Recording.from_arrays('simulated', time, run.position, None, run.effort,
                                       found.drives, run.channels)
     return SimulationResult(found, recording, run.effects, motion or run.motion,
                             round(1 / float(np.median(np.diff(time))), 6), seed)
+
+
+def _excitation(duration: float, seed: int) -> PlatformMotion:
+    path = Excitation(duration=duration, seed=seed)
+    return path.motion(np.arange(0.0, path.duration, 1 / RATE))
+
+
+def _of_drives(model: DriveModel, motion: PlatformMotion) -> JointMotion:
+    """Return the motion of the drives within their strokes along one of the platform."""
+    state = model.mechanism(motion)
+    model.limits.check_strokes(state.position)
+    return JointMotion(state.position, state.velocity, state.acceleration, motion.time)

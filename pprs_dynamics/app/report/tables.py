@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 from pprs_dynamics.app.report import charts
 from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.terminal import escape, text_table
-from pprs_dynamics.drives import CHANNELS, common_unit
+from pprs_dynamics.drives import CHANNELS, DriveColumns, common_unit
 from pprs_dynamics.system.plain_text import counted
 
 if TYPE_CHECKING:
-    from pprs_dynamics.drives import DriveUnits
+    from pprs_dynamics.drives import DriveUnits, RecordedDrives
     from pprs_dynamics.measurement.files.recording import Recording, Summary
     from pprs_dynamics.physics.model.reproduction import Claim
 
@@ -50,10 +50,37 @@ def _recording_table(summary: Summary, units: DriveUnits, drives: Sequence[str])
         [(escape(drive), *map(_span, (found.position, found.velocity, found.effort)),
           f'{found.measured:.1%}', *(_span(found.channels.get(name)) for name in channels))
          for drive in drives for found in [summary.drives[drive]]],
-        caption=escape(summary.source), title=escape(
-            f'{summary.name}: {summary.used} of {summary.samples} samples in '
-            f'{counted(len(summary.segments), "segment")}, '
-            f'{summary.duration:.2f} s at {summary.rate:.6g} Hz'))
+        caption=escape(summary.source), title=_title(summary))
+
+
+def _title(summary: Summary) -> str:
+    return escape(f'{summary.name}: {summary.used} of {summary.samples} samples in '
+                  f'{counted(len(summary.segments), "segment")}, '
+                  f'{summary.duration:.2f} s at {summary.rate:.6g} Hz')
+
+
+def reading_table(summary: Summary, recorded: RecordedDrives) -> Any:
+    """Return how the columns of a recording are read: column, drive, quantity, unit, range."""
+    rows = []
+    joints = recorded.joints or recorded.names
+    for drive, joint, units in zip(recorded.names, joints, recorded.units, strict=True):
+        found = summary.drives[drive]
+        columns = (DriveColumns() if recorded.columns is None
+                   else recorded.columns.drives.get(drive, DriveColumns()))
+        current = 'current' in columns.names
+        for quantity, bounds, unit, factor in (
+                ('position', found.position, units.position, columns.position_scale),
+                ('velocity', found.velocity, f'{units.position}/s', columns.velocity_scale),
+                ('current' if current else 'effort', found.effort, units.effort,
+                 columns.effort_scale),
+                *((name, each, units.of(CHANNELS[name]), 1.0)
+                  for name, each in found.channels.items())):
+            if bounds is not None:
+                column = columns.names.get(quantity, f'{joint}/{quantity}')
+                rows.append((escape(str(column)), escape(drive), quantity, unit + (
+                    f', {factor:.4g} of the column' if factor != 1 else ''), _span(bounds)))
+    return text_table(('column', 'drive', 'quantity', 'unit', 'range'), rows,
+                      caption=escape(summary.source), title=_title(summary))
 
 
 def _span(bounds: tuple[float, float] | None) -> str:

@@ -13,10 +13,11 @@ from pprs_dynamics.app.api.inputs import Given, Inputs
 from pprs_dynamics.app.workbench import view_state
 from pprs_dynamics.app.workbench.errors import SessionError
 from pprs_dynamics.app.workbench.jobs import Jobs
+from pprs_dynamics.app.workbench.masks import shares_in, span_mask
 from pprs_dynamics.app.workbench.recordings import Recordings
 from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
 from pprs_dynamics.app.workbench.ticks import Ticks
-from pprs_dynamics.app.workbench.view_state import NOT_KNOWN, DriveError
+from pprs_dynamics.app.workbench.view_state import NOT_KNOWN, DriveError, Share
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.quantities import word_little
@@ -147,6 +148,17 @@ class Session:
         return DriveError(root_mean_square(self.ticks.fits.before),
                           root_mean_square(self.ticks.view.residual),
                           root_mean_square(noise) if noise else NOT_KNOWN)
+
+    def shares(self, start: float, end: float, drives: Sequence[str] | None = None) -> list[Share]:
+        """Return the share of the squared error in a span [s] that each unticked effect explains.
+
+        Raises
+        ------
+        SessionError
+            For an unknown drive.
+        """
+        ticks = self.ticks
+        return shares_in(span_mask(ticks, start, end, drives), ticks.fits, ticks.view)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the page, without curves."""

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.inference.diagnosis.answer import Answer, answer_of
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis, SinceReference
+from pprs_dynamics.inference.diagnosis.mounting import other_mounting
 from pprs_dynamics.inference.diagnosis.statements import word_stick_slip
 from pprs_dynamics.inference.fit.reference import Reference
 from pprs_dynamics.inference.readings.efforts import looks_like
@@ -28,7 +29,7 @@ def diagnose(
     progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
     as_it_is: bool = False, reference: Reference | None = None,
 ) -> Diagnosis:
-    """Return which physical effect a model lacks, as far as recordings can tell.
+    """Return which physical effect a model lacks, as far as recordings show it.
 
     Parameters
     ----------
@@ -71,15 +72,16 @@ def diagnose(
     return found
 
 
-@outside_cost('efforts that are no measurement, and stick-slip, end the diagnosis before the '
-              'search: `unknown`')
+@outside_cost('another mounting, efforts that are no measurement, and stick-slip end the '
+              'diagnosis before the search: `unknown`')
 def _gate(model: DriveModel, recordings: Sequence[Recording], decisions: Decisions,
           reference: Reference | None) -> tuple[dict[str, NoMeasurement], dict[str, StickSlip]]:
     """Return the drives whose efforts are no measurement, and those that stick and slip."""
-    other = looks_like(model, recordings)
+    other = other_mounting(model, recordings) or looks_like(model, recordings)
     if other and reference is not None:
         # What the reference looks like as well is no change.
-        before = looks_like(model, reference.recordings)
+        before = (other_mounting(model, reference.recordings)
+                  or looks_like(model, reference.recordings))
         other = {drive: looks for drive, looks in other.items()
                  if drive not in before or before[drive].kind != looks.kind}
     # No law of a drive's motion describes what its controller and its elasticity do.

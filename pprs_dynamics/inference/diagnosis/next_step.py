@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # naming files needs no diagnosis
     from pprs_dynamics.inference.readings.findings import NoMeasurement
     from pprs_dynamics.physics.model.drive_model import DriveModel
 
+MOUNTING = 'mounting'  # kind of a finding on the direction of gravity
 OWN_FRICTION = ('friction.viscous', 'friction.coulomb')  # of an arm's model file
 SECOND = 'SECOND_RECORDING'  # that is still to be made
 
@@ -110,6 +111,9 @@ def _has_no_friction(model: DriveModel) -> bool:
 def measure_first(findings: Sequence[NoMeasurement], files: GivenFiles) -> tuple[str, str]:
     """Return what to do where efforts are no measurement, and the command that ignores this."""
     lines = list(dict.fromkeys(finding.line for finding in findings if finding.line))
+    if all(finding.kind == MOUNTING for finding in findings):
+        return (f'Write {listed(lines)} into the model file. If the robot is mounted as in the '
+                'model, continue with', files.command('diagnose', '--as-it-is'))
     say = f', or write {listed(lines, "or")} into the model file' if lines else ''
     return (f'Record the measured effort{say}. If it is measured, continue with',
             files.command('diagnose', '--as-it-is'))

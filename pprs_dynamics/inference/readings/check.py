@@ -25,6 +25,7 @@ from pprs_dynamics.inference.readings.efforts import (
     find_no_measurements,
     find_scales,
     find_sign_bit,
+    gain_line,
 )
 from pprs_dynamics.inference.readings.evidence import (
     Parts,
@@ -33,8 +34,9 @@ from pprs_dynamics.inference.readings.evidence import (
     likelihood,
     parts_of,
     read_motion,
+    rigid_factor,
 )
-from pprs_dynamics.inference.readings.findings import Mistake, OtherReading, Scales, columns_line
+from pprs_dynamics.inference.readings.findings import OtherReading, Scales, columns_line
 from pprs_dynamics.inference.readings.table import Reading, named, plain, quarter_turn, readings
 from pprs_dynamics.inference.residuals.excerpt import Excerpt, excerpt_of
 from pprs_dynamics.measurement.files.defects import SLOW_STEP
@@ -61,10 +63,15 @@ class Fit:
 
     @property
     def is_other_unit(self) -> bool:
-        """Whether only efforts differ, those of all drives by one unit."""
+        """Whether only efforts differ, those of all drives by one unit or by drive constants."""
         sizes = np.abs(self.scales)
-        return (not self.reading.kind and self.time_unit == 1
-                and bool(np.all(sizes == sizes[0]) and sizes[0] != 1))
+        return not self.reading.kind and self.time_unit == 1 and (self.has_constants or bool(
+            np.all(sizes == sizes[0]) and sizes[0] != 1))
+
+    @property
+    def has_constants(self) -> bool:
+        """Whether efforts are multiplied by constants of the drives."""
+        return not np.all(np.isin(self.scales, table.SCALES))
 
 
 def with_mistakes(model: DriveModel, recording: Recording, refuse: bool = False) -> Recording:
@@ -115,10 +122,10 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
     kinds = {mistake.kind for mistake in mistakes}
     if not mistakes:
         mistakes += find_scales(model, contents)
-    # What explains the efforts well is in the right unit, whatever limits say.
-    if (not kinds & {'position_unit', 'drive_order', 'ambiguous'}
-            and search.plain_left > table.GOOD_FIT):
-        mistakes += _of_strokes(model, recording, search.strokes)
+    if not kinds & {'position_unit', 'drive_order', 'ambiguous'}:
+        # Angles that explain the efforts well are in the right unit, whatever limits say.
+        mistakes += _of_strokes(model, recording, search.strokes,
+                                search.plain_left > table.GOOD_FIT)
     if not kinds & {'position_unit', 'position_sign', 'reversed_time'}:
         mistakes += _of_velocities(model, recording, excerpts.get(
             1.0 if best is None else best.time_unit))
@@ -172,7 +179,7 @@ class Search:
         start = self.fit(first, 1.0, in_pieces=True) or Fit(
             first, 1.0, 0.0, np.ones(len(drives)), 1.0)
         self.plain_left = start.left
-        if 1.0 in self.excerpts and start.left < table.CLOSE_FIT and start.is_plain and not (
+        if 1.0 in self.excerpts and start.left < 1.5 * table.CLOSEST and start.is_plain and not (
                 self._outside(first, self.excerpts[1.0])):
             return None
         best: tuple[Fit | None, float] = (None, start.score)
@@ -264,15 +271,27 @@ class Search:
                            - _mistakes(scale) / weights[d])
         choices = [alone]
         # Inertia alone may be invented: units that are no prefixes need a weight.
-        for scale in table.SCALES if np.nanmax(np.abs(parts.gravity)) > 0 else table.OF_ONE:
+        has_weight = bool(np.nanmax(np.abs(parts.gravity)) > 0)
+        for scale in table.SCALES if has_weight else table.OF_ONE:
             common = np.ones(effort.shape[1])
             common[np.isfinite(effort).any(axis=0)] = scale
             choices.append(common)
+        own = np.ones(effort.shape[1])
+        for d in measured if has_weight else ():
+            factor = rigid_factor(effort[:, d], parts, d)
+            if factor and abs(np.log(abs(factor))) > np.log(table.SAME_MASSES) and (
+                    one := likelihood(effort[:, d], parts, d, factor, self.masses)) is not None:
+                own[d], found[d, factor] = factor, one
+        if np.all(own[measured] != 1) and np.ptp(np.sign(own[measured])) == 0:
+            choices.append(own)
         return max((fit_of(scales) for scales in choices), key=lambda one: one.score)
 
     def _cost(self, scales: Array, measured: list[int]) -> float:
         """Return the prior cost of scales: kinds of drives may share a mistake."""
         told = scales[measured]
+        if not np.all(np.isin(told, table.SCALES)):
+            return table.COST['drive_constant'] + (
+                table.COST['effort_sign'] if told[0] < 0 else 0.0)
         if np.all(told == told[0]):
             return _mistakes(float(told[0]))
         kinds = [scales[:3], scales[3:]] if self.model.drives == DRIVES else [scales]
@@ -360,6 +379,14 @@ def _of_fit(model: DriveModel, fit: Fit) -> Iterator[OtherReading]:
     if fit.reading.kind:
         yield OtherReading.of(fit.reading.kind, drives, fit.reading.drives, fit.reading.what,
                               scales=position_scales(model, fit.reading))
+    if fit.has_constants:
+        every = tuple(range(len(drives)))
+        yield OtherReading.of(
+            'drive_constant', drives, every, f'the effort of {named(drives, every)} looks like '
+            'currents in amperes, or another unit: '
+            + ', '.join(f'{scale:.3g}' for scale in fit.scales) + ' times what the model says',
+            gain_line(fit.scales.tolist()))
+        return
     for scale in dict.fromkeys(fit.scales.tolist()):
         group = tuple(np.flatnonzero(fit.scales == scale).tolist())
         if scale == 1.0:
@@ -394,7 +421,7 @@ def position_scales(model: DriveModel, reading: Reading) -> Scales:
 
 
 def _of_strokes(model: DriveModel, recording: Recording, strokes: tuple[Array, Array],
-                ) -> Iterator[Defect]:
+                with_angles: bool) -> Iterator[Defect]:
     """Yield positions far beyond the strokes, which no effort is needed to recognise."""
     lower, upper = strokes
     drives, ends = recording.drives, np.maximum(-lower, upper)
@@ -402,7 +429,7 @@ def _of_strokes(model: DriveModel, recording: Recording, strokes: tuple[Array, A
     for turns, names in ((False, table.LENGTHS), (True, table.ANGLES)):
         alike = [k for k, units in enumerate(model.units) if units.turns == turns]
         far = tuple(k for k in alike if reach[k] > table.FAR * ends[k])
-        if not far:
+        if not far or (turns and not with_angles):
             continue
         # Encoders of a robot's turning joints count alike; its rails may not.
         group = tuple(alike) if turns else far
@@ -444,11 +471,15 @@ def _of_velocities(model: DriveModel, recording: Recording, excerpt: Excerpt | N
         return
     groups: dict[float, list[int]] = {}
     for drive, factor in factors.items():
-        for wrong in (-1.0, 1e-3, -1e-3, 1e3, -1e3, *(1 / unit for unit in table.ANGLES)):
+        for wrong in (-1.0, *(sign * each for sign in (1, -1) for unit in table.VELOCITY_FACTORS
+                              for each in (unit, 1 / unit))):
             if abs(factor / wrong - 1) <= table.NEAR_ONE:
                 groups.setdefault(wrong, []).append(drive)
     for factor, group in groups.items():
         times = 'minus' if factor == -1.0 else f'{factor:.4g} times'
-        yield Mistake.of('velocity', recording.drives, group, 'the recorded velocity of '
-                         f'{named(recording.drives, tuple(group))} is {times} the derivative of '
-                         'the position')
+        yield OtherReading.of(
+            'velocity', recording.drives, group, 'the recorded velocity of '
+            f'{named(recording.drives, tuple(group))} is {times} the derivative of the position',
+            scales=tuple((drive, 'velocity_scale', (
+                1.0 if columns is None else columns.drives[drive].velocity_scale) / factor)
+                for drive in (recording.drives[k] for k in group)))

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,7 +17,7 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.table import CURRENT, EFFORT, POSITION, VELOCITY
 from pprs_dynamics.measurement.files.contents import Series
-from pprs_dynamics.measurement.files.table_files import LATEST_SECOND, TIME_COLUMNS, TIME_LIKE
+from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
 
 
 class GuessError(PprsError, ValueError):
@@ -71,6 +70,8 @@ class Guess:
         What was decided and why, for comments.
     rate : float, optional
         Samples per second of a table without times [Hz].
+    effort_kind : str
+        By their names, where it is neither measured nor current; else empty.
     """
 
     time: Column | None
@@ -79,6 +80,7 @@ class Guess:
     time_scale: float | None = None
     notes: list[str] = field(default_factory=list)
     rate: float | None = None
+    effort_kind: str = ''
 
 
 def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str | None = None,
@@ -123,7 +125,13 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     by_column = {one.column: one for one in series}
     scales = {key: scale for key, column in columns.items()
               if (scale := _scale(by_column[column].title, key[1])) is not None}
-    guess = Guess(None if time is None else time.column, columns, scales, time_scale, notes, rate)
+    outside = [column for (_, kind), column in columns.items() if kind == EFFORT
+               and {*words_of(by_column[column].title)} & table.FROM_OUTSIDE]
+    if outside:
+        notes.append(f'{by_column[outside[0]].title} is an external torque by its name, from which '
+                     'a model was taken out')
+    guess = Guess(None if time is None else time.column, columns, scales, time_scale, notes, rate,
+                  table.EXTERNAL if outside else '')
     return guess if quantity else _judge_velocities(guess, by_column, time, rate)
 
 
@@ -170,20 +178,9 @@ def _time(series: Sequence[Series], has_rate: bool,
         notes.append(f'column {found.column} rises all the time: taken as time')
     scale = next((table.TIME_WORDS[word] for word in words_of(found.title)
                   if word in table.TIME_WORDS), None)
-    known = found.values[np.isfinite(found.values)]
-    if known[0] > LATEST_SECOND:  # since 1970, in a unit that the size of the stamps tells
-        parts = 1.0
-        while known[0] * parts > LATEST_SECOND:
-            parts /= 1e3
-        step = float(np.median(np.diff(known)))
-        if scale is None and step * parts < table.SHORTEST:  # since boot
-            scale = next(unit for unit in table.SINCE_BOOT if step * unit <= table.SLOWEST)
-            notes.append(f'times rise by {step:g}: taken as units of {scale:g} s since boot')
-        parts = scale or parts
-        return replace(found, values=found.values * parts), scale, notes
-    step = float(np.median(np.diff(known)))
+    step = float(np.median(np.diff(found.values[np.isfinite(found.values)])))
     if scale is None and step > table.SLOWEST:
-        scale = next(unit for unit in table.SINCE_BOOT if step * unit <= table.SLOWEST)
+        scale = next(unit for unit in table.TIMES if step * unit <= table.SLOWEST)
         notes.append(f'times rise by {step:g}: taken as units of {scale:g} s')
     return replace(found, values=found.values * (scale or 1.0)), scale, notes
 
@@ -262,7 +259,7 @@ def _fit(key: tuple[str, ...], members: dict[str, Column], quantity: str, given:
         fits = False
     if not fits or {*key} & table.OTHERS:
         return (-1.0,)
-    return (float(len(members)), float(not {*key} & table.COMMANDS),
+    return (float(len(members)), float(not {*key} & (table.COMMANDS | table.FROM_OUTSIDE)),
             float(bool({*key} & table.MEASURED)), -float(len(key)))
 
 
@@ -410,6 +407,9 @@ def _chains(links: Links, count: int) -> dict[str, list[int]]:
     """Return positions and velocities by derivatives; empty where not each joint has both."""
     with np.errstate(invalid='ignore'):
         derived = (links.correlation > table.ALIKE) & (links.slope > 0)
+        # What has a velocity is followed by it best: an effort may resemble a position.
+        derived &= links.correlation > np.nanmax(np.where(
+            derived, links.correlation, -1.0), axis=0) - table.AS_WELL
         same = links.alike > table.COPY
     np.fill_diagonal(derived, False)
     # What is asked for moves as what is measured, which the velocity follows more exactly.
@@ -457,12 +457,22 @@ def _layout(values: Array, time: Array, count: int) -> dict[str, list[int]]:
                                   -p, layout, p, e, links[p]))
     if not found:
         return {}
-    _, _, layout, p, e, of_p = max(found, key=lambda one: (round(one[0], 2), one[1]))
+    # Of those that explain as much the one whose positions are smoothest, as no effort is.
+    most = max(found, key=lambda one: one[0])[0] - table.CLEAR
+    _, _, layout, p, e, of_p = min(
+        (one for one in found if one[0] >= most), key=lambda one: (
+            _roughness(values[:, one[2][one[3]]]), -one[1]))
     kinds = {POSITION: layout[p]}
     speeds = [b for b in range(number) if b not in (p, e) and of_p[b]]
     if speeds:
         kinds[VELOCITY] = layout[speeds[0]]
     return {**kinds, EFFORT: layout[e]}
+
+
+def _roughness(values: Array) -> float:
+    """Return the size of third differences over that of the first ones: small for a motion."""
+    moved = np.std(np.diff(values, axis=0), axis=0)
+    return float(np.median(np.std(np.diff(values, 3, axis=0), axis=0) / np.maximum(moved, 1e-300)))
 
 
 def _linked(values: Array, block: Sequence[int], other: Sequence[int], time: Array) -> bool:
@@ -484,30 +494,37 @@ def _is_known(links: Links, place: int, used: Collection[int]) -> bool:
 
 
 def _explained(efforts: Array, position: Array, time: Array) -> float:
-    """Return the share of efforts that gravity, friction and inertia of any size explain."""
+    """Return the share of efforts that gravity, friction and inertia of any size explain.
+
+    Positions may be in any unit of angles.
+    """
     known = (np.isfinite(efforts).all(axis=1) & np.isfinite(position).all(axis=1)
              & np.isfinite(time))
     efforts, position, time = efforts[known], position[known], time[known]
+    swing = np.var(efforts, axis=0)
+    moves = swing > 0
     if len(time) < table.LEAST_ROWS or not np.all(np.diff(time) > 0):
         return 0.0
+    if not np.any(moves):
+        return -1.0
     half = max(1, len(time) // 400)
     speed = np.zeros_like(position)
     speed[half:-half] = (position[2 * half:] - position[:-2 * half]) / (
         time[2 * half:] - time[:-2 * half])[:, None]
-    rate = np.gradient(speed, time, axis=0)
-    total = np.cumsum(position, axis=1)
     width = root_mean_square(speed) / 10 or 1.0
-    columns = np.column_stack([
-        np.ones(len(time)), np.sin(position), np.cos(position), np.sin(total), np.cos(total),
-        speed, np.tanh(speed / width), rate])
-    columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    rest = efforts - columns @ np.linalg.lstsq(columns, efforts, rcond=1e-8)[0]
-    swing = np.var(efforts, axis=0)
-    moves = swing > 0
-    if not np.any(moves):
-        return -1.0
-    # What is explained exactly is computed from positions: no measurement.
-    return float(np.mean(1 - np.var(rest, axis=0)[moves] / swing[moves]))
+    rate = np.gradient(speed, time, axis=0)
+    common = [np.ones(len(time)), speed, np.tanh(speed / width), rate]
+    shares = []
+    for unit in (1.0, *table.ANGLES):
+        angle = unit * position
+        total = np.cumsum(angle, axis=1)
+        columns = np.column_stack([
+            *common, np.sin(angle), np.cos(angle), np.sin(total), np.cos(total),
+            *(each * rate for each in np.cos(angle).T[1:, :, None])])
+        columns = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        rest = efforts - columns @ np.linalg.lstsq(columns, efforts, rcond=1e-8)[0]
+        shares.append(np.mean(1 - np.var(rest, axis=0)[moves] / swing[moves]))
+    return float(max(shares))
 
 
 # ------------------------------------------------------------------------------------ units
@@ -520,7 +537,7 @@ def _scale(title: str, quantity: str) -> float | None:
 
 def _judge_velocities(guess: Guess, series: Mapping[Column, Series], time: Series | None,
                       rate: float | None) -> Guess:
-    """Return a guess with the units of velocities and the rate that derivatives show.
+    """Return a guess with the rate that velocities show, without those that are none.
 
     Raises
     ------
@@ -556,15 +573,4 @@ def _judge_velocities(guess: Guess, series: Mapping[Column, Series], time: Serie
             1.0, *table.VELOCITY_FACTORS, *(1 / factor for factor in table.VELOCITY_FACTORS)))
         if not is_unit:
             raise RateError(rate, float(f'{rate * middle:.3g}'))
-    scales = dict(guess.scales)
-    for joint, slope in slopes.items():
-        factor = scales.get((joint, POSITION), 1.0)
-        if (joint, VELOCITY) in scales or abs(slope - 1) < table.SAME_UNIT:
-            continue
-        exact = min((1.0, *table.VELOCITY_FACTORS), key=lambda unit: abs(
-            math.log(unit * slope / factor)))
-        if abs(exact * slope / factor - 1) < table.SAME_UNIT:
-            scales[joint, VELOCITY] = exact
-            guess.notes.append(f'the velocity of {joint} is {slope:.4g} times the derivative of '
-                               f'its position: velocity_scale {exact:g}')
-    return replace(guess, scales=scales)
+    return guess

@@ -47,8 +47,7 @@ def find_scales(model: DriveModel, contents: Mapping[str, Shares]) -> list[Other
     # Masses of a description are right within a factor; inertia alone may be invented.
     has_weight = any(abs(one.gravity) > table.CERTAIN * one.gravity_doubt for one in known)
     sizes, sign = np.abs(scales), float(np.sign(scales[0]))
-    gain = ', '.join(f'{1 / certain[k]:.3g}' if k in certain else '1.0' for k in every)
-    gain_line = f'effort_kind: current, and beside urdf or mjcf  gain: [{gain}]'
+    gains_line = gain_line([certain.get(k, 1.0) for k in every])
     for unit, name in table.EFFORTS.items():
         is_prefix = unit in table.PREFIXES
         tolerance = np.log(table.SAME_MASSES) if is_prefix and has_weight else table.NEAR_UNIT
@@ -62,7 +61,7 @@ def find_scales(model: DriveModel, contents: Mapping[str, Shares]) -> list[Other
             line = columns_line([found], model.recorded.columns is not None)
             return [OtherReading.of(
                 'ambiguous', model.drives, every, f'{found.what}, or in amperes: the factors are '
-                + ', '.join(f'{scale:.3g}' for scale in scales), f'{line} or {gain_line}')]
+                + ', '.join(f'{scale:.3g}' for scale in scales), f'{line} or {gains_line}')]
     limits = model.effort_limits[[*certain]]
     if len(certain) > 1 and has_weight and np.all(np.isfinite(limits)):
         gains = np.log(sizes * limits)
@@ -84,8 +83,14 @@ def find_scales(model: DriveModel, contents: Mapping[str, Shares]) -> list[Other
         return [OtherReading.of(
             'drive_constant', model.drives, every, f'{of_all} is another multiple of what the '
             f'masses need: {listed}: it looks like currents in amperes, or another unit',
-            gain_line)]
+            gains_line)]
     return []
+
+
+def gain_line(scales: Sequence[float]) -> str:
+    """Return the lines for efforts that are so many times what they should be: currents."""
+    return ('effort_kind: current, and beside urdf or mjcf  gain: ['
+            + ', '.join('1.0' if scale == 1 else f'{1 / scale:.3g}' for scale in scales) + ']')
 
 
 def _unit(model: DriveModel, what: str, factors: Array) -> OtherReading:

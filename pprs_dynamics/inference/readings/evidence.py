@@ -115,7 +115,7 @@ def likelihood(effort: Array, parts: Parts, drive: int, scale: float, masses: fl
     """Return how likely efforts, (N,), are `scale` times those of a drive; None where all is 0.
 
     Inertia and gravity are the model's within a relative tolerance of its masses, friction
-    opposes the motion with any size, and a constant is small beside them.
+    opposes the motion with any size, and a constant is small in comparison.
     """
     columns = [part[:, drive] for part in (parts.inertia, parts.gravity, parts.others,
                                            parts.velocity, parts.direction)]
@@ -306,6 +306,16 @@ def _fast_noise(recording: Recording, drive: int) -> float:
     values = np.unique(recording.effort[np.isfinite(recording.effort[:, drive]), drive])
     return float(max(table.NORMAL * np.median(differences) / gain,
                      np.min(np.diff(values)) / np.sqrt(12)))
+
+
+def rigid_factor(effort: Array, parts: Parts, drive: int) -> float:
+    """Return the factor of a model's inertia and gravity together in efforts, (N,); 0 for none."""
+    known = np.isfinite(effort) & np.isfinite(parts.inertia[:, drive])
+    rigid, velocity, direction = (part[known, drive] for part in (
+        parts.inertia + parts.gravity, parts.velocity, parts.direction))
+    is_steady = np.std(rigid) < table.STEADY * root_mean_square(rigid)
+    return fitted(effort[known], [rigid, velocity, direction, *(
+        [] if is_steady else [np.ones_like(rigid)])])[0][0]
 
 
 def fitted(effort: Array, columns: Sequence[Array]) -> tuple[list[float], list[float], float]:

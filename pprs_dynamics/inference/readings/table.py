@@ -53,7 +53,8 @@ REVERSAL = 0.2
 FRICTION, FRICTION_MOST = 3.0, 9.0
 # Prior costs of mistakes [nats].
 COST = {'position_unit': 6.0, 'position_sign': 6.0, 'drive_order': 8.0, 'position_offset': 8.0,
-        'reversed_time': 8.0, 'time_unit': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0}
+        'reversed_time': 8.0, 'time_unit': 6.0, 'effort_unit': 6.0, 'effort_sign': 6.0,
+        'drive_constant': 10.0}
 FEW = 10.0  # more, of positions of some drives in another unit than those of the others
 ALL_NEGATED = 2.0  # more, of all positions together: efforts are negated more often
 OUTSIDE, FAR_OUTSIDE = 4.0, 8.0  # of positions beyond a stroke, and far beyond it
@@ -124,6 +125,8 @@ OTHERS = frozenset((
 COMMANDS = frozenset((
     'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'des', 'desired', 'ref',
     'reference', 'goal', 'setpoint', 'sp', 'set', 'demand', 'demanded'))
+# These tell of torques from outside, as a driver estimates them: taken where nothing else is there.
+FROM_OUTSIDE = frozenset(('ext', 'external', 'contact'))
 LETTERS = {'a': 'actual', 'm': 'measured', 'd': 'desired', 'c': 'commanded', 'r': 'reference'}
 MEASURED = frozenset((
     'meas', 'measured', 'actual', 'act', 'real', 'fb', 'feedback', 'msr', 'sensor', 'link'))
@@ -139,6 +142,7 @@ TIME_WORDS = {'ms': 1e-3, 'msec': 1e-3, 'millis': 1e-3, 'milliseconds': 1e-3, 'u
 # --------------------------------------------------------------------- columns by their numbers
 
 COPY = 0.995  # correlation of the changes of a column with those of what it was asked to be
+AS_WELL = 0.02  # difference of correlations that says nothing
 UNLIKE = 0.5  # correlation below which a column that is called a velocity is none
 SAME_UNIT = 0.05  # relative distance of a slope from a unit's
 CLEAR = 0.05  # share of the explained efforts by which one block of columns must win
@@ -146,7 +150,6 @@ LEAST_ROWS = 30
 LENGTHS_OF_STEPS = (1, 2, 4, 8, 16, 32, 64, 128)  # [samples]
 VELOCITY_FACTORS = (math.pi / 180, 2 * math.pi, math.pi / 30, 1e-3, 1e-6)
 SLOWEST, SHORTEST = 0.5, 1e-5  # [s]; steps of a robot's recording
-SINCE_BOOT = (1e-3, 1e-6, 1e-9)  # units of stamps [s]
 
 # --------------------------------------------------------------------------------- velocities
 

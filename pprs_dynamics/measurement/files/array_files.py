@@ -1,13 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Tables of arrays: Parquet files and LeRobot datasets of them, MAT and NumPy files."""
+"""Tables of arrays: Parquet files and LeRobot datasets of them, MAT, NumPy and JSON files."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,8 @@ import numpy as np
 
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
 
-PARQUET, MAT, NUMPY = ('.parquet', '.pq'), ('.mat',), ('.npz',)
+PARQUET, MAT, NUMPY, JSON = ('.parquet', '.pq'), ('.mat',), ('.npz',), ('.json', '.jsonl')
+BYTES_PER_CHARACTER = 8  # of JSON in memory
 INFO = Path('meta') / 'info.json'  # of a LeRobot dataset
 DEEPEST = 6  # structures within structures of a MAT file
 LARGEST = 2_000_000_000  # bytes of a file's arrays in memory: 1 000 Hz of 7 joints for three hours
@@ -63,8 +65,8 @@ def open_arrays(path: Path) -> ArrayTable | None:
         return _lerobot(path) if is_lerobot(path) else None
     if path.suffix in PARQUET:
         return _parquet(path, [path], {})
-    if path.suffix in (*MAT, *NUMPY):
-        arrays = _mat(path) if path.suffix in MAT else _numpy(path)
+    if path.suffix in (*MAT, *NUMPY, *JSON):
+        arrays = (_mat if path.suffix in MAT else _numpy if path.suffix in NUMPY else _json)(path)
         return ArrayTable(path, list(arrays), lambda wanted: arrays, {})
     return None
 
@@ -214,3 +216,42 @@ def _numpy(path: Path) -> dict[str, Any]:
     except Exception as error:  # a damaged archive surfaces as zipfile's and zlib's own errors
         raise UnreadableFileError(path, f'no NumPy file of arrays ({_first_line(error)})'
                                   ) from None
+
+
+def _json(path: Path) -> dict[str, Any]:
+    """Return the largest table within a JSON document, or one of a document in each line."""
+    require_size(path, BYTES_PER_CHARACTER * path.stat().st_size)
+    try:
+        text = path.read_text(encoding='utf-8')
+        try:
+            content = json.loads(text)
+        except ValueError:
+            content = [json.loads(line) for line in text.splitlines() if line.strip()]
+    except (ValueError, RecursionError) as error:
+        raise UnreadableFileError(path, f'no JSON ({_first_line(error)})') from None
+    table = _largest_table(content, DEEPEST)
+    if not table:
+        raise UnreadableFileError(path, 'it holds no table: a list of objects, or lists of numbers '
+                                  'of one length')
+    return table
+
+
+def _largest_table(content: Any, depth: int) -> dict[str, Any]:
+    """Return lists of one length by name; of objects in a list, their numbers by `name.name`."""
+    import pandas as pd
+
+    if isinstance(content, list) and content and isinstance(content[0], Mapping):
+        frame = pd.json_normalize([row for row in content if isinstance(row, Mapping)])
+        content = {str(name): frame[name].tolist() for name in frame}
+    elif not isinstance(content, Mapping) or not depth:
+        return {}
+    lists = {name: value for name, value in content.items()
+             if isinstance(value, list) and len(value) > 1 and not isinstance(value[0], Mapping)}
+    longest = max(map(len, lists.values()), default=0)
+    found = {}
+    for name, value in lists.items():
+        if len(value) == longest:
+            with suppress(ValueError):  # lists of several lengths are no table
+                found[name] = np.asarray(value)
+    tables = [found, *(_largest_table(value, depth - 1) for value in content.values())]
+    return max(tables, key=lambda table: sum(array.size for array in table.values()))

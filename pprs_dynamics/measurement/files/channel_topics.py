@@ -3,10 +3,10 @@
 
 """Further channels of drives in bags: temperatures and pressures.
 
-sensor_msgs/Temperature and sensor_msgs/FluidPressure, and numbers of std_msgs on topics with such a
-name, belong to the drive that their topic or frame names, and to all drives where it names none.
-sensor_msgs/JointState on a topic with such a name has one number a joint, control_msgs/
-DynamicJointState an interface of that name.
+Messages of type sensor_msgs/Temperature and sensor_msgs/FluidPressure have one number. So have
+numbers of std_msgs on topics with such a name. They belong to the drive that their topic or frame
+names, and to all drives where it names none. A sensor_msgs/JointState on a topic with such a name
+has one number a joint, a control_msgs/DynamicJointState an interface of that name.
 """
 
 from __future__ import annotations

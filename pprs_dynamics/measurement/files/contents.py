@@ -140,6 +140,8 @@ def _elements(table: ArrayTable) -> Iterator[Series]:
             values = np.squeeze(np.asarray(table.load([name])[name]))
             if np.issubdtype(values.dtype, np.datetime64):
                 values = values.astype('datetime64[ns]').astype(np.int64)
+            if values.dtype.kind == 'c':
+                values = values.real if not np.any(values.imag) else values.astype(str)
             values = values.astype(float)
         except (TypeError, ValueError):  # words, pictures
             continue

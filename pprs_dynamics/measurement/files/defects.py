@@ -38,7 +38,7 @@ STAMP_UNITS = {'milliseconds': 1e3, 'microseconds': 1e6, 'nanoseconds': 1e9}
 
 
 class Judgement:
-    """Samples on their way to a recording: what is kept, where it is split, what was found.
+    """Checks samples: drops some, splits the rest into segments, and lists all defects.
 
     Parameters
     ----------

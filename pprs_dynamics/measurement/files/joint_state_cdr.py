@@ -25,8 +25,13 @@ from pprs_dynamics.measurement.files.samples import Indices, Mask
 from pprs_dynamics.system.cdr import HEADER, LITTLE_ENDIAN, STAMP, WORD, Walk
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
-# Of a topic whose messages differ in more ways than this, the others are read one by one.
-MOST_LAYOUTS = 16
+# Names, stamps [ns], (N,), and three arrays, (N, joints).
+States = tuple[tuple[str, ...], Indices, list[Array]]
+
+
+@cache
+def _types() -> Any:
+    return message_types()
 
 
 def message_types() -> Any:
@@ -52,7 +57,7 @@ class Layout:
         Places of the bytes that make this layout: encapsulation, length words, names. Stamps,
         values, padding and the text of the frame may differ.
     pattern : (K,) array of bytes
-        What stands there.
+        The bytes at these places.
     """
 
     names: tuple[str, ...]
@@ -89,18 +94,13 @@ class Layout:
         same: Mask = np.all(rows[:, self.fixed] == self.pattern, axis=1)
         return same
 
-    def stamps(self, rows: NDArray[np.uint8]) -> Indices:
-        """Return the header stamps [ns], (N,)."""
+    def read(self, rows: NDArray[np.uint8]) -> States:
+        """Return names, header stamps [ns], (N,), and position, velocity and effort."""
         words = np.ascontiguousarray(rows[:, HEADER:HEADER + STAMP.size])
-        seconds = words.view('<i4')[:, 0].astype(np.int64)
-        stamps: Indices = seconds * 10**9 + words.view('<u4')[:, 1]
-        return stamps
-
-    def values(self, rows: NDArray[np.uint8], array: tuple[int, int]) -> Array:
-        """Return one of the arrays, (N, count)."""
-        offset, count = array
-        block = np.ascontiguousarray(rows[:, offset:offset + 8 * count])
-        return block.view('<f8').astype(np.float64, copy=False)
+        stamps = words.view('<i4')[:, 0].astype(np.int64) * 10**9 + words.view('<u4')[:, 1]
+        return self.names, stamps, [
+            np.ascontiguousarray(rows[:, offset:offset + 8 * count]).view('<f8').astype(
+                np.float64, copy=False) for offset, count in self.arrays]
 
     def filled(self, stamps: Indices, *quantities: Array | None) -> NDArray[np.uint8]:
         """Return messages with this layout as rows of bytes, (N, length), all else zero.
@@ -160,18 +160,13 @@ class JointStateBlocks:
     ----------
     drives : tuple of D str
         Taken by name, in any order, among any others.
-    use_layouts : bool
-        False reads every message by rosbags; for checking one way against the other.
     """
 
-    def __init__(self, drives: tuple[str, ...], use_layouts: bool = True) -> None:
+    def __init__(self, drives: tuple[str, ...]) -> None:
         self.drives = drives
         self.names: set[str] = set()
         self.samples = 0
-        self._layouts: list[Layout] = []
-        self._use_layouts = use_layouts
         self._blocks: list[tuple[Indices, Indices, Array]] = []
-        self._typestore: Any = None
 
     def add(self, messages: Sequence[bytes], received: Sequence[int]) -> None:
         """Take in serialised messages and the times of their recording [ns]."""
@@ -181,85 +176,51 @@ class JointStateBlocks:
         complete = np.zeros(len(messages), dtype=bool)
         lengths = np.fromiter(map(len, messages), dtype=np.int64, count=len(messages))
         left = np.arange(len(messages))
-        tried = 0
         while len(left):
-            if tried == len(self._layouts):
-                first = int(left[0])
-                layout = Layout.of(messages[first]) if self._use_layouts else None
-                if layout is None or tried == MOST_LAYOUTS:
-                    complete[first] = self._take_one(messages[first], layout, first, stamps, values)
-                    left = left[1:]
-                    continue
-                self._layouts.append(layout)
-            layout = self._layouts[tried]
-            tried += 1
-            fitting = left[lengths[left] == layout.length]
-            joined = b''.join([messages[row] for row in fitting.tolist()])
-            rows = np.frombuffer(joined, np.uint8).reshape(len(fitting), layout.length)
-            same = layout.matches(rows)
-            if not np.all(same):
-                fitting, rows = fitting[same], rows[same]
-            if len(fitting):
-                complete[fitting] = self._take(layout, rows, fitting, stamps, values)
-                left = np.setdiff1d(left, fitting, assume_unique=True)
+            layout, rows = Layout.of(messages[left[0]]), left[:1]
+            if layout is None:
+                states = _decoded(messages[left[0]])
+            else:
+                rows = left[lengths[left] == layout.length]
+                data = np.frombuffer(b''.join([messages[row] for row in rows.tolist()]),
+                                     np.uint8).reshape(len(rows), layout.length)
+                same = layout.matches(data)
+                rows, states = rows[same], layout.read(data[same])
+            left = np.setdiff1d(left, rows, assume_unique=True)
+            if states is not None:
+                names, stamps[rows], arrays = states
+                complete[rows] = self._place(names, arrays, rows, values)
         times = np.array(received, dtype=np.int64)
-        if not np.all(complete):
-            stamps, times, values = stamps[complete], times[complete], values[:, complete]
-        self.samples += len(stamps)
-        self._blocks.append((stamps, times, values))
+        self.samples += int(complete.sum())
+        self._blocks.append((stamps[complete], times[complete], values[:, complete]))
 
     def arrays(self) -> tuple[Indices, Indices, Array, Array, Array]:
-        """Return header stamps and recording times [ns], (N,); the three arrays, (N, D).
-
-        What was collected is given away, not kept.
-        """
-        stamps = np.concatenate([block[0] for block in self._blocks])
-        received = np.concatenate([block[1] for block in self._blocks])
-        position, velocity, effort = (
-            np.concatenate([block[2][k] for block in self._blocks]) for k in range(3))
-        self._blocks.clear()
-        return stamps, received, position, velocity, effort
-
-    def _take(
-        self, layout: Layout, messages: NDArray[np.uint8], rows: Indices, stamps: Indices,
-        values: Array,
-    ) -> bool:
-        """Read messages of one layout into their rows; return whether they hold all drives."""
-        stamps[rows] = layout.stamps(messages)
-        return self._place(layout.names, [
-            layout.values(messages, array) for array in layout.arrays], rows, values)
-
-    def _take_one(
-        self, message: bytes, layout: Layout | None, row: int, stamps: Indices, values: Array,
-    ) -> bool:
-        """Read one message for itself, with rosbags where it has no layout."""
-        rows = np.array([row])
-        if layout is not None:
-            return self._take(layout, np.frombuffer(message, np.uint8)[None], rows, stamps, values)
-        if self._typestore is None:
-            self._typestore = message_types()
-        try:
-            state = self._typestore.deserialize_cdr(message, JOINT_STATE)
-        except Exception:
-            # Bytes that are no joint state at all: told among the incomplete messages.
-            return False
-        stamps[row] = state.header.stamp.sec * 10**9 + state.header.stamp.nanosec
-        arrays = [np.asarray(array)[None] for array in (state.position, state.velocity,
-                                                        state.effort)]
-        return self._place(tuple(state.name), arrays, rows, values)
+        """Return header stamps and recording times [ns], (N,); the three arrays, (N, D)."""
+        stamps, received, values = (np.concatenate(
+            [block[k] for block in self._blocks], axis=-1 if k < 2 else 1) for k in range(3))
+        return stamps, received, *values
 
     def _place(
         self, names: tuple[str, ...], arrays: Sequence[Array], rows: Indices, values: Array,
     ) -> bool:
         """Put arrays, (n, joints) each, into their rows; return whether they hold all drives."""
         self.names.update(names)
-        if any(drive not in names for drive in self.drives):
+        if arrays[0].shape[1] != len(names) or not {*self.drives} <= {*names}:
             return False
         columns = [names.index(drive) for drive in self.drives]
-        if arrays[0].shape[1] != len(names):
-            return False
         for k, array in enumerate(arrays):
             # A sequence of another length than the names says nothing about which joint.
             if array.shape[1] == len(names):
                 values[k, rows] = array[:, columns]
         return True
+
+
+def _decoded(message: bytes) -> States | None:
+    """Return what a message without a layout holds, by rosbags; None for other bytes."""
+    try:
+        state = _types().deserialize_cdr(message, JOINT_STATE)
+    except Exception:  # of any kind, as the bytes are
+        return None
+    stamp = state.header.stamp.sec * 10**9 + state.header.stamp.nanosec
+    return tuple(state.name), np.array([stamp]), [np.asarray(array)[None] for array in (
+        state.position, state.velocity, state.effort)]

@@ -35,7 +35,7 @@ AT_LIMIT, BEYOND_LIMIT = 0.99, 1.05
 # Everything that can be found, and what is done about it. Nothing else is ever changed.
 POLICY = {
     'no_metadata': 'its only storage file is read',
-    'ignored_columns': 'they are ignored',
+    'ignored_columns': 'name those to use in columns of the model file',
     'ignored_joints': 'they are ignored',
     'incomplete_messages': 'those messages are ignored',
     'merged': 'samples are those of the first drive, the others lie between their neighbours',
@@ -87,7 +87,7 @@ class Defect:
     count : int
         How many samples, places, columns, ... it concerns.
     what : str
-        What was found, as a clause.
+        The defect, as a clause.
     spans : tuple of (start, end)
         Where, in the recording's time [s]; the first 100 places. Empty where it has no place.
     drives : tuple of str

@@ -42,7 +42,8 @@ TIME_LIKE = ('t', 'stamp', 'timestamp', 'times', 'seconds', 'sec', 'clock', 'ros
 ELEMENT = re.compile(r'(.+)\[(\d+)\]')
 # From here on a stamp counts no seconds since 1970, but a thousandth, a millionth, ... of them.
 LATEST_SECOND = 1e11
-KINDS = {'.mat': 'MAT', '.parquet': 'Parquet', '.pq': 'Parquet', '.npz': 'NumPy'}
+KINDS = {'.mat': 'MAT', '.parquet': 'Parquet', '.pq': 'Parquet', '.npz': 'NumPy', '.json': 'JSON',
+         '.jsonl': 'JSON'}
 PARTS = {3: 'milli', 6: 'micro', 9: 'nano'}
 Table = CsvTable | ArrayTable
 
@@ -54,7 +55,7 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
     Parameters
     ----------
     path : Path
-        .parquet, .mat (up to version 7.2), .npz, a LeRobot dataset, or anything else as CSV;
+        .parquet, .mat (up to version 7.2), .npz, .json, a LeRobot dataset, or else CSV;
         where the model names several files, their folder or one of them.
     drives : RecordedDrives
     topic : str, optional
@@ -117,7 +118,7 @@ def _source(path: Path, columns: RecordedColumns, prefix: str = '') -> str:
 
 
 def _time_column(table: Table, columns: RecordedColumns) -> Column | None:
-    """Return the column of times; None where a rate stands for them."""
+    """Return the column of times; None where a rate replaces it."""
     if columns.time is not None:
         _require(table, [columns.time])
         return columns.time
@@ -235,7 +236,10 @@ def _series(path: Path, name: str, values: Any, element: int | None, length: int
     if not np.issubdtype(array.dtype, np.datetime64):
         try:
             if array.dtype.kind == 'c':
-                raise TypeError('complex numbers')
+                if np.any(array.imag):
+                    raise UnreadableFileError(path, f'column {name!r} holds complex numbers, must '
+                                              'hold real ones: take its real part')
+                array = array.real
             array = array if array.dtype.kind in 'iu' else array.astype(float)
         except (TypeError, ValueError):
             raise UnreadableFileError(path, f'column {name!r} holds something else than numbers'
@@ -285,14 +289,14 @@ def _seconds(stamps: Any, columns: RecordedColumns, count: int,
 
 
 def _ignored(table: Table, wanted: Sequence[Column]) -> tuple[Defect, ...]:
-    used = {table.names[one - 1] if isinstance(one, int) and table.names else
-            one if isinstance(one, int) else (_holder(table, one) or (one,))[0] for one in wanted}
-    others = [name or '(no name)' for name in table.names if name not in used]
+    every = table.names or [str(k + 1) for k in range(getattr(table, 'count', 0))]
+    used = {every[one - 1] if isinstance(one, int) else (_holder(table, one) or (one,))[0]
+            for one in wanted}
+    others = [name or '(no name)' for name in every if name not in used]
     if not others:
         return ()
-    return (Defect('ignored_columns', len(others),
-                   f'the file also holds {counted(len(others), "column")}: '
-                   + ', '.join(others[:10]) + (', ...' if len(others) > 10 else '')),)
+    return (Defect('ignored_columns', len(others), 'not used: ' + ', '.join(others[:10])
+                   + (f' and {len(others) - 10} more' if len(others) > 10 else '')),)
 
 
 def _prefix(
@@ -400,12 +404,12 @@ def files_of(path: Path, names: Mapping[str, str]) -> dict[str, Path]:
     path : Path
         Their folder, or one of them.
     names : mapping
-        By quantity; * stands for what recordings in one folder differ in.
+        By quantity; * is the part in which recordings of one folder differ.
 
     Raises
     ------
     UnreadableFileError
-        Where one is missing, or cannot be told.
+        Where one is missing, or several fit.
     """
     if path.is_dir():
         folder, star = path, None
@@ -418,13 +422,16 @@ def files_of(path: Path, names: Mapping[str, str]) -> dict[str, Path]:
             return files_of(fitting[0], names)
     else:
         folder = path.parent
-        fits = [re.fullmatch(re.escape(Path(name).name).replace(r'\*', '(.*)'), path.name)
-                for name in names.values()]
-        fit = next(filter(None, fits), None)
+        fits = filter(None, (re.fullmatch(
+            re.escape(Path(name).name).replace(r'\*', '(.*)'), path.name)
+            for name in names.values()))
+        # Of q*.csv and qd*.csv the second is what qd_run.csv is.
+        fit = min(fits, key=lambda fit: sum(map(len, fit.groups())), default=None)
         if fit is None:
             raise UnreadableFileError(
                 path, f'it is none of {", ".join(names.values())}, of which columns.files say '
-                'that they make one recording')
+                'that they make one recording: write * there for what recordings differ in, as '
+                'in q_*.csv')
         star = next(iter(fit.groups()), None)
         if len(Path(names['position']).parts) > 1:  # they may lie in folders of their own
             folder = folder.parent

@@ -15,7 +15,8 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.tree_equations import (
+from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
+from pprs_dynamics.physics.mechanism.tree_tables import (
     ANGLE,
     AXES,
     KIND,
@@ -24,7 +25,6 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     Integers,
     Model,
 )
-from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
 
 X, Y, Z = range(3)
 Row = tuple[int, tuple[int, int, int, int], tuple[float, float]]

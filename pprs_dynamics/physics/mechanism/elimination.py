@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.tree_equations import (
+from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
+from pprs_dynamics.physics.mechanism.tree_tables import (
     DRIVE_OF,
     JOINT,
     KIND,
@@ -29,7 +30,6 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     Integers,
     Model,
 )
-from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
 
 PIVOT = 0.1  # of the largest number in its column: the least that a pivot is at home
 

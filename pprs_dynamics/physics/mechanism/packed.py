@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.mechanism.tree_equations import (
+from pprs_dynamics.physics.mechanism.tree_tables import (
     OF_FORCES,
     OF_LINK,
     Data,

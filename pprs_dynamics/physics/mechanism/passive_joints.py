@@ -12,7 +12,7 @@ import numpy as np
 from pprs_dynamics.physics.mechanism.places import PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.structure import Structure
-from pprs_dynamics.physics.mechanism.tree_equations import JointFriction
+from pprs_dynamics.physics.mechanism.tree_tables import JointFriction
 
 ROTATING = ('spherical', 'revolute', 'universal')
 

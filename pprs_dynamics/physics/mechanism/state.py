@@ -17,12 +17,8 @@ from pprs_dynamics.physics.mechanism.places import BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.structure import Structure
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
-from pprs_dynamics.physics.mechanism.tree_equations import (
-    JOINT_EFFORT,
-    TRANSMITTED,
-    JointFriction,
-)
 from pprs_dynamics.physics.mechanism.tree_evaluation import NO_FRICTION, InverseDynamicsResult
+from pprs_dynamics.physics.mechanism.tree_tables import JOINT_EFFORT, TRANSMITTED, JointFriction
 from pprs_dynamics.system.parallel import lazy
 
 
@@ -123,7 +119,7 @@ class Robot(Protocol):
         """Return how far a motion stays from singular states: 0 at the limit, at most 1."""
 
     def variables(self, state: MechanismState) -> dict[str, Array]:
-        """Return the variables that an error may depend on beside time and drive motion."""
+        """Return the variables that an error may depend on, except time and drive motion."""
 
     def require_bodies(self, key: str, value: Any) -> None:
         """Raise ModelError, of a key and its value, for bodies that cannot be."""

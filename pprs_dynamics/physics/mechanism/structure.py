@@ -38,8 +38,8 @@ from pprs_dynamics.physics.mechanism.elimination import (
     with_actuated_coordinates,
     with_elimination_order,
 )
-from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Integers, Model
 from pprs_dynamics.physics.mechanism.tree_evaluation import Evaluation, constraint_jacobian
+from pprs_dynamics.physics.mechanism.tree_tables import TRANSLATION, Integers, Model
 
 # Drives move by these between closings when a motion is walked to.
 STRIDE_TURN, STRIDE_SLIDE = 0.1, 0.1  # [rad], and of the mechanism's size

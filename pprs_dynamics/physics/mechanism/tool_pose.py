@@ -33,7 +33,7 @@ from pprs_dynamics.physics.mechanism.structure import (
     Structure,
     path_to_base,
 )
-from pprs_dynamics.physics.mechanism.tree_equations import TRANSLATION, Integers, Model
+from pprs_dynamics.physics.mechanism.tree_tables import TRANSLATION, Integers, Model
 
 COORDINATES = ('x', 'y', 'z', 'yaw', 'pitch', 'roll')
 SLIDES = 3  # the first of them

@@ -28,19 +28,7 @@ from pprs_dynamics.physics.mechanism.packed import (
     views,
 )
 from pprs_dynamics.physics.mechanism.tree_equations import (
-    EFFORTS,
-    JOINT_EFFORT,
-    OF_DRIVE,
-    OPEN,
-    STEPS,
-    TRANSMITTED,
     WARM_STEPS,
-    WIDTH,
-    Data,
-    Integers,
-    JointFriction,
-    Loads,
-    Model,
     actuator_efforts,
     close_loops,
     constraint_forces,
@@ -54,6 +42,20 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     predict,
     residual,
     update_frame_placements,
+)
+from pprs_dynamics.physics.mechanism.tree_tables import (
+    EFFORTS,
+    JOINT_EFFORT,
+    OF_DRIVE,
+    OPEN,
+    STEPS,
+    TRANSMITTED,
+    WIDTH,
+    Data,
+    Integers,
+    JointFriction,
+    Loads,
+    Model,
 )
 
 # Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of

@@ -74,7 +74,7 @@ class DriveModel:
     robot : Mechanism or ThreePprs
         Bodies and joints; effects take their parameters from it.
     effects : tuple of Effect
-        What acts beside the rigid body; the model's own friction comes first.
+        What acts in addition to the rigid body; the model's own friction comes first.
     reversal : Reversal
     limits : DriveLimits
     values : mapping
@@ -389,7 +389,7 @@ class DriveModel:
 
     @cached_property
     def _added(self) -> tuple[Effect, ...]:
-        """Effects that the one pass leaves to be added."""
+        """Effects that are not part of the one pass."""
         own = self._one_pass.OWN
         return tuple(effect for effect in self.effects if not isinstance(effect, own))
 
@@ -527,7 +527,7 @@ class DriveModel:
         return np.sum(errors, axis=0) if errors else np.zeros_like(transmitted)
 
     def windup_error(self, transmitted: Array, windup: Array) -> Array:
-        """Return what second encoders say beside that, of position and its rates, (3, N, D)."""
+        """Return the further errors of second encoders, of position and its rates, (3, N, D)."""
         errors: Array = np.sum([one.windup_error(self.drives, transmitted, windup)
                                 for one in self.misreadings], axis=0)
         return errors

@@ -330,7 +330,7 @@ NODE_PREFIXES = ('qos_overrides.',)
 
 
 def as_list(value: Any) -> Any:
-    """Return a tuple as the list that a file holds for it, and any other value as it is."""
+    """Return a tuple as a list, as in a file, and any other value unchanged."""
     return list(value) if isinstance(value, tuple) else value
 
 

@@ -7,10 +7,9 @@ A file that exists is edited: what does not change keeps its place and its comme
 diff against the old one shows what was changed and nothing else. The blocks `effects` and
 the ledger, which commands write, are written anew at the end of the model and of the file.
 
-A library that keeps comments, ruamel.yaml, formats the whole file anew. Of 15 forms in which a
-model file may be written it changed untouched lines in nine: four spaces of indentation (40
-lines), values in a column, spaces within brackets, lists over several lines, `~`, `.1E-2`, an
-anchor, what follows `---`. It also writes 1e-05, which is a word for YAML 1.1. Hence an editor.
+A library that keeps comments, ruamel.yaml, formats the whole file anew. It changed untouched
+lines in nine of 15 forms of a model file, among them indentation by four spaces, values in a
+column and lists over several lines. It also writes 1e-05, which is a word for YAML 1.1.
 """
 
 from __future__ import annotations

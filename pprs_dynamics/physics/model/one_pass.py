@@ -25,7 +25,8 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_sample import motion_sample
 from pprs_dynamics.physics.mechanism.reversal import Reversal, smooth_sign
 from pprs_dynamics.physics.mechanism.state import MechanismState
-from pprs_dynamics.physics.mechanism.tree_equations import (
+from pprs_dynamics.physics.mechanism.tree_evaluation import InverseDynamicsResult
+from pprs_dynamics.physics.mechanism.tree_tables import (
     ARMATURE,
     COULOMB,
     DRIVE_FRICTION,
@@ -38,7 +39,6 @@ from pprs_dynamics.physics.mechanism.tree_equations import (
     WIDTH,
     JointFriction,
 )
-from pprs_dynamics.physics.mechanism.tree_evaluation import InverseDynamicsResult
 from pprs_dynamics.physics.mechanism.vectors import Vector
 from pprs_dynamics.physics.model.forces import (
     ACTIVE_FRICTION,

@@ -24,7 +24,7 @@ def prepare(model: DriveModel) -> None:
     """Evaluate a model once, both ways, alone and in a batch.
 
     A robot that cannot be at home refuses it, after what is needed has been compiled. Effects that
-    fail are told of when they are asked for an answer.
+    fail raise their error in the first real call.
     """
     home = model.robot.at_home(SAMPLES)
     with suppress(PprsError):

@@ -103,8 +103,7 @@ def recorded_columns(values: Mapping[str, Any], drives: Sequence[str]) -> Record
         For keys that are none, columns that are neither names nor numbers, scales and rates that
         are no numbers.
     """
-    # Model files of before call the factor of efforts `scale`.
-    given = {key.removeprefix(COLUMNS).replace('.scale', '.effort_scale'): value
+    given = {key.removeprefix(COLUMNS): value
              for key, value in values.items() if key.startswith(COLUMNS)}
     if not given:
         return None

@@ -160,7 +160,7 @@ def coupled(description: Description) -> list[Transmission]:
 
 
 def described_values(structure: Structure, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return keys and values that the file leaves to the description, complete with defaults.
+    """Return keys and values that a description gives where the file is silent, with defaults.
 
     Raises
     ------

@@ -10,8 +10,8 @@ which the n_i add up to nothing, speaks of omega alone,
     m . omega = b,    m = sum of balance_i m_i,    b = sum of balance_i q_dot_i.
 
 With v_x and v_y put in, row i of the lifts says s_i v_z + g_i . omega = b_i, s_i = sin u_i. These
-four equations are solved by Cramer's rule; their determinant is a constant times det [B], so it
-tells one assembly mode from the other. There is no pivot to choose, and nothing is divided by
+four equations are solved by Cramer's rule; their determinant is a constant times det [B], so its
+sign distinguishes the assembly modes. There is no pivot to choose, and nothing is divided by
 but the determinant.
 """
 

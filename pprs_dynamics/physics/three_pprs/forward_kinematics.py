@@ -4,10 +4,9 @@
 """Forward kinematics: the platform's pose from drive positions, by Newton-Raphson on Eq. (3).
 
 Six drive positions belong to several poses. The solver therefore follows the branch: it moves
-from a known pose to the wanted drive positions in steps, and accepts only poses whose det [B]
-has the sign that it has at the home pose, and whose rods lean as `geometry.elbow` demands. These
-two conditions alone do not single out one pose: others that meet them are turned by more than
-150 degrees against it, and are found only from a seed that lies there.
+from a known pose to the wanted drive positions in steps. It accepts only poses whose det [B] has
+the sign of the home pose, and whose rods lean as `geometry.elbow` demands. Other poses that meet
+both conditions are turned by more than 150 degrees; only a seed near them leads there.
 """
 
 from __future__ import annotations
@@ -104,7 +103,7 @@ def solve_forward_kinematics(
     ConvergenceError
         Where no pose of the home pose's assembly mode is found.
     SingularityError
-        Where the geometry's home pose is itself singular, so that it tells no mode.
+        Where the geometry's home pose is itself singular.
     """
     q = checked_matrix('drive positions', drive_positions, 6)
     home = home_pose()

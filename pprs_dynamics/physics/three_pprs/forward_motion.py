@@ -7,10 +7,9 @@ Positions by forward kinematics. Rates from Eq. (4), A q_dot = B X_dot, and from
 
     B X_ddot = A q_ddot + (d/dt A) q_dot - (d/dt B) X_dot,
 
-of which the last two terms are written in closed form. They say that A_i stays in its chain's
-plane and at the distance l from C_i: with c_i = omega x (omega x rho_i), the centripetal
-acceleration of A_i about o, they are -n_i . c_i for the slides and -(d_i . c_i + l u_dot_i^2)
-for the lifts.
+of which the last two terms have a closed form. The centripetal acceleration of A_i about o is
+c_i = omega x (omega x rho_i). A_i stays in its chain's plane: the terms of the slides are
+-n_i . c_i. It stays at the distance l from C_i: those of the lifts are -(d_i . c_i + l u_dot_i^2).
 """
 
 from __future__ import annotations

@@ -7,15 +7,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from pprs_dynamics.arrays import Array, Sample, Value
+from pprs_dynamics.arrays import Value
 from pprs_dynamics.physics.mechanism.arithmetic import sqrt
-from pprs_dynamics.physics.mechanism.evaluation import KernelParameters, evaluate
 from pprs_dynamics.physics.mechanism.reversal import sign_over_speed
 from pprs_dynamics.physics.mechanism.vectors import ChainVector
-from pprs_dynamics.physics.three_pprs.chains import CHAINS
-from pprs_dynamics.physics.three_pprs.inverse_kinematics import read_chains
 
 
 class Turnover(NamedTuple):
@@ -39,24 +34,3 @@ def turnover(u_dot: Value, omega: ChainVector, width: Value) -> Turnover:
     """Return the turnover of friction in the joints of a chain, within `width` [rad/s]."""
     return Turnover(sign_over_speed(abs(u_dot), width),
                     sign_over_speed(length(relative_rate(u_dot, omega)), width))
-
-
-def turnover_table(chains: Array, width: float) -> Array:
-    """Return `turnover` for a table of chains: C_i, then A_i, (N, 6)."""
-    table = np.empty((len(chains), 6))
-    evaluate(turnover_kernel, KernelParameters(TurnoverParameters(width)), chains, table)
-    return table
-
-
-class TurnoverParameters(NamedTuple):
-    """Parameters of `turnover_kernel`: the width in which friction turns over [rad/s]."""
-
-    width: Value
-
-
-def turnover_kernel(p: TurnoverParameters, s: Sample, chains: Array, table: Array) -> Any:
-    """Fill a table of `turnover`."""
-    rods = read_chains(chains, s)
-    for i in range(CHAINS):
-        table[s, i], table[s, CHAINS + i] = turnover(rods[i].u_dot, rods[i].omega, p.width)
-    return True

@@ -17,10 +17,9 @@ REVOLUTE, SPHERICAL = 'revolute', 'spherical'  # names of the joints C_i and A_i
 class Chain(NamedTuple):
     """Constants of one chain.
 
-    `cos` and `sin` of delta_i; `x`, `y` of the spherical joint in `platform` [m]. The slides
-    alone say how the platform moves horizontally, (v_x, v_y) = sum of (`left_x`, `left_y`) times
-    the speed of A_i along n_i, and one thing more: the sum of `balance` times these speeds is 0
-    for a platform that does not turn.
+    `cos` and `sin` of delta_i; `x`, `y` of the spherical joint in `platform` [m].
+    With s_i, the speed of A_i along n_i, (v_x, v_y) = sum of (`left_x`, `left_y`) s_i. The sum
+    of `balance` s_i is 0 for a platform that does not turn.
     """
 
     cos: Value
@@ -86,7 +85,7 @@ class Joints(NamedTuple):
 
     @classmethod
     def of(cls, blocks: Mapping[str, Mapping[str, float]], width: float) -> Joints:
-        """Return the friction of blocks `revolute` and `spherical`; 0 for what is left out.
+        """Return the friction of blocks `revolute` and `spherical`; 0 by default.
 
         Parameters
         ----------

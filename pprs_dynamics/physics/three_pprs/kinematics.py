@@ -13,10 +13,9 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.three_pprs.geometry import Geometry
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import ChainKinematics, chain_table
-from pprs_dynamics.physics.three_pprs.jacobians import Jacobians, inverse_table
-from pprs_dynamics.physics.three_pprs.joint_rates import turnover_table
+from pprs_dynamics.physics.three_pprs.jacobians import drive_jacobian, inverse_table
 from pprs_dynamics.physics.three_pprs.kernel_parameters import REVOLUTE, Joints
-from pprs_dynamics.physics.three_pprs.passive_joints import resistance_table, transferred
+from pprs_dynamics.physics.three_pprs.passive_joints import solve_friction
 from pprs_dynamics.physics.three_pprs.rigid_body import RigidBody
 
 
@@ -42,7 +41,6 @@ class PlatformKinematics:
     ) -> None:
         self.geometry, self.motion = geometry, motion
         self.minimum_sine, self.condition_limit = minimum_sine, condition_limit
-        self._turnover: tuple[float, Array] | None = None
 
     @cached_property
     def chain_table(self) -> Array:
@@ -66,16 +64,9 @@ class PlatformKinematics:
         return ChainKinematics.from_table(self.chain_table)
 
     @cached_property
-    def jacobians(self) -> Jacobians:
-        """Jacobians of the mechanism."""
-        return Jacobians(self.geometry, self.chains, self.inverse_table.reshape(-1, 6, 6))
-
-    def turnover(self, width: float) -> Array:
-        """Return sgn(s) / s of the joints C_i, then A_i, (N, 6), within `width` [rad/s]."""
-        if self._turnover is None or self._turnover[0] != width:
-            # The last one only: a fit tries many widths.
-            self._turnover = width, turnover_table(self.chain_table, width)
-        return self._turnover[1]
+    def J(self) -> Array:
+        """[J], X_dot = J q_dot, (N, 6, 6)."""
+        return drive_jacobian(self.inverse_table, self.chains.sin_u)
 
     @property
     def tool_velocity(self) -> Array:
@@ -89,12 +80,15 @@ class PlatformKinematics:
 
     def resistances(self, loads: RigidBody, joints: Joints) -> Array:
         """Return k_ri and k_si at the frictionless reactions, (N, 6) [N m s/rad], Eq. (9)."""
-        return resistance_table(joints, loads.reaction_table, self.turnover(joints.width))
+        return self._friction(loads, joints)[0]
 
     def friction(self, loads: RigidBody, joints: Joints) -> Array:
         """Return the drive forces against friction of passive joints, (N, 6) [N].
 
         By virtual power: a virtual motion of a drive moves every passive joint, Eq. (12).
         """
-        return transferred(self.geometry.kernel_parameters, self.chain_table, self.inverse_table,
-                           self.resistances(loads, joints), joints.printed)
+        return self._friction(loads, joints)[1]
+
+    def _friction(self, loads: RigidBody, joints: Joints) -> tuple[Array, Array]:
+        return solve_friction(self.geometry.kernel_parameters, joints, self.chain_table,
+                              self.inverse_table, loads.reaction_table)

@@ -96,7 +96,7 @@ class IndependentChainsFriction(PassiveFriction):
     Notes
     -----
     An approximation in either form: it is unbounded where cos u_i = 0, where it refuses, and
-    even with the signs mended its friction power can be negative. Use it to reproduce the
+    even with the signs corrected its friction power can be negative. Use it to reproduce the
     paper, not to drive a robot.
     """
 

@@ -23,7 +23,7 @@ from pprs_dynamics.physics.three_pprs.closure import (
     rod_row,
 )
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import ThreeChains, read_chains
-from pprs_dynamics.physics.three_pprs.joint_rates import Turnover, relative_rate
+from pprs_dynamics.physics.three_pprs.joint_rates import Turnover, relative_rate, turnover
 from pprs_dynamics.physics.three_pprs.kernel_parameters import GeometryParameters, Joints
 
 
@@ -96,64 +96,47 @@ def _lift_forces(i: int, w: Wrench, inverse: Inverse, rods: ThreeChains) -> Any:
     return rods[i].sin_u * power(w, inverse.columns.lifts[i])                  # Eq. (11)
 
 
-class TransferParameters(NamedTuple):
-    """Parameters of `transfer_kernel`: `printed` is 1 for Eq. (12) to the letter, else 0."""
+class FrictionParameters(NamedTuple):
+    """Parameters of `friction_kernel`."""
 
     geometry: GeometryParameters
-    printed: Value
+    joints: Joints
 
 
-def transfer_kernel(
-    p: TransferParameters, s: Sample, chains: Array, inverse: Array, resistances: Array,
-    force: Array,
+def friction_kernel(
+    p: FrictionParameters, s: Sample, chains: Array, inverse: Array, reactions: Array,
+    resistances: Array, force: Array,
 ) -> Any:
-    """Fill a table of forces from one of k_r, k_s."""
-    _write_forces(force, s, friction_forces(
-        p.geometry, read_chains(chains, s), read_inverse(inverse, s),
-        _read_resistances(resistances, s), p.printed))
-    return True
-
-
-@each_chain
-def _read_resistances(i: int, resistances: Any, s: Sample) -> JointResistance:
-    return JointResistance(resistances[s, i], resistances[s, CHAINS + i])
-
-
-def resistance_kernel(
-    p: Joints, s: Sample, reactions: Array, turnover: Array, resistances: Array,
-) -> Any:
-    """Fill a table of k_r, k_s."""
-    k = _resistances_at(p, reactions, turnover, s)
+    """Fill tables of k_r, k_s and of the drive forces that overcome them."""
+    rods = read_chains(chains, s)
+    k = _resistances_at(p.joints, rods, reactions, s)
+    forces = friction_forces(p.geometry, rods, read_inverse(inverse, s), k, p.joints.printed)
     for i in range(CHAINS):
         resistances[s, i], resistances[s, CHAINS + i] = k[i].revolute, k[i].spherical
+        force[s, i], force[s, CHAINS + i] = forces.slides[i], forces.lifts[i]
     return True
 
 
 @each_chain
 def _resistances_at(
-    i: int, joints: Joints, reactions: Any, turnover: Any, s: Sample,
+    i: int, joints: Joints, rods: ThreeChains, reactions: Any, s: Sample,
 ) -> JointResistance:
     return joint_resistances(
         joints, reactions[s, i], reactions[s, 3 + i], reactions[s, 6 + i], reactions[s, 12 + i],
-        reactions[s, 15 + i], Turnover(turnover[s, i], turnover[s, CHAINS + i]))
+        reactions[s, 15 + i], turnover(rods[i].u_dot, rods[i].omega, joints.width))
 
 
-def _write_forces(force: Any, s: Sample, forces: DriveValues) -> None:
-    for i in range(CHAINS):
-        force[s, i], force[s, CHAINS + i] = forces.slides[i], forces.lifts[i]
+def solve_friction(geometry: KernelParameters[GeometryParameters], joints: Joints, chains: Array,
+                   inverse: Array, reactions: Array) -> tuple[Array, Array]:
+    """Return k_r and k_s, (N, 6) [N m s/rad], and the drive forces that overcome them, (N, 6) [N].
 
-
-def resistance_table(joints: Joints, reactions: Array, turnover: Array) -> Array:
-    """Return k_r and k_s, (N, 6), from tables of reactions and of turnovers."""
-    k = np.empty(turnover.shape)
-    evaluate(resistance_kernel, KernelParameters(joints), reactions, turnover, k)
-    return k
-
-
-def transferred(geometry: KernelParameters[GeometryParameters], chains: Array, inverse: Array,
-                k: Array, printed: float) -> Array:
-    """Return the drive forces that overcome k_r and k_s, (N, 6) [N m s/rad], (N, 6) [N]."""
-    force = np.empty(k.shape)
-    evaluate(transfer_kernel, geometry.extended(TransferParameters, printed), chains, inverse, k,
-             force)
-    return force
+    Parameters
+    ----------
+    geometry, joints : parameters
+    chains, inverse, reactions : arrays
+        See `chain_table`, `inverse_table` and `RigidBody`.
+    """
+    k, force = np.empty((2, len(chains), 6))
+    evaluate(friction_kernel, geometry.extended(FrictionParameters, joints), chains, inverse,
+             reactions, k, force)
+    return k, force

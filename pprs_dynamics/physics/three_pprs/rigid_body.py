@@ -118,9 +118,10 @@ class ChainForces(NamedTuple):
 def platform_wrench(body: PlatformBody, g: Vector, m: MotionSample) -> Wrench:
     """Return the wrench about o that moves platform and payload, in `base` [N, N m].
 
-    Left side of Eq. (6) minus weight, with the centre of mass anywhere: with d its vector from
-    o, force (M + m)(a_o + eps x d + omega x (omega x d) - g) and moment
-    [I]eps + omega x [I]omega + d x force.
+    Left side of Eq. (6) minus weight, with the centre of mass anywhere. With d its vector from o:
+
+        force = (M + m)(a_o + eps x d + omega x (omega x d) - g)
+        moment = [I]eps + omega x [I]omega + d x force
     """
     d = turned(m.rotation, body.centre)
     a_centre = plus(m.a, plus(product(m.epsilon, d), product(m.omega, product(m.omega, d))))
@@ -273,7 +274,7 @@ def solve_bodies(
     printed : bool
         Take Eq. (7) to the letter, which lacks the factor l in its rod term.
     load : StructureLoad, optional
-        Loads beside bodies and gravity.
+        Loads in addition to bodies and gravity.
     """
     samples = len(motion)
     force, guide_load = np.empty((samples, 6)), np.empty((samples, 6))

@@ -1,0 +1,316 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tables of a tree of joints with closures: what it is, how it moves, and what it transmits.
+
+Row 0 of all tables of joints is the base.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+
+Integers = np.typing.NDArray[np.int_]
+
+TRANSLATION, ANGLE = 0, 1  # kinds of rows
+# Rows of tables of vectors: of a joint's frame, a closure's frames, a link's motion, a closure's
+# motion, and forces; a frame's orientation is three rows.
+PLACE_R, PLACE_P, AXIS, OF_FRAME = 0, 3, 4, 5
+A_R, A_P, B_R, B_P, OF_CLOSURE = 0, 3, 4, 7, 8
+R, P, Z, W, U, WD, UD, OF_LINK = 0, 3, 4, 5, 6, 7, 8, 9
+FORCE, MOMENT, OF_FORCES = 0, 1, 2
+# Columns of tables of whole numbers.
+PARENT, TURNS, COORDINATE = 0, 1, 2
+PASSIVE_OF, DRIVE_OF = 0, 1
+LOOP_A, LOOP_B, PATH_START, PATH_END = 0, 1, 2, 3
+LOOP, KIND, AXES = 0, 1, 2
+JOINT, SIGN = 0, 1
+UNIT = 2  # column of `row_reals`
+# Of `Data.solution`.
+OPEN, DETERMINANT, CONDITION, STEPS = 0, 1, 2, 3
+
+
+def _part(table: Array, of: int, at: int | slice) -> Array:
+    """Return a row, or some, of each group of `of` rows of vectors."""
+    return table.reshape(*table.shape[:-2], -1, of, 3)[..., at, :]
+
+
+class Model(NamedTuple):
+    """A mechanism as tables; joints are 1 .. J, in an order in which parents come first.
+
+    They are few: what compiled functions take costs by the number of arrays.
+
+    Parameters
+    ----------
+    joints : (J + 1, 3) int array
+        Parent, whether it turns, coordinate.
+    frames : ((J + 1) OF_FRAME, 3) array
+        Frame at position 0 in the parent's, and axis in the joint's.
+    ratio, offset : (J + 1,) arrays
+        A joint's position is ratio q[coordinate] + offset.
+    passive, drives : int arrays
+        Coordinates that closures determine, and those that are given.
+    places : (C, 2) int array
+        Place of each coordinate among them, or -1.
+    stride : (D,) array
+        By which drives move between closings.
+    closures : (L, 4) int array
+        Joints whose links it connects; where its path begins and ends.
+    closure_frames : (L OF_CLOSURE, 3) array
+        Frames A and B there.
+    rows : (r, 6) int array
+        Closure, kind, and four axes. Translation along the first (axis of A); angle: axis of A,
+        axis of B, and a second pair. The first rows, as many as passive coordinates, determine
+        these; the others follow from them at home.
+    row_reals : (r, 3) array
+        Weights of the two pairs; the mechanism's size for lengths, 1 for angles: the unit in which
+        conditioning is judged.
+    passive_unit : (passive,) array
+        The same for coordinates.
+    path : (K, 2) int array
+        Joints between closures' two links, and 1 on the side of B, -1 on that of A.
+    starts : (passive + 1, 3) int array
+        Where lists begin in `swap`, `below` and `right`.
+    swap, below, right : int arrays
+        The order in which J_p is eliminated; see `elimination`.
+    """
+
+    joints: Integers
+    passive: Integers
+    drives: Integers
+    places: Integers
+    closures: Integers
+    rows: Integers
+    path: Integers
+    starts: Integers
+    swap: Integers
+    below: Integers
+    right: Integers
+    frames: Array
+    ratio: Array
+    offset: Array
+    stride: Array
+    closure_frames: Array
+    row_reals: Array
+    passive_unit: Array
+
+    @property
+    def parent(self) -> Integers:
+        """Parent of each joint, (J + 1,)."""
+        return self.joints[:, PARENT]
+
+    @property
+    def turns(self) -> Integers:
+        """Whether each joint turns, (J + 1,)."""
+        return self.joints[:, TURNS]
+
+    @property
+    def coordinate(self) -> Integers:
+        """Coordinate of each joint, (J + 1,)."""
+        return self.joints[:, COORDINATE]
+
+    @property
+    def place_R(self) -> Array:
+        """Orientation of each joint in its parent, (J + 1, 3, 3)."""
+        return _part(self.frames, OF_FRAME, slice(PLACE_R, PLACE_R + 3))
+
+    @property
+    def place_p(self) -> Array:
+        """Origin of each joint in its parent, (J + 1, 3)."""
+        return _part(self.frames, OF_FRAME, PLACE_P)
+
+    @property
+    def axis(self) -> Array:
+        """Axis of each joint, (J + 1, 3)."""
+        return _part(self.frames, OF_FRAME, AXIS)
+
+    @property
+    def loop_a(self) -> Integers:
+        """Joints whose links are A of each closure, (L,)."""
+        return self.closures[:, LOOP_A]
+
+    @property
+    def loop_b(self) -> Integers:
+        """Joints whose links are B of each closure, (L,)."""
+        return self.closures[:, LOOP_B]
+
+    @property
+    def a_R(self) -> Array:
+        """Orientation of the frames A in their links, (L, 3, 3)."""
+        return _part(self.closure_frames, OF_CLOSURE, slice(A_R, A_R + 3))
+
+    @property
+    def a_p(self) -> Array:
+        """Origins of the frames A in their links, (L, 3)."""
+        return _part(self.closure_frames, OF_CLOSURE, A_P)
+
+    @property
+    def b_R(self) -> Array:
+        """Orientation of the frames B in their links, (L, 3, 3)."""
+        return _part(self.closure_frames, OF_CLOSURE, slice(B_R, B_R + 3))
+
+    @property
+    def b_p(self) -> Array:
+        """Origins of the frames B in their links, (L, 3)."""
+        return _part(self.closure_frames, OF_CLOSURE, B_P)
+
+    @property
+    def row_unit(self) -> Array:
+        """Units of the rows, (r,)."""
+        return self.row_reals[:, UNIT]
+
+
+class Data(NamedTuple):
+    """Motion of joints and links; per sample, vectors in the base's frame.
+
+    Parameters
+    ----------
+    q, v, a : (C,) arrays
+        Of all coordinates.
+    links : ((J + 1) OF_LINK, 3) array
+        Orientation, origin, axis, angular and linear velocity and acceleration of each joint's
+        link, at its origin.
+    loops : (L OF_CLOSURE, 3) array
+        Frames of the closures.
+    drive_to_joint : (C, D) array
+        T: rates of all coordinates per rate of each drive.
+    inverse : (passive, passive + D) array
+        J_p^-1, and J_p^-1 J_a.
+    solution : (4,) array
+        Largest row before the last step (OPEN); determinant and condition number of J_p; steps of
+        Newton in the last stride.
+    J, by_drives, residuals : arrays
+        Scratch: J_p during its elimination, J_a, and rows.
+    """
+
+    q: Any
+    v: Any
+    a: Any
+    links: Any
+    loops: Any
+    drive_to_joint: Any
+    inverse: Any
+    solution: Any
+    J: Any
+    by_drives: Any
+    residuals: Any
+
+    @property
+    def R(self) -> Any:
+        """Orientation of each joint's link, (N, J + 1, 3, 3)."""
+        return _part(self.links, OF_LINK, slice(R, R + 3))
+
+    @property
+    def p(self) -> Any:
+        """Its origin, (N, J + 1, 3)."""
+        return _part(self.links, OF_LINK, P)
+
+    @property
+    def z(self) -> Any:
+        """Axis of each joint."""
+        return _part(self.links, OF_LINK, Z)
+
+    @property
+    def w(self) -> Any:
+        """Angular velocity of its link."""
+        return _part(self.links, OF_LINK, W)
+
+    @property
+    def u(self) -> Any:
+        """Velocity of its origin."""
+        return _part(self.links, OF_LINK, U)
+
+    @property
+    def wd(self) -> Any:
+        """Angular acceleration of its link."""
+        return _part(self.links, OF_LINK, WD)
+
+    @property
+    def ud(self) -> Any:
+        """Acceleration of its origin."""
+        return _part(self.links, OF_LINK, UD)
+
+    @property
+    def A(self) -> Any:
+        """Orientation of the closures' frames A, (N, L, 3, 3)."""
+        return _part(self.loops, OF_CLOSURE, slice(A_R, A_R + 3))
+
+    @property
+    def pA(self) -> Any:
+        """Their origins, (N, L, 3)."""
+        return _part(self.loops, OF_CLOSURE, A_P)
+
+    @property
+    def B(self) -> Any:
+        """Orientation of the closures' frames B."""
+        return _part(self.loops, OF_CLOSURE, slice(B_R, B_R + 3))
+
+    @property
+    def pB(self) -> Any:
+        """Their origins."""
+        return _part(self.loops, OF_CLOSURE, B_P)
+
+
+class Loads(NamedTuple):
+    """Forces of N samples; per sample, in the base's frame.
+
+    Parameters
+    ----------
+    links : ((J + 1) OF_FORCES, 3) array
+        What each joint transmits to its link: force, and moment about its origin.
+    loops : (L OF_FORCES, 3) array
+        What the link of A does to that of B in each closure: force and moment.
+    tau, tau_friction : (C,) arrays
+        Efforts of the tree's coordinates: of the bodies, and against friction of joints.
+    efforts : (D,) array
+        Of the drives.
+    """
+
+    links: Any
+    loops: Any
+    tau: Any
+    tau_friction: Any
+    efforts: Any
+
+    @property
+    def f(self) -> Any:
+        """Forces that joints transmit, (N, J + 1, 3)."""
+        return _part(self.links, OF_FORCES, FORCE)
+
+    @property
+    def n(self) -> Any:
+        """Moments that joints transmit about their origins."""
+        return _part(self.links, OF_FORCES, MOMENT)
+
+    @property
+    def F(self) -> Any:
+        """Forces in the closures, (N, L, 3)."""
+        return _part(self.loops, OF_FORCES, FORCE)
+
+
+class JointFriction(NamedTuple):
+    """Friction of passive joints and closures, each (F,).
+
+    joint, loop : int arrays
+        One of both; the other is -1.
+    viscous [N m s/rad, N s/m], torque [N m, N], lever [m, 1] : arrays
+        Dry friction is torque + lever load.
+    width : array
+        In which sgn turns over [rad/s, m/s].
+    """
+
+    joint: Any
+    loop: Any
+    viscous: Any
+    torque: Any
+    lever: Any
+    width: Any
+
+
+# Rows of the parameters of drives, and of the efforts that follow from them.
+ARMATURE, VISCOUS, COULOMB, OFFSET, WIDTH, OF_DRIVE = 0, 1, 2, 3, 4, 5
+TOTAL, RIGID, DRIVE_FRICTION, JOINT_EFFORT, TRANSMITTED, EFFORTS = 0, 1, 2, 3, 4, 5

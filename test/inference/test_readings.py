@@ -1,0 +1,190 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""Recordings of people's machines, made up: held poses, slow joints, free motors, odd efforts."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_up_files import ARM, arm_efforts, motion
+from pprs_command import pprs
+
+from pprs_dynamics.app.api.diagnose import diagnose
+from pprs_dynamics.app.api.first_model import first_model
+from pprs_dynamics.app.api.fit import fit
+from pprs_dynamics.errors import UnreadableFileError
+from pprs_dynamics.inference.readings.check import find_mistakes
+from pprs_dynamics.inference.readings.findings import OtherReading
+from pprs_dynamics.measurement.files.recording import Recording, read_recording
+from pprs_dynamics.physics.model.drive_model import DriveModel
+
+DRIVES = ('shoulder', 'elbow')
+MOTOR = ('<robot name="motor"><link name="base"/><joint name="motor" type="revolute"><parent '
+         'link="base"/><child link="rotor"/><axis xyz="0 0 1"/><limit lower="-6.3" upper="6.3" '
+         'effort="2" velocity="9"/></joint><link name="rotor"><inertial><mass value="0.3"/>'
+         '<inertia ixx="0.001" iyy="0.001" izz="0.003" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+         '</robot>')
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> DriveModel:
+    (tmp_path / 'arm.urdf').write_text(ARM)
+    return first_model(tmp_path / 'arm.urdf', output=tmp_path / 'arm.yaml').model
+
+
+def run(seed: int = 0) -> tuple[np.ndarray, ...]:
+    """Return time, positions, velocities and efforts of an arm in motion."""
+    random = np.random.default_rng(seed)
+    time, q, v, a = motion(random, 2, 1.0)
+    return time, q, v, arm_efforts(q, v, a) + random.normal(0, 0.03, q.shape)
+
+
+def told(model: DriveModel, time: np.ndarray, q: np.ndarray, effort: np.ndarray) -> str:
+    """Return all mistakes of a recording as one text."""
+    found = find_mistakes(model, Recording.from_arrays('run', time, q, None, effort, model.drives))
+    return '; '.join(each.what for each in found)
+
+
+def test_held_poses_show_the_offset_of_a_sensor(arm: DriveModel) -> None:
+    random = np.random.default_rng(3)
+    poses = np.repeat(random.uniform(-1.5, 1.5, (40, 2)), 30, axis=0)
+    time = np.repeat(3.0 * np.arange(40), 30) + np.tile(np.arange(30) / 50, 40)
+    still = np.zeros_like(poses)
+    effort = arm_efforts(poses, still, still) + random.normal(0, 0.05, poses.shape) + [0, 1.3]
+    held = Recording.from_arrays('poses', time, poses + random.normal(0, 2e-5, poses.shape), None,
+                                 effort, DRIVES)
+    answer = diagnose(arm, held)
+    effect, = answer.effects
+    assert effect.name == 'effort_offset'
+    assert effect.parameters['elbow.force'].value == pytest.approx(1.3, abs=0.02)
+
+
+def test_friction_of_a_joint_at_some_milliradians_per_second_is_found(
+    arm: DriveModel, tmp_path: Path,
+) -> None:
+    time = np.arange(6000) / 50
+    w = 2 * np.pi * np.array([0.011, 0.017])
+    q = np.column_stack([0.05 * np.sin(w[0] * time), 0.06 * np.sin(w[1] * time + 1)])
+    v = np.column_stack([0.05 * w[0] * np.cos(w[0] * time), 0.06 * w[1] * np.cos(w[1] * time + 1)])
+    assert np.abs(v).max() < 0.007
+    still = np.zeros_like(q)
+    effort = arm_efforts(q, still, still) + [4.0, 2.0] * np.tanh(v / 2e-4) + [150.0, 60.0] * v
+    slow = Recording.from_arrays('slow', time, q, None, effort + np.random.default_rng(1).normal(
+        0, 0.03, q.shape), DRIVES)
+    base = fit(arm, slow).model
+    assert base.values['friction.coulomb'] == pytest.approx((4.0, 2.0), rel=0.05)
+    assert base.values['friction.viscous'] == pytest.approx((150.0, 60.0), rel=0.1)
+
+
+@pytest.mark.parametrize('constant', [True, False])
+def test_limits_of_a_motor_that_turns_freely_say_nothing(constant: bool, tmp_path: Path) -> None:
+    (tmp_path / 'motor.urdf').write_text(MOTOR)
+    model = first_model(tmp_path / 'motor.urdf', output=tmp_path / 'motor.yaml').model
+    time = np.arange(2000) / 200
+    v = 7.0 * np.tanh(time) if constant else 40 * np.sin(3 * time)
+    q, a = np.cumsum(v)[:, None] / 200, np.gradient(v, time)
+    effort = 0.003 * a + 0.02 * np.tanh(v / 0.1) + 1e-3 * v
+    effort += np.random.default_rng(0).normal(0, 1e-3, len(v))
+    assert told(model, time, q, effort[:, None]) == ''
+
+
+@pytest.mark.parametrize(('factor', 'words'), [
+    (10.197, 'as if it were in kgf cm'), (-10.197, 'in kgf cm'), (9.3, 'or in amperes'),
+    (8.0, 'it looks like currents in amperes'), (1e3, 'in mN m'), (1e-3, 'in kN m')])
+def test_a_common_factor_is_a_unit_only_near_its_constant(
+    arm: DriveModel, factor: float, words: str,
+) -> None:
+    time, q, _, effort = run(1)
+    found = told(arm, time, q, effort * factor)
+    assert words in found
+    assert factor != 8.0 or 'kgf' not in found
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_errors_of_position_and_external_torques_are_in_no_unit(arm: DriveModel, seed: int) -> None:
+    time, q, v, _ = run(seed)
+    noise = np.random.default_rng(seed).normal(0, 1, q.shape)
+    lag = told(arm, time, q, 0.05 * v + 1e-3 * noise)
+    assert 'an error of position' in lag
+    slow = np.cumsum(noise, axis=0) / len(q) ** 0.5
+    outside = told(arm, time, q, 0.1 * slow + 0.1 * noise)
+    assert 'kN' not in lag + outside
+    assert 'external torque' in outside or 'currents' not in outside
+
+
+def test_what_a_driver_calls_an_external_torque_is_one(tmp_path: Path) -> None:
+    time, q, v, effort = run()
+    (tmp_path / 'arm.urdf').write_text(ARM)
+    for columns, kind in (({'tau_ext': 0.01 * effort}, 'external'),
+                          ({'tau_ext': 0.01 * effort, 'tau_J': effort}, 'measured')):
+        named = {'q': q, 'dq': v, **columns}
+        np.savetxt(tmp_path / 'run.csv', np.column_stack([time, *named.values()]), delimiter=',',
+                   comments='', header='t,' + ','.join(
+                       f'{name}{k}' for name in named for k in (1, 2)))
+        first = first_model(tmp_path / 'arm.urdf', [tmp_path / 'run.csv'], tmp_path / 'a.yaml')
+        assert first.model.effort_kind == kind
+        assert first.has_efforts == (kind == 'measured')
+
+
+@pytest.mark.parametrize('form', ['entries', 'lists', 'lines'])
+def test_a_log_in_json_is_a_table(form: str, tmp_path: Path) -> None:
+    time, q, v, effort = (values.tolist() for values in run())
+    (tmp_path / 'arm.urdf').write_text(ARM)
+    rows = [{'timestamp': t, 'state': {'q1': a, 'q2': b}, 'load1': c, 'load2': d}
+            for t, (a, b), (c, d) in zip(time, q, effort, strict=True)]
+    content = {'entries': {'kp': 3, 'entries': rows, 'log': [{'x': 1}]},
+               'lists': {'t': time, 'q': q, 'dq': v, 'tau': effort, 'gains': [1.0, 2.0]}}
+    path = tmp_path / 'log.json'
+    path.write_text('\n'.join(map(json.dumps, rows)) if form == 'lines'
+                    else json.dumps(content[form]))
+    first = first_model(tmp_path / 'arm.urdf', [path], tmp_path / 'a.yaml')
+    read = read_recording(path, first.model.recorded)
+    np.testing.assert_allclose(read.position, q)
+    np.testing.assert_allclose(read.effort, effort)
+    path.write_text('{"text": "no table"}')
+    with pytest.raises(UnreadableFileError, match='holds no table'):
+        read_recording(path, first.model.recorded)
+
+
+@pytest.mark.parametrize(('names', 'others'), [
+    (('q_free.csv', 'tau_free.csv'), ('q_free_load.csv', 'tau_free_load.csv')),
+    (('run1-q.csv', 'run1-tau.csv'), ('run2-q.csv', 'run2-tau.csv')),
+    (('q.csv', 'tau.csv'), ('q2.csv', 'tau2.csv'))])
+def test_the_second_pair_of_files_in_a_folder_is_read_by_the_pattern_of_the_first(
+    names: tuple[str, str], others: tuple[str, str], tmp_path: Path,
+) -> None:
+    (tmp_path / 'arm.urdf').write_text(ARM)
+    for seed, pair in enumerate((names, others)):
+        _, q, _, effort = run(seed)
+        for name, values, word in zip(pair, (q, effort), ('q', 'tau'), strict=True):
+            np.savetxt(tmp_path / name, values, delimiter=',', comments='',
+                       header=f'{word}1,{word}2')
+    first = first_model(tmp_path / 'arm.urdf', [tmp_path / name for name in names],
+                        tmp_path / 'a.yaml', rate=100.0)
+    read = read_recording(tmp_path / others[0], first.model.recorded)
+    np.testing.assert_allclose(read.effort, effort)
+
+
+def test_init_shows_each_column_and_those_that_it_does_not_use(tmp_path: Path) -> None:
+    time, q, v, effort = run()
+    (tmp_path / 'arm.urdf').write_text(ARM)
+    np.savetxt(tmp_path / 'run.csv', np.column_stack([time, np.rad2deg(q), effort, v]),
+               delimiter=',', comments='', header='t,q1,q2,tau1,tau2,voltage1,voltage2')
+    answer = pprs('init', tmp_path / 'arm.urdf', tmp_path / 'run.csv', '--output',
+                  tmp_path / 'a.yaml', '--picture', tmp_path / 'a.png', columns=120)
+    assert answer.returncode == 0
+    row = next(line for line in answer.stdout.splitlines() if 'q1' in line)
+    assert all(word in row for word in ('shoulder', 'position', 'rad', '0.01745'))
+    assert 'not used: voltage1, voltage2' in answer.stdout
+    assert (tmp_path / 'a.png').stat().st_size > 5000
+
+
+def test_no_reading_is_found_where_nothing_is_wrong(arm: DriveModel) -> None:
+    for seed in range(5):
+        time, q, _, effort = run(seed)
+        found = find_mistakes(arm, Recording.from_arrays('run', time, q, None, effort, DRIVES))
+        assert not [each for each in found if isinstance(each, OtherReading)]
