@@ -130,7 +130,7 @@ def _is_allowed(model: DriveModel, motion: PlatformMotion) -> bool:
         model.limits.check_strokes(mechanism.position)
     except PprsError:
         return False
-    condition = condition_number(model.robot.geometry, mechanism.links.jacobians.J).max()
+    condition = condition_number(model.robot.geometry, mechanism.links.J).max()
     return bool(np.abs(mechanism.velocity).max() < FASTEST
                 and np.abs(mechanism.acceleration).max() < STRONGEST
                 and np.abs(mechanism.links.chains.sin_u).min() > ROD_SINE and condition < CONDITION)

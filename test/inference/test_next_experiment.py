@@ -294,7 +294,7 @@ def test_a_design_keeps_tight_limits_and_repeats_with_its_seed(model: DriveModel
     assert np.abs(forces.mechanism.acceleration).max() <= 0.45 + 1e-5
     assert forces.mechanism.motion.tilt.max() <= 0.09 + 1e-6
     tight.limits.check_strokes(forces.mechanism.position)
-    number = condition_number(tight.robot.geometry, forces.mechanism.links.jacobians.J)
+    number = condition_number(tight.robot.geometry, forces.mechanism.links.J)
     assert number.max() <= 0.9 * 2.2 + 1e-3
     assert np.abs(forces.mechanism.links.chains.sin_u).min() >= 0.5
     tight.limits.check_efforts(forces.total)

@@ -62,7 +62,7 @@ def test_names_are_those_that_the_robot_can_have(monkeypatch: pytest.MonkeyPatch
     before = names_of(MODEL)
     elsewhere, here = (type(name, (DriveEffect,), {
         'name': name.lower(), 'linear': SIZE, 'acts_in': acts_in})
-        for name, acts_in in (('Elsewhere', ('arm',)), ('Here', (MODEL.kind,))))
+        for name, acts_in in (('Elsewhere', ('mechanism',)), ('Here', (MODEL.kind,))))
     for more, count in (({'elsewhere': elsewhere}, 0), ({'here': here}, 1)):
         monkeypatch.setattr(candidates_module, 'catalogue', lambda more=more: {**CATALOGUE, **more})
         assert names_of(MODEL) == before + count

@@ -276,21 +276,6 @@ def test_a_fit_names_its_runs_and_a_diagnosis_takes_them(tmp_path: Path) -> None
         read_reference(DriveModel.load(base))
 
 
-def test_a_model_file_that_keeps_the_residual_stands_alone(
-        machine: tuple[DriveModel, Reference], tmp_path: Path) -> None:
-    model, reference = machine
-    kept = DriveModel.from_parameters(
-        {**model.values, 'reference_residual': reference.residual}, model.source)
-    path = tmp_path / 'kept.yaml'
-    write_model(path, kept.values, model.source)
-    assert path.stat().st_size < 50_000
-    design = Design.of(model, [run(model, 0, 4)])
-    error = design.residuals.error
-    carried = read_reference(DriveModel.load(path)).carried_over(design)
-    left = error - carried.shown(design.residuals)
-    assert np.all(np.nanstd(left, axis=0) < 0.35 * np.nanstd(error, axis=0))
-
-
 @pytest.mark.slow
 def test_dry_friction_of_passive_joints_is_carried_over_and_no_change() -> None:
     model = DriveModel.load(Path(__file__).parents[2] / 'config' / 'delta.yaml')

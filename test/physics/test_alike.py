@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import pickle
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,6 @@ import pytest
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
 from pprs_dynamics.physics.effects.laws.link_mass import LinkMass
-from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.mechanism.alike import alike_bodies, proportional_joints
 
 # A parallelogram in the vertical plane, and a pointer on its coupler: crank and follower turn
@@ -105,17 +103,3 @@ def test_friction_that_turns_with_a_drive_is_left_to_the_drive(
     knee = JointFrictionEffect.bound(parallelogram.robot).from_file({'knee': {'viscous': 0.3}})
     forces = knee.force(parallelogram.mechanism(motion))
     assert forces[:, 0] == pytest.approx(0.3 * motion.velocity[:, 0], abs=1e-9)
-
-
-@pytest.mark.parametrize('file', ['hexapod', 'delta'])
-def test_a_model_and_effects_on_its_links_go_to_other_processes(file: str) -> None:
-    """The workbench diagnoses in a process of its own: models and effects are pickled."""
-    model = DriveModel.load(f'config/{file}.yaml')
-    again = pickle.loads(pickle.dumps(model))
-    assert again.values == model.values
-    for effect in (LinkMass, PayloadMass, JointFrictionEffect):
-        bound = model.bound(effect)
-        assert bound is not effect
-        assert pickle.loads(pickle.dumps(bound)) is bound
-        added = bound({one.name: 0.5 for one in bound.linear})
-        assert pickle.loads(pickle.dumps(added)) == added

@@ -12,9 +12,6 @@ from numpy.testing import assert_allclose
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.inference.regression.design import Design, searched_in_drives
-from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveSamples
 from pprs_dynamics.physics.effects.laws.counterbalance import Counterbalance
 
@@ -48,21 +45,6 @@ def test_friction_at_the_motor_does_the_same_work_as_in_its_joints(arm):
     # Each joint by its share of the map, the third not at all.
     assert_allclose(force[:, 0] * 2.0, force[:, 1] * -0.5)
     assert not force[:, 2].any()
-
-
-def test_where_the_motor_stands_its_joints_feel_nothing(arm):
-    at = motion()
-    together = at.velocity.copy()
-    together[:, 1] = 0.25 * together[:, 0]
-    still = type(at)(at.position, together, at.acceleration, at.time)
-    assert_allclose(added(arm, 'coupled_drives', still, wrist__viscous=0.7, wrist__coulomb=3.0),
-                    0.0, atol=1e-12)
-
-
-def test_no_map_is_no_candidate(tmp_path, arm):
-    plain = DriveModel.load(write_arm(tmp_path))
-    for model, expected in ((plain, 0), (arm, 2)):
-        assert len(model.bound(CATALOGUE['coupled_drives']).coefficients) == expected
 
 
 @pytest.mark.parametrize(('motors', 'sentence'), [
@@ -116,20 +98,3 @@ def test_a_cylinder_pulls_with_the_pressure_that_was_measured(arm):
     unit = added(arm, 'counterbalance', at, **{**shape, 'swing__force': 1.0})
     assert_allclose(force[:, 1], 3e-5 * pressure * unit[:, 1])
     assert not added(arm, 'counterbalance', at, swing__area=3e-5, **shape).any()
-
-
-def test_effects_that_a_recording_cannot_show_are_not_tried(arm):
-    at = motion(duration=6.0)
-    position = at.position[0] + 0.1 * (at.position - at.position[0])
-    efforts = arm.drive_forces(at).total
-
-    def searched(**more):
-        design = Design.of(arm, [Recording.from_arrays(
-            'x', at.time, position, None, efforts, arm.drives, **more)])
-        return {effect.name for effect in searched_in_drives(design)}
-
-    assert not searched() & {'counterbalance', 'friction_temperature'}
-    steady = {'temperature': np.full(position.shape, 30.0)}
-    warming = {'temperature': 30.0 + np.arange(len(position))[:, None] * np.ones(3)}
-    assert 'friction_temperature' not in searched(channels=steady)
-    assert 'friction_temperature' in searched(channels=warming)

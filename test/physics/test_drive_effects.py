@@ -19,7 +19,6 @@ from scipy.integrate import solve_ivp
 from scipy.signal import butter, lfilter, lfilter_zi
 
 from pprs_dynamics import DriveModel, Excitation
-from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
@@ -146,14 +145,6 @@ def test_law_gives_the_number_worked_out_by_hand(effect, values, sample, force):
     assert_allclose(built.force(one_sample(**sample)), [[force]], rtol=0, atol=1e-7)
 
 
-def test_friction_has_fallen_to_its_eth_part_a_drift_time_after_the_start():
-    axes = excitation()
-    force = FrictionDrift({'axis': {'force': 1.0, 'time': 4.0}}).force(axes)
-    share = force / axes.direction
-    assert_allclose(share[0], 1, rtol=1e-12)
-    assert_allclose(share[2000], math.exp(-1), rtol=1e-9)  # 2000 samples of 2 ms
-
-
 def test_work_warms_a_drive_and_a_rest_cools_it() -> None:
     """10 s at 0.2 m/s, a rest of 10 s, back at 0.1 m/s, with heat that flows off in 5 s."""
     time = np.arange(0.0, 25.0, 0.002)
@@ -166,23 +157,6 @@ def test_work_warms_a_drive_and_a_rest_cools_it() -> None:
     again = warm * math.exp(-3) + 0.1 * (1 - math.exp(-1))
     assert_allclose(worked, [-3 * 0.2 * (1 - math.exp(-1)), -3 * warm, 0, 3 * again], atol=1e-3)
     assert_allclose(thinned, worked * [0.2, 0.2, 0, 0.1], atol=1e-3)
-
-
-def test_drift_without_times_is_friction_at_the_start():
-    axes = excitation()
-    axes.time = None
-    assert_array_equal(FrictionDrift({'axis': {'force': 2.0, 'time': 4.0}}).force(axes),
-                       2 * axes.direction)
-
-
-def test_presliding_gives_the_numbers_worked_out_by_hand():
-    # From rest forwards by x_d ln 2: z = 1/2. Back by as much: z = -1 + 3/2 / 2 = -1/4.
-    half = 0.001 * math.log(2)
-    q = np.array([0.0, half, 0.0])[:, None]
-    v = np.array([0.0, 1.0, -1.0])[:, None]
-    axes = Axes(None, q, v, v, v)
-    force = Hysteresis({'axis': {'force': 0.8, 'distance': 0.001}}).force(axes)
-    assert_allclose(force[:, 0], [0, 0.8 * (0.5 - 1), 0.8 * (-0.25 + 1)], rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize('x_d', [1e-4, 1e-3, 1e-2])
@@ -200,19 +174,6 @@ def test_presliding_solves_dahls_differential_equation(x_d):
     force = Hysteresis({'axis': {'force': 1.0, 'distance': x_d}}).force(axes)
     # A reversal between samples is missed by up to acceleration dt^2 / 8 = 5e-10 m.
     assert_allclose(force[:, 0] + axes.direction[:, 0], z, rtol=0, atol=2e-5)
-
-
-def test_presliding_of_a_jittering_encoder_is_dahls_solution_sample_by_sample():
-    rng = np.random.default_rng(61)
-    q = np.cumsum(rng.integers(-2, 3, 3000)) * 1e-6  # standstills and reversals all the time
-    z, expected = 0.0, [0.0]
-    for step in np.diff(q):
-        z = np.sign(step) + (z - np.sign(step)) * math.exp(-abs(step) / 2e-5)
-        expected.append(z)
-    axes = Axes(None, *(np.stack([x], axis=1) for x in (q, 0 * q, 0 * q, 0 * q)))
-    force = Hysteresis({'axis': {'force': 1.0, 'distance': 2e-5}}).force(axes)
-    assert np.ptp(force) > 0.5
-    assert_allclose(force[:, 0], expected, rtol=0, atol=1e-12)
 
 
 def test_presliding_friction_dissipates_over_every_closed_cycle():
@@ -279,19 +240,6 @@ def test_no_trial_of_any_variant_goes_unnoticed_in_the_force(effect):
             assert np.linalg.cond(chosen / np.linalg.norm(chosen, axis=0)) < 100, shape
 
 
-@pytest.mark.parametrize('covered', [
-    COVERED, DriveRange(0.0, 0.0, 0.0, 0.0), DriveRange(1e5, 1.0, 20.0, 50.0),
-    DriveRange(1.0, 1e-3, 2e-4, 1e-4)], ids=['usual', 'nothing', 'large', 'tiny'])
-@every_effect
-def test_trials_are_distinct_and_lie_within_the_bounds(effect, covered):
-    trials = effect.trials(covered)
-    assert len({tuple(trial.values()) for trial in trials}) == len(trials) > 0
-    for trial in trials:
-        assert list(trial) == [p.name for p in effect.shape]
-        for p in effect.shape:
-            assert type(p.check(p.name, trial[p.name])) is float
-
-
 def test_some_pitch_tried_shows_most_of_any_ripple():
     q = np.linspace(0, COVERED.stroke, 2000)
     drive = DriveSamples(None, q, q, q, q, q, q)
@@ -318,16 +266,6 @@ def test_some_position_tried_shows_most_of_any_stop(middle):
         stop = np.maximum(q - q[-1] + reach * COVERED.stroke, 0.0)
         assert (shown @ stop).max() > 0.9 * np.linalg.norm(stop), reach
     assert {trial['position'] > middle for trial in StopContact.trials(covered)} == {False, True}
-
-
-@every_effect
-def test_variants_are_sets_of_coefficients_and_the_last_holds_all(effect):
-    known = {c.name for c in effect.coefficients}
-    assert set(effect.variants[-1]) == known
-    assert len(set(effect.variants)) == len(effect.variants)
-    for variant in effect.variants:
-        assert set(variant) <= known
-    assert set(effect.unphysical_below) <= {p.name for p in effect.parameters}
 
 
 @every_effect
@@ -358,21 +296,6 @@ def test_any_coefficients_fitted_make_an_allowed_effect_of_the_same_force(effect
                     rtol=0, atol=2e-4 * max(map(abs, fitted.values())) + 1e-12)
 
 
-@pytest.mark.parametrize('force', [0.7, -0.7])
-@pytest.mark.parametrize('k', [0.0, -0.0, 1e-12, -1e-12])
-def test_a_spring_without_stiffness_is_a_constant_force_from_afar(k, force):
-    values = DriveSpring.from_coefficients({'stiffness': k, 'force': force})
-    assert abs(values['position']) == 1000
-    assert DriveSpring.to_coefficients(values)['force'] == pytest.approx(force, rel=1e-12)
-    assert abs(values['stiffness']) == pytest.approx(7e-4)
-
-
-def test_a_spring_without_force_is_relaxed_at_zero():
-    assert DriveSpring.from_coefficients({'stiffness': 0.0, 'force': 0.0}) == {
-        'stiffness': 0.0, 'position': 0.0}
-    assert DriveSpring.from_coefficients({'stiffness': 5.0, 'force': 0.0})['position'] == 0
-
-
 # Files, drives and memories ------------------------------------------------------------------
 
 @every_effect
@@ -382,16 +305,6 @@ def test_effect_comes_back_from_its_block_in_a_file(effect):
     block = yaml.safe_load(yaml.safe_dump(built.to_file()))
     assert effect.from_file(block) == built
     assert effect.from_file({'axis': next(iter(block.values()))}) != built
-
-
-@every_effect
-def test_card_states_the_law_with_every_parameters_symbol(effect):
-    card = effect.card
-    for parameter in effect.parameters:
-        assert parameter.symbol in card.equation
-        assert parameter.lower <= parameter.scale <= parameter.upper
-    assert all(len(text) > 40 for text in (card.looks_like, card.causes, card.confirm,
-                                           card.reference))
 
 
 @every_effect
@@ -421,15 +334,6 @@ def test_a_stream_with_a_carried_memory_equals_one_call(effect, chunk):
     assert_array_equal(np.concatenate(parts), built.force(axes))
 
 
-@pytest.mark.parametrize('effect', WITH_MEMORY, ids=lambda effect: effect.name)
-def test_a_call_without_memory_starts_afresh(effect):
-    axes = excitation()
-    built = effect({'axis': random_values(effect, np.random.default_rng(69))})
-    whole = built.force(axes)
-    assert np.abs(whole[5000:] - built.force(axes[5000:])).max() > 0.01
-    assert_array_equal(built.force(axes), whole)
-
-
 @pytest.mark.parametrize('time_constant', [0.004, 0.03, 0.2])
 def test_a_filtered_ramp_is_the_solution_of_its_differential_equation(time_constant):
     """(T/2 d/dt + 1)^2 y = t from rest has y = t - T + (t + T) exp(-2 t / T)."""
@@ -438,16 +342,6 @@ def test_a_filtered_ramp_is_the_solution_of_its_differential_equation(time_const
     y = effect.sensed(t[:, None], t, ('axis',))[:, 0]
     expected = t - time_constant + (t + time_constant) * np.exp(-2 * t / time_constant)
     assert_allclose(y, expected, atol=1e-2 * time_constant)
-
-
-def test_a_filter_leaves_what_stands_and_takes_what_is_fast():
-    t = np.arange(0.0, 2.0, 0.001)
-    effect = EffortFilter({'axis': {'time_constant': 0.02}})
-    still = effect.sensed(np.full((len(t), 1), 7.5), t, ('axis',))
-    assert_allclose(still, 7.5, rtol=1e-12)
-    for f in (1.0, 20.0, 100.0):
-        y = effect.sensed(np.sin(2 * np.pi * f * t)[:, None], t, ('axis',))[1000:, 0]
-        assert np.ptp(y) / 2 == pytest.approx(1 / (1 + (np.pi * f * 0.02) ** 2), rel=0.1)
 
 
 @pytest.mark.parametrize('order', [1, 2])
@@ -464,17 +358,6 @@ def test_what_a_filters_order_leaves_open_holds_other_orders(order):
     share = (open_ @ (real - form)) / (open_ @ open_)
     assert share == pytest.approx({1: 1.0, 2: -1.0}[order], abs=0.2)  # of unit prior
     assert np.std((real - form - share * open_)[steady]) < 0.4 * np.std((real - form)[steady])
-
-
-@pytest.mark.parametrize('chunk', [1, 7])
-def test_a_filter_in_a_stream_equals_one_call(chunk):
-    t = np.arange(200) * 0.01
-    F = np.random.default_rng(0).normal(size=(200, 1)).cumsum(axis=0)
-    effect = EffortFilter({'axis': {'time_constant': 0.05}})
-    memory = effect.initial_memory()
-    parts = [effect.sensed(F[k:k + chunk], t[k:k + chunk], ('axis',), memory)
-             for k in range(0, len(t), chunk)]
-    assert_allclose(np.concatenate(parts), effect.sensed(F, t, ('axis',)), atol=1e-9)
 
 
 # --- what is remembered while parameters change ---------------------------------------------------
@@ -521,12 +404,3 @@ def test_a_stressed_contact_does_not_relax_as_a_parameter_changes() -> None:
     moved(expected, 0.0, whole)
     assert moved(other, 4.0, again)['hysteresis'] == pytest.approx(
         moved(expected, 4.0, whole)['hysteresis'], abs=1e-12)
-
-
-def test_every_effect_with_a_memory_says_what_a_start_takes_for_granted() -> None:
-    assert with_effect('friction_drift', force=5.0, time=60.0).assumed_at_start == {
-        'friction_drift': 'the drive is cold, the time of fading begins'}
-    assert DriveModel.load().assumed_at_start == {}
-    for effect in catalogue().values():
-        if issubclass(effect, DriveEffect):
-            assert bool(effect.assumed_at_start) == (effect.drive_memory() is not None), effect

@@ -56,10 +56,3 @@ def test_a_stop_follows_the_path_and_its_derivatives_belong_together(start: floa
     for k in (1, 3, 5, 7):
         way = h / 3 * (stop.velocity[k - 1] + 4 * stop.velocity[k] + stop.velocity[k + 1])
         np.testing.assert_allclose(stop.position[k + 1] - stop.position[k - 1], way, atol=2e-3)
-
-
-def test_one_point_is_a_path_too() -> None:
-    path = DrivePath(np.array([2.0]), np.array([[1.0, 2.0]]), np.array([[0.5, 0.0]]))
-    stop = path.stop(2.0, 0.6)
-    np.testing.assert_allclose(stop.position[-1], [1.0 + 0.5 * 0.2, 2.0])
-    assert not stop.velocity[-1].any()

@@ -17,7 +17,7 @@ from feedforward_bench import random_motion
 
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import EffectError
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples, GainEffect
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.foreign_effects import guard
 
@@ -154,25 +154,3 @@ def test_a_wrong_answer_is_shown_beside_what_it_must_be(
         getattr(stiction, method)(stiction)
     assert told in str(raised.value)
     assert str(raised.value).startswith('effect stiction: ')
-
-
-def test_right_answers_pass_unchanged(stiction: Any) -> None:
-    stiction.answers = {'trials': [{'width': 0.1}], 'from_coefficients': {'force': 2.0}}
-    assert stiction.trials(None) == [{'width': 0.1}]
-    assert stiction.from_coefficients(None) == {'force': 2.0}
-
-
-def test_a_gain_of_another_shape_is_an_error_with_its_name() -> None:
-    class WornSensor(GainEffect):
-        name = 'worn_sensor'
-        linear = (Parameter('share', 's', '1', 'too much', -1.0, 1.0),)
-        card = Card('(1 + s x) F', 'x', 'x', 'x', 'x')
-
-        @classmethod
-        def shares(cls, drive: DriveSamples, **shape: float) -> tuple[np.ndarray, ...]:
-            return (np.zeros(3),)
-
-    guard(WornSensor)
-    q = np.zeros(5)
-    with pytest.raises(EffectError, match=r'effect worn_sensor: shares returned .*\(5,\)'):
-        WornSensor.shares(DriveSamples(None, q, q, q, q, q, q))

@@ -16,7 +16,7 @@ import pytest
 import yaml
 from pprs_command import pprs
 
-from pprs_dynamics.errors import ModelError, UnreadableFileError
+from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import (
     Step,
@@ -75,16 +75,6 @@ def test_each_step_is_taken_back_exactly_through_files(
     assert model_values(values) == stages[0]
     with pytest.raises(ModelError, match='history is missing'):
         without_last_step(values)
-
-
-def test_what_a_step_holds_comes_back(stages: list[dict[str, Any]]) -> None:
-    first, second = read_steps(stages[2])
-    assert replace(first, previous={}, added=()) == STEP
-    assert first.previous == {'masses.payload': 1.0}
-    assert set(first.added) == {'effects.active', 'effects.coulomb_friction.lift_1.force'}
-    assert second.previous['effects.active'] == ['coulomb_friction']
-    assert second.rivals == ('external_wrench',)
-    assert json.dumps(first.to_dict())
 
 
 def test_tolerances_count_from_the_numbers_of_the_first_file(stages: list[dict[str, Any]]) -> None:
@@ -157,13 +147,6 @@ def test_the_command_shows_draws_and_takes_back(
 OLD = Path(__file__).parents[2] / 'config/paper.yaml'
 
 
-def in_the_old_place(text: str) -> str:
-    """Return a file as it was written before the ledger had a section of its own."""
-    model, _, ledger = text.partition(f'{LEDGER}:\n  ros__parameters:\n')
-    assert ledger
-    return model + ledger
-
-
 def test_the_ledger_has_a_section_of_its_own(
     stages: list[dict[str, Any]], tmp_path: Path,
 ) -> None:
@@ -173,35 +156,6 @@ def test_the_ledger_has_a_section_of_its_own(
     assert list(sections) == ['/**', LEDGER]
     assert 'history' not in sections['/**']['ros__parameters']
     assert set(sections[LEDGER]['ros__parameters']['history']) == {'step_01', 'step_02'}
-
-
-def test_a_ledger_in_the_old_place_is_read_and_moved(
-    stages: list[dict[str, Any]], tmp_path: Path,
-) -> None:
-    old, new, back = (tmp_path / f'{name}.yaml' for name in ('old', 'new', 'back'))
-    write_model(new, stages[2], OLD)
-    old.write_text(in_the_old_place(new.read_text()))
-    assert model_values(read_parameters(old)) == stages[2]
-    write_model(back, stages[2], old)
-    # No line is lost; effects may stand on the other side of a comment.
-    assert sorted(back.read_text().splitlines()) == sorted(new.read_text().splitlines())
-    assert read_parameters(back) == read_parameters(new)
-    done = pprs('history', str(old), '--undo', '--output', str(tmp_path / 'undone.yaml'))
-    assert done.returncode == 0, done.stderr
-    assert model_values(read_parameters(tmp_path / 'undone.yaml')) == stages[1]
-    assert (tmp_path / 'undone.yaml').read_text().count(LEDGER) == 1
-    # In both places there is no telling which one counts.
-    new.write_text(in_the_old_place(new.read_text()) + new.read_text()[
-        new.read_text().index(LEDGER):])
-    with pytest.raises(ModelError, match=r'history.step_01.effect .* must stand once'):
-        read_parameters(new)
-
-
-def test_nothing_but_a_ledger_stands_in_its_section(tmp_path: Path) -> None:
-    file = tmp_path / 'model.yaml'
-    file.write_text(OLD.read_text() + f'{LEDGER}:\n  ros__parameters:\n    gravity: [0.0]\n')
-    with pytest.raises(ModelError, match='holds history alone'):
-        read_parameters(file)
 
 
 def test_a_ledger_of_hundreds_of_steps_is_written_and_read(tmp_path: Path) -> None:
@@ -217,14 +171,6 @@ def test_a_ledger_of_hundreds_of_steps_is_written_and_read(tmp_path: Path) -> No
     start = time.process_time()
     assert len(read_steps(read_parameters(file))) == 400
     assert time.process_time() - start < 5.0
-
-
-def test_a_ledger_that_could_not_be_read_again_is_not_written(tmp_path: Path) -> None:
-    step = replace(STEP, recordings=('a' * 5000,) * 1001)
-    file = tmp_path / 'model.yaml'
-    with pytest.raises(UnreadableFileError, match='larger than 5 MB'):
-        write_model(file, {**default_parameters(), **step.as_values('history.step_01')}, OLD)
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_model_without_steps_has_none_to_take_back(tmp_path: Path) -> None:

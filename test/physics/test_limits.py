@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -29,34 +27,12 @@ def middle(limits: DriveLimits, samples: int = 4) -> np.ndarray:
     return np.tile((lower + upper) / 2, (samples, 1))
 
 
-def test_the_strokes_of_a_3_pprs_are_those_of_slides_and_lifts() -> None:
-    lower, upper = PAPER.strokes
-    assert lower.tolist() == [-0.3] * 3 + [-0.1] * 3
-    assert upper.tolist() == [0.2] * 3 + [0.8] * 3
-    assert list(PAPER.sources) == (
-        ['limits.slide_stroke'] * 3 + ['limits.lift_stroke'] * 3)
-    assert PAPER.position_units == ('m',) * 6
-    assert PAPER.effort_units == ('N',) * 6
-    assert PAPER.efforts.tolist() == [10.0, 20.0, 30.0, 40.0, 50.0, 60.0]
-
-
 @EACH
 def test_efforts_are_moved_to_the_limit_where_they_are_over_it(limits: DriveLimits) -> None:
     efforts = limits.efforts
     given = np.array([0.5, -0.5, 1.0, -1.0, 1.5, -1.5])[:, None] * efforts
     wanted = np.array([0.5, -0.5, 1.0, -1.0, 1.0, -1.0])[:, None] * efforts
     assert np.array_equal(limits.clamped(given), wanted)
-
-
-@EACH
-def test_the_smaller_of_two_efforts_counts(limits: DriveLimits) -> None:
-    count = len(limits.drives)
-    other = limits.efforts * np.where(np.arange(count) % 2, 2.0, 0.5)
-    expected = limits.efforts * np.where(np.arange(count) % 2, 1.0, 0.5)
-    narrower = limits.with_efforts(other.tolist())
-    assert isinstance(narrower, type(limits))
-    assert narrower.efforts == pytest.approx(expected)
-    assert np.array_equal(narrower.strokes, limits.strokes)
 
 
 @EACH
@@ -126,11 +102,3 @@ def test_what_is_allowed_is_finite_and_within_all_limits(limits: DriveLimits) ->
             assert not allowed(efforts, changed(middle(limits), drive, bad))
             assert not allowed(efforts, middle(limits), changed(rates, drive, bad))
             assert not allowed(efforts, middle(limits), rates, changed(rates, drive, bad))
-
-
-def test_an_arm_without_limits_in_its_urdf_is_allowed_everything_finite() -> None:
-    free = replace(ARM, lower=np.full(2, -np.inf), upper=np.full(2, np.inf),
-                   efforts=np.full(2, np.inf))
-    table = np.full((2, 2), 1e12)
-    assert free.allow(table, (table, table, table))
-    assert not free.allow(table * np.inf, (table, table, table))

@@ -5,11 +5,8 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import made_up_arm as arm
@@ -19,19 +16,10 @@ import pytest
 import yaml
 
 from pprs_dynamics import DriveModel, JointMotion, PprsError
-from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import ModelError, UnreadableFileError
-from pprs_dynamics.inference.readings.check import find_mistakes
-from pprs_dynamics.inference.readings.table import readings
-from pprs_dynamics.measurement.files.recording import Recording, read_recording, write_recording
-from pprs_dynamics.physics.effects.drive_effect import DriveRange
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
 from pprs_dynamics.physics.effects.laws.external_wrench import ExternalWrench
-from pprs_dynamics.physics.effects.laws.force_ripple import ForceRipple
-from pprs_dynamics.physics.effects.laws.hysteresis import Hysteresis
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
-from pprs_dynamics.physics.effects.laws.stribeck_friction import StribeckFriction
 from pprs_dynamics.physics.model.model_writer import write_model
 
 SAMPLES = 40
@@ -106,17 +94,6 @@ def test_torques_are_linear_in_the_regressor(tmp_path: Path) -> None:
     rows = model.robot.regressor(motion.position, motion.velocity, motion.acceleration)
     assert rows @ model.robot.inertial.ravel() == pytest.approx(
         model.drive_forces(motion).total, abs=1e-9)
-
-
-def test_joints_in_another_order_permute_the_torques(tmp_path: Path) -> None:
-    motion = states()
-    order = [2, 0, 1]
-    model = DriveModel.load(arm.write_arm(tmp_path))
-    other = DriveModel.load(arm.write_arm(tmp_path, joints=tuple(arm.JOINTS[k] for k in order)))
-    moved = JointMotion(*(values[:, order] for values in (
-        motion.position, motion.velocity, motion.acceleration)))
-    assert other.drive_forces(moved).total == pytest.approx(
-        model.drive_forces(motion).total[:, order], abs=1e-12)
 
 
 def test_locked_joints_are_as_those_that_rest(tmp_path: Path) -> None:
@@ -273,100 +250,3 @@ def test_links_and_mimics_in_a_ring_are_told(tmp_path: Path) -> None:
     with pytest.raises(UnreadableFileError, match='must mimic none that mimics it'):
         DriveModel.load(
             arm.write_arm(tmp_path, arm.urdf().replace('</robot>', f'{mimics}</robot>')))
-
-
-def test_an_unreadable_urdf_is_named(tmp_path: Path) -> None:
-    with pytest.raises(UnreadableFileError, match=r'made_up\.urdf'):
-        DriveModel.load(arm.write_arm(tmp_path, '<robot name="x"><link/></robot'))
-
-
-def test_ripple_is_looked_for_where_the_gear_has_it() -> None:
-    """A joint of four turns: the waves of its gear are beyond the grid over its range."""
-    covered = DriveRange(40.0, 0.01, 25.0, 1.0)
-    pitches = [trial['pitch'] for trial in ForceRipple.trials(replace(covered, gear_ratio=101.0))]
-    for pitch in (2 * np.pi / 101, np.pi / 101):
-        assert min(abs(np.array(pitches) / pitch - 1)) < 1e-12
-        without = [trial['pitch'] for trial in ForceRipple.trials(covered)]
-        assert min(abs(np.array(without) / pitch - 1)) > 0.1
-
-
-def defects_of(tmp_path: Path, change: Callable[[Array, Array], None]) -> str:
-    """Return what is told of a recording of the arm that was changed."""
-    model = arm.real_arm(tmp_path)
-    run = arm.record(model, arm.motion(10.0))
-    position, effort = run.position.copy(), run.effort.copy()
-    change(position, effort)
-    path = tmp_path / 'run.csv'
-    write_recording(path, Recording.from_arrays('run', run.time, position, None, effort,
-                                                model.drives))
-    found = read_recording(path, model.recorded)
-    return ' '.join(one.text for one in (*find_mistakes(model, found), *found.findings))
-
-
-def test_what_is_wrong_with_a_recording_is_told_in_the_units_of_the_joints(tmp_path: Path) -> None:
-    def stuck(position: Array, effort: Array) -> None:
-        position[:, 0], effort[:, 0], effort[:, 2] = 0.25, 3.0, 7.0
-        position[500:, 1] += 1.0
-
-    said = defects_of(tmp_path, stuck)
-    assert 'the position of turn is 0.25 rad throughout' in said
-    assert 'the effort of turn is 3 N m throughout' in said
-    assert 'the effort of reach is 7 N throughout' in said
-    jump = said.partition('the position of swing jumps')[2].partition('by up to ')[2]
-    assert jump.split()[1] == 'rad,'
-    assert ' m throughout' not in said.replace('N m throughout', '')
-
-
-def test_positions_in_degrees_are_told(tmp_path: Path) -> None:
-    def in_degrees(position: Array, effort: Array) -> None:
-        position[:, :2] *= 180 / np.pi
-
-    assert 'turn, swing look like degrees' in defects_of(tmp_path, in_degrees)
-
-
-def test_efforts_in_other_units_are_told_by_joint(tmp_path: Path) -> None:
-    def thousandth(position: Array, effort: Array) -> None:
-        effort[:, 1] *= 1e-3
-
-    said = defects_of(tmp_path, thousandth)
-    assert 'the effort of swing' in said
-    assert 'kN m' in said
-
-
-def test_six_joints_are_no_slides_and_lifts() -> None:
-    joints = tuple(f'joint_{k}' for k in range(1, 7))
-    found = list(readings(joints, (DriveUnits(True),) * 6))
-    assert not any(word in one.what for one in found for word in ('slide', 'lift', 'metres'))
-    assert {one.kind for one in found} == {'reversed_time', 'position_unit', 'position_sign',
-                                           'drive_order'}
-
-
-@pytest.mark.parametrize(('effect', 'parameter', 'turning', 'pushing'), [
-    ('homing_error', 'zero', 1.2, 0.12), ('hysteresis', 'distance', 0.4, 0.12),
-    ('stribeck_friction', 'velocity', 40.0, 12.0)])
-def test_bounds_of_parameters_are_in_the_unit_of_the_drive(
-    tmp_path: Path, effect: str, parameter: str, turning: float, pushing: float,
-) -> None:
-    """A zero may be off by any angle, and by a decimetre."""
-    values = DriveModel.load(arm.write_arm(tmp_path)).values
-    force = {} if effect == 'homing_error' else {'force': 1.0}
-
-    def with_one(drive: str, value: float) -> DriveModel:
-        block = {**force, parameter: value}
-        return DriveModel.from_parameters({**values, 'effects.active': [effect], **{
-            f'effects.{effect}.{drive}.{key}': number for key, number in block.items()}})
-
-    assert with_one('turn', turning).effects[-1].to_file()['turn'][parameter] == turning
-    with pytest.raises(ModelError, match=rf'effects\.{effect}\.reach\.{parameter}'):
-        with_one('reach', pushing)
-
-
-def test_what_is_tried_is_in_the_unit_of_the_drive() -> None:
-    """Gears give over tenths of a degree, and Stribeck's fall is above where friction turns."""
-    turns, pushes = (DriveRange(20.0, 0.01, 2.0, 2.0, turns=each) for each in (True, False))
-    give = [[one['distance'] for one in Hysteresis.trials(each)] for each in (turns, pushes)]
-    assert math.radians(2) < max(give[0]) < math.radians(5)
-    assert max(give[1]) == pytest.approx(0.005)
-    slowest = [min(one['velocity'] for one in StribeckFriction.trials(each))
-               for each in (turns, pushes)]
-    assert slowest == pytest.approx([0.01, 0.001])

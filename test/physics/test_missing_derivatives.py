@@ -5,9 +5,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from feedforward_bench import EQUAL, feedforward_bench, message_of, random_motion
@@ -15,7 +12,6 @@ from random_states import smooth_motion
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
-from pprs_dynamics.physics.mechanism.pose_spline import spline_derivatives
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import read_trajectory
 
@@ -63,18 +59,6 @@ def test_what_is_given_is_kept_and_only_what_is_missing_is_filled() -> None:
                                rtol=0, atol=1e-8)
 
 
-def test_a_turn_beyond_every_euler_angle_and_quaternion_sign_is_smooth() -> None:
-    # A constant rate about a tilted axis: quaternions of either sign, a full turn and more.
-    axis, rate = np.array([0.6, 0.0, 0.8]), 2.0
-    angle = rate * np.arange(0, 4.0, 0.02)
-    quaternion = np.column_stack((np.outer(np.sin(angle / 2), axis), np.cos(angle / 2)))
-    quaternion[::3] *= -1
-    position = np.zeros((len(angle), 3))
-    velocity, acceleration = spline_derivatives(angle / rate, position, quaternion)
-    np.testing.assert_allclose(velocity[:, 3:], np.tile(rate * axis, (len(angle), 1)), atol=1e-8)
-    np.testing.assert_allclose(acceleration[:, 3:], 0, atol=1e-6)
-
-
 @pytest.mark.parametrize('fields', [('velocities',), ('accelerations',),
                                     ('velocities', 'accelerations')])
 def test_too_few_points_and_the_policy_reject_refuse_with_the_code_size(
@@ -84,15 +68,6 @@ def test_too_few_points_and_the_policy_reject_refuse_with_the_code_size(
         with pytest.raises(Rejection, match=r'^SIZE: point 0 has 0'):
             read_trajectory(without(motion, *fields), 1, missing=policy)
     motion_of(without(SMOOTH[:4], *fields))
-
-
-def test_two_twists_or_no_pose_are_refused_even_so() -> None:
-    message = message_of(SMOOTH)
-    message.points[3].velocities = [message.points[3].velocities[0]] * 2
-    with pytest.raises(Rejection, match=r'^SIZE: point 3 has 2 velocities'):
-        motion_of(message)
-    with pytest.raises(Rejection, match=r'^SIZE: point 0 has 0 transforms'):
-        motion_of(without(SMOOTH, 'transforms'))
 
 
 def test_poses_that_no_spline_can_follow_are_rejected_and_nothing_else_happens() -> None:
@@ -118,19 +93,3 @@ def test_the_node_answers_a_pose_trajectory_as_a_whole_and_its_first_point() -> 
         np.testing.assert_allclose(effort, expected.total, rtol=0, atol=1e-4)
         node.send(without(SMOOTH[:1], 'velocities'))
         assert node.counters['SIZE'] == 1
-
-
-@pytest.mark.parametrize('missing', ['reject', 'spline'])
-def test_splines_are_loaded_before_messages_and_only_where_they_are_asked_for(missing: str) -> None:
-    code = (
-        'import sys\n'
-        'from pprs_dynamics import DriveModel\n'
-        'from pprs_dynamics.physics.model.preparation import prepare\n'
-        'from pprs_dynamics.ros.force_command import Feedforward, parameters_for\n'
-        'model = DriveModel.load()\n'
-        'prepare(model)\n'
-        'own = {each.name: each.default for each in parameters_for(6)}\n'
-        f'Feedforward(model, own | {{"missing_derivatives": {missing!r}}})\n'
-        'print("scipy.interpolate" in sys.modules)\n')
-    found = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
-    assert found.stdout.split() == [str(missing == 'spline')]

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -52,14 +50,6 @@ def test_every_key_of_the_file_is_declared_and_every_declared_key_stands_in_the_
     assert set(read_parameters(PAPER)) == set(KEYS)
 
 
-def test_the_package_finds_its_own_model_from_any_folder(tmp_path: Path) -> None:
-    code = ('from pprs_dynamics import DriveModel; '
-            'print(DriveModel.load("config/paper.yaml").robot.masses.total)')
-    found = subprocess.run([sys.executable, '-c', code], cwd=tmp_path, capture_output=True,
-                           text=True, check=True)
-    assert found.stdout.strip() == '2.0'
-
-
 def test_limits_tolerances_effects_and_node_keys_are_optional(tmp_path: Path) -> None:
     limits = tuple(name for name in KEYS if name.startswith('limits.'))
     file = written(tmp_path, {'max_age': 0.2, 'tolerances.masses.payload': 0.05,
@@ -67,16 +57,6 @@ def test_limits_tolerances_effects_and_node_keys_are_optional(tmp_path: Path) ->
     model = DriveModel.load(file)
     assert model.limits.efforts.tolist() == [100.0] * 6
     assert [effect.name for effect in model.effects] == ['active_friction', 'passive_friction']
-
-
-def test_added_effects_are_summed_as_their_own_part(tmp_path: Path) -> None:
-    model = DriveModel.load(written(tmp_path, {
-        'effects': {'active': ['effort_offset'], 'effort_offset': {'slide_3': {'force': -0.7}},
-                    'stribeck_friction': {'lift_1': {'force': 1.0, 'velocity': 0.01}}}}))
-    forces = model.drive_forces(PlatformMotion.at_rest((0.0, 0.0, 0.5)))
-    assert list(forces.parts) == ['rigid_body', 'active_friction', 'passive_friction',
-                                  'effort_offset']
-    np.testing.assert_array_equal(forces.parts['effort_offset'], [[0, 0, -0.7, 0, 0, 0]])
 
 
 WRONG = [
@@ -169,17 +149,6 @@ def test_a_foreign_file_is_one_clear_sentence(tmp_path: Path, content: bytes) ->
     assert '\n' not in str(caught.value)
 
 
-def test_a_missing_file_and_a_folder_are_one_clear_sentence(tmp_path: Path) -> None:
-    for path in (tmp_path / 'nowhere.yaml', Path('nowhere.yaml'), tmp_path):
-        with pytest.raises(UnreadableFileError, match=str(path)):
-            DriveModel.load(path)
-
-
-def test_lists_that_ros_would_refuse_are_refused_here_too(tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match=r'write 0\.0, not 0'):
-        DriveModel.load(written(tmp_path, {'masses.centre': [0, 0.001, 0.0]}))
-
-
 @pytest.mark.parametrize('number', ['1e-3', '1.0e-3', '.1E-2', '0.001', '+1e-3'])
 def test_numbers_are_those_that_ros_reads(tmp_path: Path, number: str) -> None:
     text = PAPER.read_text().replace('reversal_velocity: 0.001', f'reversal_velocity: {number}')
@@ -199,11 +168,6 @@ def test_an_effect_cannot_be_a_value_and_a_block_at_once() -> None:
     values = {**DriveModel.load().values, 'effects.effort_offset.lift_1.force': 1.0}
     with pytest.raises(ModelError, match='keys stand below it'):
         DriveModel.from_parameters({**values, 'effects.effort_offset': 3})
-
-
-def test_blocks_left_empty_say_nothing(tmp_path: Path) -> None:
-    model = DriveModel.load(written(tmp_path, {'tolerances': None, 'effects': {}}))
-    assert len(model.effects) == 2
 
 
 JUNK = st.one_of(
@@ -229,20 +193,6 @@ def test_whatever_a_parameter_is_set_to_gives_a_model_or_one_of_our_errors(
         pass
     else:
         assert forces.total.shape == (1, 6)
-
-
-def test_whole_numbers_are_numbers(tmp_path: Path) -> None:
-    model = DriveModel.load(written(tmp_path, {'masses.payload': 2, 'masses.slides': [1, 1, 1]}))
-    assert model.robot.masses.payload == 2.0
-
-
-def test_a_model_can_be_built_again_from_its_own_values() -> None:
-    values = {**DriveModel.load().values, 'effects.active': ['effort_offset'],
-              'effects.effort_offset.lift_1.force': 0.3}
-    once = DriveModel.from_parameters(values)
-    again = DriveModel.from_parameters(once.values)
-    motion = PlatformMotion.at_rest((0.01, 0.02, 0.5))
-    np.testing.assert_array_equal(once.drive_forces(motion).total, again.drive_forces(motion).total)
 
 
 def test_an_unreadable_file_is_told(tmp_path: Path) -> None:

@@ -22,15 +22,13 @@ from rclpy.context import Context
 from rclpy.node import Node
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.errors import ModelError, UnreadableFileError
+from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.model.model_writer import edit_model, format_model, write_model
 from pprs_dynamics.physics.model.parameter_file import (
     LEDGER,
     default_parameters,
-    parse_parameters,
     read_parameters,
 )
-from pprs_dynamics.system.output_files import write_text
 
 PAPER = Path(__file__).parents[2] / 'config' / 'paper.yaml'
 # Numbers whose shortest text is a trap: whole, tiny, huge, not representable, negative zero.
@@ -126,22 +124,6 @@ FORMS: dict[str, Callable[[str], str]] = {
     'quotes': lambda text: text.replace('whole_mechanism ', "'whole_mechanism' ")}
 
 
-@pytest.mark.parametrize('form', FORMS)
-def test_an_edit_changes_one_line_of_a_file_of_any_form(form: str) -> None:
-    text = FORMS[form](PAPER.read_text())
-    values = parse_parameters(text)
-    edited = edit_model(text, {**values, 'masses.payload': 1.23456})
-    lines, new = text.splitlines(), edited.splitlines()
-    changed = [k for k, (old, line) in enumerate(zip(lines, new, strict=True)) if old != line]
-    assert [lines[k].split(':')[0].strip() for k in changed] == ['payload']
-
-
-def test_a_file_written_anew_names_every_key_with_its_unit() -> None:
-    text = format_model(DriveModel.from_parameters(default_parameters()).values)
-    assert '  # l, length of the guiding rods [m]' in text
-    assert [line for line in text.splitlines() if line.startswith('    masses:')]
-
-
 def test_keys_of_nodes_and_other_nodes_blocks_stay(tmp_path: Path) -> None:
     base = tmp_path / 'base.yaml'
     base.write_text(PAPER.read_text() + '    max_age: 0.5  # of the node\n'
@@ -171,12 +153,6 @@ def test_files_of_every_form_come_out_right(tmp_path: Path, form: str) -> None:
     assert DriveModel.load(tmp_path / 'new.yaml').values == wanted
     assert ('window: 0.2' in (tmp_path / 'new.yaml').read_text()) == (form == 'flow')
     assert ros_parameters(tmp_path / 'new.yaml')['masses.slides'] == [0.4, 0.5, 0.5]
-
-
-def test_no_model_is_no_file(tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match=r'masses\.payload is -1'):
-        write_model(tmp_path / 'model.yaml', {**default_parameters(), 'masses.payload': -1.0})
-    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize('link', ['same', 'symbolic', 'hard'])
@@ -219,14 +195,3 @@ def test_a_full_disk_leaves_the_old_file_whole(tmp_path: Path) -> None:
         old, '', lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))) == 1
     assert old.read_text() == 'old'
     assert list(tmp_path.iterdir()) == [old]
-
-
-def test_permissions_are_those_of_any_new_file(tmp_path: Path) -> None:
-    write_text(tmp_path / 'new.yaml', 'text')
-    (tmp_path / 'plain.yaml').write_text('text')
-    assert (tmp_path / 'new.yaml').stat().st_mode == (tmp_path / 'plain.yaml').stat().st_mode
-
-
-def test_a_folder_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
-    with pytest.raises(UnreadableFileError, match='cannot be written: its folder does not exist'):
-        write_text(tmp_path / 'nowhere' / 'new.yaml', 'text')

@@ -52,17 +52,6 @@ def test_twists_are_the_poses_derivatives_in_base(name: str) -> None:
                                rtol=0, atol=RATE_TOLERANCE)
 
 
-def test_angular_accelerations_of_a_spline_hold_up_to_its_ends() -> None:
-    time = np.linspace(0, 4, 401)
-    exact = Excitation(4.0, seed=3, tilt=0.4).motion(time)
-    spline = PlatformMotion.from_poses(time, exact.position, exact.orientation)
-    error = np.abs(spline.angular_acceleration - exact.angular_acceleration).max(axis=1)
-    scale = np.abs(exact.angular_acceleration).max()
-    # A spline of rotation vectors is wrong by 0.8 % at the ends and by 0.4 % within.
-    assert max(error[0], error[-1]) < 0.003 * scale
-    assert error[5:-5].max() < 0.001 * scale
-
-
 @pytest.mark.parametrize('name', motions())
 def test_accelerations_are_the_twists_derivatives_in_base(name: str) -> None:
     motion = motions()[name]
@@ -71,12 +60,6 @@ def test_accelerations_are_the_twists_derivatives_in_base(name: str) -> None:
                        ('angular_velocity', 'angular_acceleration')):
         difference = (getattr(after, rate) - getattr(before, rate)) / (2 * STEP)
         np.testing.assert_allclose(getattr(middle, gain), difference, rtol=0, atol=3e-3)
-
-
-def test_the_rates_of_a_tilted_platform_would_differ_in_its_own_frame() -> None:
-    motion = tilted_poses(np.linspace(0, 4, 200))
-    own = Rotation.from_quat(motion.orientation).inv().apply(motion.angular_velocity)
-    assert np.abs(own - motion.angular_velocity).max() > 0.1
 
 
 def test_the_helix_is_the_papers() -> None:
@@ -116,14 +99,6 @@ def test_a_lead_in_ends_where_the_path_starts_and_leaves_it_as_it_is() -> None:
     assert np.abs(np.diff(whole.position, axis=0)).max() < 0.005
 
 
-def test_samples_at_the_wanted_rate_stay_and_others_are_splined() -> None:
-    motion = tilted_poses(np.linspace(0, 4, 401))
-    assert motion.resampled(100.0) is motion
-    finer = motion.resampled(250.0)
-    assert len(finer) == 1001
-    np.testing.assert_allclose(finer.position[::5], motion.position[::2], atol=1e-12)
-
-
 @pytest.mark.parametrize(('change', 'message'), [
     ({'position': [[0, 0, np.nan]]}, 'position: sample 0 is .*must be finite'),
     ({'orientation': [[0, 0, 0, 1.01]]}, 'orientation: the quaternion of sample 0 has length 1.01'),
@@ -139,9 +114,3 @@ def test_what_is_no_motion_is_told(change: dict[str, object], message: str) -> N
             'angular_velocity': zero, 'linear_acceleration': zero, 'angular_acceleration': zero}
     with pytest.raises(MotionError, match=message):
         PlatformMotion(**{**good, **change})
-
-
-def test_times_must_increase() -> None:
-    zero = np.zeros((3, 3))
-    with pytest.raises(MotionError, match='sample 2 at 1 s follows 1 s'):
-        PlatformMotion(zero, [[0, 0, 0, 1]] * 3, zero, zero, zero, zero, [0.0, 1.0, 1.0])

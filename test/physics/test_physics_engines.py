@@ -143,18 +143,3 @@ def test_reference_values_of_the_helical_path():
                     atol=HALF_OF_THE_LAST_DIGIT)
     assert_allclose(forces.parts['passive_friction'], [REFERENCE_PASSIVE], rtol=0,
                     atol=HALF_OF_THE_LAST_DIGIT)
-
-
-@every_engine
-def test_engines_give_the_reference_values_themselves(engine):
-    oracle = engine(paper_model().robot).solve(helical_motion_at_1_second(), 0.02, 0.02)
-    assert_allclose(oracle.force, [REFERENCE_FORCE], rtol=0, atol=HALF_OF_THE_LAST_DIGIT)
-    assert_allclose(oracle.passive, [REFERENCE_PASSIVE], rtol=0, atol=HALF_OF_THE_LAST_DIGIT)
-
-
-def test_package_path_at_1_second_is_the_papers_closed_form():
-    from pprs_dynamics.physics.mechanism.paths import HelicalPath
-
-    path, expected = HelicalPath().motion([1.0]), helical_motion_at_1_second()
-    for name in ('position', 'linear_velocity', 'linear_acceleration'):
-        assert_allclose(getattr(path, name), getattr(expected, name), rtol=0, atol=1e-15)

@@ -19,18 +19,13 @@ from pprs_dynamics.errors import ModelError, MotionError
 from pprs_dynamics.inference.adoption.request import EffectRequest, EffectRequestError
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.regression.sensitivities import Sensitivities
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.keys import set_number
 from pprs_dynamics.physics.model.model_writer import write_model
-from pprs_dynamics.physics.model.parameter_file import read_parameters
 
-CONFIG = Path(__file__).parents[2] / 'config'
-FILE = CONFIG / 'single_axis.yaml'
 MASS, VISCOUS, COULOMB, OFFSET, WIDTH = 20.0, 40.0, 6.0, -2.0, 0.001
 VALUES = axis_values(MASS, VISCOUS, COULOMB, OFFSET, width=WIDTH)
 SPRING, CENTRE = 55.0, 0.03  # N/m, m: hidden
@@ -93,24 +88,6 @@ def test_a_vertical_axis_at_rest_is_held_against_its_weight() -> None:
     assert model.drive_forces(JointMotion(rest, rest, rest)).total[0, 0] == MASS * 9.81
 
 
-def test_an_effect_adds_its_closed_form_and_changes_nothing_else() -> None:
-    time, q, q_dot, q_ddot = sweep(2.0)
-    motion = JointMotion(q[:, None], q_dot[:, None], q_ddot[:, None], time)
-    with_effect = DriveModel.from_parameters({**VALUES, 'effects.active': ['quadratic_friction'],
-                               'effects.quadratic_friction.axis.coefficient': 30.0})
-    bare, forces = (model.drive_forces(motion) for model in (DriveModel.from_parameters(
-        VALUES), with_effect))
-    np.testing.assert_allclose((forces.total - bare.total)[:, 0], 30 * q_dot * np.abs(q_dot),
-                               rtol=0, atol=1e-9)
-    for name, part in bare.parts.items():
-        np.testing.assert_array_equal(forces.parts[name], part)
-
-
-def test_the_shipped_file_is_found_by_its_name() -> None:
-    assert DriveModel.load(FILE).kind == 'slide'
-    assert DriveModel.load('config/single_axis.yaml').values == DriveModel.load(FILE).values
-
-
 @pytest.mark.parametrize(('change', 'sentence'), [
     ({'links.mass': [0.0]}, 'move a body: no link that it moves has a mass'),
     ({'friction.coulomb': [-1.0]}, 'friction.coulomb is [-1.0]'),
@@ -126,21 +103,6 @@ def test_a_mistake_in_a_file_is_one_sentence(change: dict[str, float], sentence:
     with pytest.raises(ModelError) as caught:
         DriveModel.from_parameters({**VALUES, **change})
     assert sentence in str(caught.value)
-
-
-def test_a_robot_has_no_drive_axis() -> None:
-    values = {**read_parameters(CONFIG / 'paper.yaml'), 'effects.active': ['viscous_friction'],
-              'effects.viscous_friction.axis.coefficient': 1.0}
-    with pytest.raises(ModelError, match=r'unknown drive axis \(known: slide_1'):
-        DriveModel.from_parameters(values)
-
-
-def test_motion_comes_from_positions_of_the_drive_alone() -> None:
-    time, _, q_dot, q_ddot = sweep(20.0, 1)
-    found = reconstruct(DriveModel.from_parameters(VALUES), bench(1))
-    np.testing.assert_allclose(found.velocity[:, 0], q_dot[found.index], atol=2e-5)
-    np.testing.assert_allclose(found.acceleration[:, 0], q_ddot[found.index], atol=2e-3)
-    np.testing.assert_array_equal(found.time, time[found.index])
 
 
 def test_a_recording_of_other_drives_is_refused_by_name() -> None:
@@ -172,26 +134,6 @@ def test_columns_of_numbers_are_what_the_model_changes_by() -> None:
                                    atol=2e-3 * np.abs(change).max())
 
 
-def test_a_number_below_zero_of_a_robot_moves_the_way_it_is_told_to() -> None:
-    values = {**read_parameters(CONFIG / 'paper.yaml'), 'masses.centre': [0.0, -0.01, -0.02],
-              'tolerances.masses.centre': 0.1, 'tolerances.gravity': 0.1}
-    model = DriveModel.from_parameters(values)
-    forces = model.drive_forces(HelicalPath().motion(np.arange(0.0, 1.0, 0.1)))
-    found = Sensitivities(model, model)
-    columns = found.columns(forces)['numbers']
-    assert len(found.numbers) == 3
-    for number, column in zip(found.numbers, columns, strict=True):
-        moved = list(model.values[number.key])
-        moved[number.element or 0] += np.sign(number.value) * number.deviation
-        after = DriveModel.from_parameters({**model.values, number.key: moved}).drive_forces(
-            forces.mechanism.motion)
-        bodies = [name for name in forces.parts if name != 'passive_friction']
-        change = sum(after.parts[name] - forces.parts[name] for name in bodies)
-        passive = after.parts['passive_friction'] - forces.parts['passive_friction']
-        np.testing.assert_allclose(column, change + passive, rtol=0,
-                                   atol=0.02 * np.abs(change).max())
-
-
 def test_an_offset_that_is_known_roughly_is_found_within_its_tolerance() -> None:
     model = DriveModel.from_parameters({**VALUES, 'tolerances.friction.offset': 1.0})
     design = Design.of(model, [bench(3, hidden=False, offset=-0.5)])
@@ -207,21 +149,6 @@ def test_effects_of_a_platform_are_not_offered_to_an_axis() -> None:
         EffectRequest.of('payload_mass').placed(DriveModel.from_parameters(VALUES))
     with pytest.raises(EffectRequestError, match='one of axis'):
         EffectRequest.of('viscous_friction:lift_1', (AXIS,))
-
-
-def test_compare_tells_the_error_of_the_axis(folder: Path) -> None:
-    done = pprs('compare', 'run.csv', '--model', 'axis.yaml', '--json', 'compare.json',
-                '--report', 'compare.html', cwd=folder)
-    assert done.returncode == 0, done.stderr
-    found = json.loads((folder / 'compare.json').read_text())
-    _, q, q_dot, q_ddot = sweep(20.0, 1)
-    hidden = SPRING * (q - CENTRE)
-    assert list(found['drives']) == [AXIS]
-    assert found['overall']['rms'] == pytest.approx(np.sqrt(np.mean(hidden ** 2)), rel=0.02)
-    measured = textbook_force(q_dot, q_ddot) + hidden
-    assert found['overall']['relative'] == pytest.approx(
-        found['overall']['rms'] / np.std(measured), rel=0.02)
-    assert (folder / 'compare.html').stat().st_size > 10_000
 
 
 def test_diagnose_names_the_hidden_effect_and_writes_a_model_that_has_it(folder: Path) -> None:
@@ -251,12 +178,3 @@ def test_diagnose_names_the_hidden_effect_and_writes_a_model_that_has_it(folder:
     undone = pprs('history', 'better.yaml', '--undo', '--output', 'undone.yaml', cwd=folder)
     assert undone.returncode == 0, undone.stderr
     assert {key: DriveModel.load(folder / 'undone.yaml').values[key] for key in VALUES} == VALUES
-
-
-def test_nothing_is_missing_where_nothing_is(folder: Path) -> None:
-    write_recording(folder / 'right.csv', bench(4, hidden=False))
-    done = pprs('diagnose', 'right.csv', '--model', 'axis.yaml', '--json', 'right.json',
-                cwd=folder)
-    assert done.returncode == 0, done.stderr
-    found = json.loads((folder / 'right.json').read_text())
-    assert (found['verdict'], found['effects']) == ('adequate', [])

@@ -169,14 +169,6 @@ def test_the_drives_do_the_work_of_wrench_and_drag(elbow) -> None:
         assert_allclose(damping, damping.T, rtol=0, atol=1e-6)
 
 
-def test_a_platform_pulled_down_needs_lifts_that_push_up() -> None:
-    state = paper_model().mechanism(PlatformMotion.at_rest((0.0, 0.0, 0.5)))
-    down = EFFECTS['external_wrench'].at({'force_z': 3.0}).force(state)
-    assert_allclose(down, [[0, 0, 0, 1, 1, 1]], rtol=0, atol=1e-12)
-    payload = EFFECTS['payload_mass']({'mass': 3.0 / 9.81}).force(state)
-    assert_allclose(payload, down, rtol=0, atol=1e-12)
-
-
 @every_elbow
 def test_the_force_of_stiffness_is_the_change_of_its_energy(elbow) -> None:
     robot, motion = several_velocities_per_pose(elbow)
@@ -223,26 +215,6 @@ def test_dry_friction_of_joints_takes_its_torque_times_their_speed(elbow) -> Non
         assert_allclose(np.sum(force * state.velocity, axis=1), expected, rtol=0, atol=1e-7)
 
 
-@pytest.mark.parametrize('name', ['joint_friction', 'tool_drag'])
-def test_friction_dissipates_at_every_speed_and_is_nothing_at_rest(case, name) -> None:
-    _, motion, _ = case
-    robot = case[0]
-    effect = EFFECTS[name](VALUES[name])
-    for slowness in (1.0, 1e-3, 1e-6):
-        slow = replace_velocity(motion, slowness)
-        state = model_of(robot).mechanism(slow)
-        assert np.all(np.sum(effect.force(state) * state.velocity, axis=1) > 0)
-    rest = model_of(robot).mechanism(replace_velocity(motion, 0.0))
-    assert_allclose(effect.force(rest), 0, atol=1e-12)
-
-
-def replace_velocity(motion, factor):
-    return PlatformMotion(
-        motion.position, motion.orientation, factor * motion.linear_velocity,
-        factor * motion.angular_velocity, motion.linear_acceleration,
-        motion.angular_acceleration)
-
-
 @pytest.mark.parametrize('changes', [
     {'equations': 'printed'}, {'friction.approach': 'independent_chains'}])
 def test_friction_added_in_joints_is_exact_whatever_the_papers_is(changes) -> None:
@@ -255,17 +227,6 @@ def test_friction_added_in_joints_is_exact_whatever_the_papers_is(changes) -> No
 
 
 # What holds for all of them ------------------------------------------------------------------
-
-@every_effect
-def test_every_coefficient_changes_the_prediction(case, name) -> None:
-    effect, state = EFFECTS[name], case[2]
-    columns = []
-    for coefficient in effect.coefficients:
-        force = effect.at({coefficient.name: coefficient.scale}).force(state)
-        assert np.sqrt(np.mean(force ** 2)) > 0.003, coefficient.name
-        columns.append(force.ravel() / np.linalg.norm(force))
-    # No coefficient does what the others do together.
-    assert np.linalg.svd(np.array(columns), compute_uv=False)[-1] > 0.02
 
 
 @every_effect
@@ -282,16 +243,6 @@ def test_forces_follow_the_coefficients(case, name) -> None:
     else:
         assert rest < 1e-9
     assert_allclose(effect.at({}).force(state), 0, atol=1e-9)
-
-
-@every_effect
-def test_unit_coefficients_one_at_a_time_give_finite_forces(case, name) -> None:
-    # Moments of inertia about one axis alone, or springs without stiffness, are no real bodies.
-    for coefficient in EFFECTS[name].coefficients:
-        for size in (1.0, -1.0):
-            force = EFFECTS[name].at({coefficient.name: size}).force(case[2])
-            assert np.all(np.isfinite(force))
-            assert np.abs(force).max() > 0
 
 
 @every_effect
@@ -338,24 +289,6 @@ def robot_of(robot):
     return replace(robot, masses=replace(robot.masses))
 
 
-def test_masses_that_no_robot_has_are_refused_when_they_are_made_anew() -> None:
-    robot = paper_model().robot
-    for name, values in (('payload_mass', {'mass': -3.0}), ('link_mass', {'rods': {'mass': -1.0}}),
-                         ('platform_inertia', {'xx': -0.1, 'yy': 0.0, 'zz': 0.0})):
-        altered = EFFECTS[name].from_file(values).changed(robot)
-        with pytest.raises(ModelError, match=r'masses\.'):
-            robot_of(altered)
-
-
-def test_a_moment_without_stiffness_is_exact_and_can_still_be_written(case) -> None:
-    spring, state = EFFECTS['joint_spring'], case[2]
-    constant = spring.at({'revolute.moment': 1.0})
-    written = spring.from_file(constant.to_file())
-    assert np.abs(constant.force(state) - written.force(state)).max() < 0.005 * np.abs(
-        constant.force(state)).max()
-    assert spring.at({}).values == {'revolute.stiffness': 0.0, 'revolute.position': 0.0}
-
-
 @pytest.mark.parametrize(('name', 'values', 'rule'), [
     ('payload_mass', {'mass': 1e6}, r'effects\.payload_mass\.mass is 1000000.*between'),
     ('payload_mass', {}, r'effects\.payload_mass\.mass is missing.*kg'),
@@ -366,9 +299,3 @@ def test_a_moment_without_stiffness_is_exact_and_can_still_be_written(case) -> N
 def test_a_wrong_block_is_told(name, values, rule) -> None:
     with pytest.raises(ModelError, match=rule):
         EFFECTS[name].from_file(values)
-
-
-def test_what_is_seldom_known_may_be_left_out() -> None:
-    inertia = EFFECTS['platform_inertia'].from_file({'xx': 0.1, 'yy': 0.1, 'zz': 0.1})
-    assert inertia.values['xy'] == 0.0
-    assert EFFECTS['tool_drag'].from_file({'coefficient': 2.0}).values['rotational'] == 0.0

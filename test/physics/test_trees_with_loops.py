@@ -165,9 +165,6 @@ def test_a_state_of_the_other_assembly_is_not_gone_on_from(tmp_path: Path) -> No
     assert state.closed[structure] == pytest.approx(home, abs=1e-9)
 
 
-PAPER_FRICTION = ('friction.revolute', 'friction.spherical')
-
-
 def three_pprs(tmp_path: Path, drives: bool = False) -> tuple[DriveModel, DriveModel]:
     """Return the paper's robot in closed form, and as a tree with loops.
 
@@ -288,18 +285,6 @@ def test_a_state_with_a_load_is_sliced_with_it(tmp_path: Path) -> None:
     loaded = state.with_load(model.robot, StructureLoad(wrench))
     for part in (slice(2, 5), np.array([6, 1]), np.arange(8) % 2 == 0):
         assert loaded[part].rigid_force == pytest.approx(loaded.rigid_force[part], abs=1e-9)
-
-
-def test_a_gear_does_not_carry_its_rotor(tmp_path: Path) -> None:
-    """The motor accelerates the rotor on its own side: only its effort grows, not the load."""
-    model = DriveModel.load(robots.five_bar().write(tmp_path))
-    motion = states(model, SIZES['five_bar'])
-    with_rotor = DriveModel.from_parameters(
-        {**model.values, 'robot.armature': (0.5, 0.8)}, model.source)
-    before, after = model.mechanism(motion), with_rotor.mechanism(motion)
-    assert after.friction_load == pytest.approx(before.friction_load, abs=1e-12)
-    assert after.rigid_force - before.rigid_force == pytest.approx(
-        motion.acceleration * np.array([0.5, 0.8]), abs=1e-9)
 
 
 def four_bar(coupler: float) -> robots.RobotText:
@@ -505,19 +490,6 @@ def test_a_pose_past_a_singularity_is_not_answered_with_another_pose_of_the_same
                                                   np.tile(turned, (samples, 1))))
 
 
-def test_friction_of_joints_leaves_loads_as_they_are_that_others_read(tmp_path: Path) -> None:
-    """Columns of several threads share one state."""
-    model = DriveModel.load(robots.hexapod().write(tmp_path))
-    state = model.mechanism(states(model, SIZES['hexapod']))
-    loads = {name: each.copy() for name, each in state.reactions._asdict().items()}
-    joints = np.arange(3)
-    numbers = [np.full(3, value) for value in (0.3, 0.2, 0.01, 0.1)]
-    efforts = state.against_friction(tree_evaluation.JointFriction(joints, joints, *numbers))
-    assert np.abs(efforts).max() > 0
-    for name, each in state.reactions._asdict().items():
-        np.testing.assert_array_equal(each, loads[name])
-
-
 def test_a_delta_follows_places_and_refuses_what_it_cannot_turn(tmp_path: Path) -> None:
     model = DriveModel.load(robots.delta().write(tmp_path))
     assert model.robot.tool_pose.chosen.tolist() == [0, 1, 2]
@@ -607,14 +579,6 @@ def test_a_robot_from_mjcf_is_that_of_mujoco(tmp_path: Path) -> None:
         columns = np.column_stack((np.eye(4)[:, [0, 2]], constraint.T))
         expected = np.linalg.lstsq(columns, data.qfrc_inverse, rcond=1e-11)[0][:2]
         assert found[k] == pytest.approx(expected, abs=1e-9 * np.max(np.abs(found)))
-
-
-def test_it_is_told_as_a_robot_with_loops(tmp_path: Path) -> None:
-    file = robots.five_bar().write(tmp_path)
-    assert DriveModel.load(file).title == 'a robot with loops'
-    values = {**DriveModel.load(file).values, 'effects.payload_offset.x': 0.1}
-    with pytest.raises(ModelError, match='acts in a robot with loops'):
-        DriveModel.from_parameters(values, str(file))
 
 
 def test_the_file_refuses_two_descriptions_and_none(tmp_path: Path) -> None:

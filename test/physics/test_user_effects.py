@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import subprocess
@@ -110,20 +109,6 @@ assert catalogue() is catalogue()
 """
 
 
-def test_the_catalogue_lists_it_after_the_packages_own(installed: Path) -> None:
-    done = python(LIST, installed)
-    assert done.stdout.split() == [*CATALOGUE, 'eddy_brake', 'sensor_dead_band'], done.stderr
-
-
-def test_no_other_package_is_asked_where_no_effect_of_theirs_is_named(
-    installed: Path, tmp_path: Path,
-) -> None:
-    file = model_file(tmp_path, {'active': ['effort_offset'],
-                                 'effort_offset': {'lift_1': {'force': 0.5}}})
-    code = LOAD + "print('eddy_brake' in sys.modules, 'importlib.metadata' in sys.modules)"
-    assert python(code, installed, file).stdout.split() == ['False', 'False']
-
-
 GOOD = """
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import Card, Parameter
@@ -186,38 +171,3 @@ def test_a_broken_effect_is_left_out_with_one_clear_warning_and_the_others_stay(
         assert reason in line
     assert any('second_of_that_name' in line and 'mine is taken' in line for line in told)
     assert 'Traceback' not in done.stderr
-
-
-FIND_DEAD_BAND = """
-import sys, json
-import numpy as np
-from pprs_dynamics import DriveModel
-from pprs_dynamics.inference.adoption.adopt import adopt
-from pprs_dynamics.inference.adoption.request import EffectRequest
-from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.drives import DRIVES
-given = DriveModel.load(sys.argv[1])
-true = DriveModel.from_parameters({**given.values, 'effects.active': ['sensor_dead_band'],
-                    **{f'effects.sensor_dead_band.{d}.width': 0.5 for d in DRIVES}})
-time = np.arange(1600) * 0.005
-forces = true.drive_forces(Excitation().motion(time).with_time(time))
-effort = true.measured(forces).total
-effort = effort + 0.05 * np.random.default_rng(0).normal(size=effort.shape)
-recording = Recording.from_arrays('made', time, forces.mechanism.position, effort=effort)
-found = diagnose(given, [recording])
-answer = adopt(given, EffectRequest.of('sensor_dead_band'), [recording], diagnosis=found)
-print(json.dumps({'found': found.to_dict(), 'adopted': answer.to_dict()}))
-"""
-
-
-def test_a_nonlinear_sensor_effect_of_another_package_is_found_and_adopted(
-        installed: Path, tmp_path: Path) -> None:
-    done = python(FIND_DEAD_BAND, installed, model_file(tmp_path, {}), limit=200)
-    assert done.returncode == 0, done.stderr
-    said = json.loads(done.stdout)
-    assert [one['name'] for one in said['found']['effects']] == ['sensor_dead_band']
-    widths = [one['value'] for one in said['found']['effects'][0]['parameters'].values()]
-    assert widths == pytest.approx([0.5] * 6, rel=0.1)
-    assert said['adopted']['adopted'], said['adopted']['reason']

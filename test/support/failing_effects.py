@@ -72,7 +72,7 @@ class WornBrake(DriveEffect):
 
 class Hose(BodyEffect):
     name = 'hose'
-    acts_in = frozenset({'platform', 'arm'})
+    acts_in = frozenset({'platform', 'mechanism'})
     linear = (Parameter('force', 'F', 'N', 'downward force', 0.0, 1e6),)
     card = CARD
 

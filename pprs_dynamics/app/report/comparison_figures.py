@@ -138,13 +138,10 @@ def along(residuals: Residuals, noise: NoiseSpectrum, statement: Statement, what
         return None
     units = residuals.units_of(statement.drive)
     factor, label = axis_of(variable, residuals, statement.drive)
-    kind = 'rms' if statement.kind == 'scatter' else 'mean'
-    trace = (_means(profile, variable, residuals, statement.drive) if kind == 'mean' else
-             charts.trace(factor * middles(profile), profile.rms, kind, charts.ERROR, 2,
-                          mode='lines+markers', hovertemplate=charts.hover(units)))
+    trace = _means(profile, variable, residuals, statement.drive)
     figure = charts.figure([trace], 300, margin={**charts.MARGIN, 't': 15}, showlegend=False,
                            xaxis_title=label,
-                           yaxis_title=f'{kind} {what} on {statement.drive} [{units.effort}]')
+                           yaxis_title=f'mean {what} on {statement.drive} [{units.effort}]')
     if statement.range is not None and statement.variable == variable:
         low, high = (factor * end for end in statement.range)
         figure.add_vrect(x0=low, x1=high, fillcolor=charts.MARK, opacity=0.15, line_width=0)

@@ -301,10 +301,10 @@ def _share(true: Any, among: Any) -> float:
 
 
 def _adopt_curve(case: _Case, request: CurveRequest, report: Callable[[float], None]) -> Adoption:
-    model, drive, noise = case.model, request.drive, case.diagnosis.noise[request.drive]
+    model, drive = case.model, request.drive
     plain_model = without_curve(model, drive)
     start, _ = measure_residuals(plain_model, case.recordings)
-    fitted = fit_curve(start, request, noise)
+    fitted = fit_curve(start, request)
     after = with_curve(plain_model, drive, fitted)
     residuals, _ = measure_residuals(after, case.recordings)
     before = start if plain_model is model else measure_residuals(model, case.recordings)[0]
@@ -312,7 +312,7 @@ def _adopt_curve(case: _Case, request: CurveRequest, report: Callable[[float], N
         given, found = (measure_residuals(one, case.validate)[0] for one in (plain_model, after))
     else:
         given, found = start, held_out_residuals(
-            start, request, noise, lambda share: report(DIAGNOSED + (1 - DIAGNOSED) * share))
+            start, request, lambda share: report(DIAGNOSED + (1 - DIAGNOSED) * share))
     count = len(model.drives)
     # Chosen among the curves of every drive over every variable.
     evidence = fitted.evidence - 2 * float(np.log(count * (len(OWN) + len(OF) * (count - 1))))

@@ -4,14 +4,13 @@
 """A curve over one variable, fitted to a drive's residual.
 
 The curve is a B-spline with a prior on its roughness (Eilers & Marx, Flexible smoothing with
-B-splines and penalties, Statistical Science 11, 1996). Number of knots and smoothness maximise the
-restricted likelihood under the drive's noise: with the coefficients integrated out, more knots are
-no better by themselves. The same number, against that without a curve, is the evidence.
+B-splines and penalties, Statistical Science 11, 1996). The smoothness maximises the restricted
+likelihood. The same number, against that without a curve, is the evidence.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import pi
@@ -21,9 +20,9 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.errors import PprsError, UnknownNameError
-from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
-from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.regression.joint_fit import Regression
+from pprs_dynamics.inference.regression.normal_equations import Block
+from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.laws.measured_curve import (
     DEGREE,
@@ -35,13 +34,14 @@ from pprs_dynamics.physics.effects.laws.measured_curve import (
 )
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
-INTERVALS = (6, 12, 24, 48, 96, 192)  # between knots, tried
+INTERVALS = 96  # between knots; the prior on the roughness decides how fine the curve is
 # Prior standard deviations of the second difference of coefficients, as a share of the error's rms.
-ROUGHNESS = np.geomspace(1e-3, 3.0, 15)
+ROUGHNESS = np.geomspace(1e-4, 1.0, 13)
 WIDEST = 10.0  # prior standard deviation of the curve itself, as a multiple of the error's rms
 LEAST_SHARE = 0.002  # of the samples at each end of the variable, beyond which nothing is fitted
 TURN = 2 * pi
 BLOCKS = 10
+FLEXIBLE = 0.1  # roughness of the curve with which the noise is estimated
 ACTIVE = 'effects.active'
 
 
@@ -145,19 +145,15 @@ def curve_variable(residuals: Residuals, request: CurveRequest) -> Array:
     return values
 
 
-def fit_curve(
-    residuals: Residuals, request: CurveRequest, noise: NoiseSpectrum,
-    left_out: slice | None = None,
-) -> FittedCurve:
-    """Fit a curve to a drive's error.
+def fit_curve(residuals: Residuals, request: CurveRequest, left_out: slice | None = None,
+              ) -> FittedCurve:
+    """Return the curve of a drive's error that has the largest evidence.
 
     Parameters
     ----------
     residuals : Residuals
         Of the model that the curve joins.
     request : CurveRequest
-    noise : NoiseSpectrum
-        Of the drive.
     left_out : slice, optional
         Samples that are not fitted.
 
@@ -170,14 +166,13 @@ def fit_curve(
     if left_out is not None:
         measured = residuals.measured.copy()
         measured[left_out, drive] = np.nan
-        if not np.isfinite(measured).any():
-            raise CurveError(f'{request.name}: {request.drive} was not measured')
         residuals = replace(residuals, measured=measured)
-    series = DriveSeries(residuals, drive, FrequencyBands.for_residuals(residuals))
-    if len(series) < 10 * (INTERVALS[0] + DEGREE):
-        raise CurveError(f'{request.name}: {request.drive} was measured at {len(series)} '
-                         'samples only')
-    seen = x[series.index]
+    try:
+        regression = Regression(residuals, drives=(drive,))
+    except ResidualsError:
+        raise CurveError(f'{request.name}: {request.drive} was not measured, or at few samples '
+                         'only') from None
+    seen = x[np.isfinite(residuals.measured[:, drive])]
     start, end = np.quantile(seen, (LEAST_SHARE, 1 - LEAST_SHARE))
     if not end - start > 1e-9 * max(1.0, abs(start), abs(end)):
         raise CurveError(f'{request.name}: {request.variable} hardly varies in the recordings')
@@ -185,46 +180,35 @@ def fit_curve(
                  and residuals.units_of(request.drive).position == 'rad')
     if turns:
         start, end = -pi, pi
-    root = np.sqrt(noise.power(series.frequency))
-    error = series.transform(series.error) / root
-    scale = root_mean_square(series.error)
-    found = []
-    for intervals in INTERVALS:
-        index, weight = spline_basis(x[series.index], start, end, intervals, turns)
-        count = intervals + (0 if turns else DEGREE)
-        columns = np.zeros((count, len(series)))
-        for k in range(DEGREE + 1):
-            np.add.at(columns, (index[:, k], np.arange(len(series))), weight[:, k])
-        rows = series.transform(columns) / root
-        gram, moment = rows @ rows.T, rows @ error
-        for values, covariance, evidence, freedom in _smoothed(gram, moment, scale, turns):
-            curve = Curve(request.variable, float(start), float(end), tuple(values.tolist()), turns)
-            found.append(FittedCurve(curve, covariance, evidence, freedom))
-    return max(found, key=lambda one: one.evidence)
+    scale = root_mean_square(residuals.error[np.isfinite(residuals.measured[:, drive]), drive])
 
+    index, weight = spline_basis(x, start, end, INTERVALS, turns)
+    columns = np.zeros((INTERVALS + (0 if turns else DEGREE), len(x)))
+    for k in range(DEGREE + 1):
+        np.add.at(columns, (index[:, k], np.arange(len(x))), weight[:, k])
+    unit = np.eye(len(columns))
+    second = (unit - 2 * np.roll(unit, 1, 1) + np.roll(unit, 2, 1) if turns
+              else np.diff(unit, 2, axis=0))
+    rows = {drive: regression.series[drive].transform(columns)}
 
-def _smoothed(gram: Array, moment: Array, scale: float, periodic: bool,
-              ) -> Iterator[tuple[Array, Array, float, float]]:
-    """Yield values, covariance, evidence and freedom for each prior of smoothness."""
-    count = len(gram)
-    second = np.diff(np.eye(count), 2, axis=0)
-    if periodic:
-        second = np.eye(count) - 2 * np.roll(np.eye(count), 1, 1) + np.roll(np.eye(count), 2, 1)
-    wide = np.eye(count) / (WIDEST * scale) ** 2
-    for share in ROUGHNESS:
-        deviation = share * scale
-        prior = second.T @ second / deviation ** 2 + wide
-        factor = np.linalg.cholesky(gram + prior)
-        half = np.linalg.solve(factor, moment)
-        values = np.linalg.solve(factor.T, half)
-        inverse = np.linalg.inv(factor)
-        covariance = inverse.T @ inverse
-        logs = 2 * np.log(np.diag(factor)).sum() - np.linalg.slogdet(prior)[1]
-        yield values, covariance, float(half @ half - logs), float(np.trace(covariance @ gram))
+    def block(share: float) -> Block:
+        """Return the columns of a curve with the precision of its roughness and of its size."""
+        return regression.transformed_block(rows, second.T @ second / (share * scale) ** 2
+                                            + unit / (WIDEST * scale) ** 2)
+
+    # The noise is that of a flexible curve, the same for all.
+    noise = regression.fit((block(FLEXIBLE),)).amplitudes
+    best = min((regression.at((block(share),), noise) for share in ROUGHNESS),
+               key=lambda fit: fit.deviance)
+    precision = best.blocks[0].precision
+    freedom = len(best.coefficients) - float(np.trace(best.covariance @ precision))
+    return FittedCurve(
+        Curve(request.variable, float(start), float(end), tuple(best.coefficients.tolist()), turns),
+        best.covariance, regression.at((), noise).deviance - best.deviance, freedom)
 
 
 def held_out_residuals(
-    residuals: Residuals, request: CurveRequest, noise: NoiseSpectrum,
+    residuals: Residuals, request: CurveRequest,
     report: Callable[[float], None] = lambda share: None,
 ) -> Residuals:
     """Return residuals whose model has the curve, in each block from a fit to the others."""
@@ -233,7 +217,7 @@ def held_out_residuals(
     edges = np.linspace(0, len(residuals), BLOCKS + 1).astype(int)
     for number, (first, last) in enumerate(pairwise(edges)):
         block = slice(int(first), int(last))
-        model[block, drive] += fit_curve(residuals, request, noise, block).curve.force(x[block])
+        model[block, drive] += fit_curve(residuals, request, block).curve.force(x[block])
         report((number + 1) / BLOCKS)
     return replace(residuals, model=model)
 

@@ -58,7 +58,7 @@ from pprs_dynamics.inference.search.held_out import (
     hold_out,
     predictive_gain,
 )
-from pprs_dynamics.inference.search.noise_floors import noise_floors
+from pprs_dynamics.inference.search.noise_floors import noise_at_most, noise_floors
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
@@ -112,9 +112,10 @@ class Answer:
             for d, spectrum in fits.regression.noise(fitted.fit).items()}
         known = noise_floors(table.first)
         # The residual of the reported set is an upper bound of the noise.
-        self.floors = {self.drives[d]: min(known.get(self.drives[d], np.inf),
-                                           self.fits.regression.noise_floor(self.fitted.fit, d))
-                       for d in self.fits.regression.drives}
+        self.floors = {self.drives[d]: noise_at_most(
+            known.get(self.drives[d], np.inf),
+            self.fits.regression.noise_floor(self.fitted.fit, d))
+            for d in self.fits.regression.drives}
         self.unseen = tuple(name for name in self.floors if name not in known)
 
     def _remaining(self) -> Array:
@@ -375,7 +376,7 @@ class Answer:
                      for fitted in self.table.alone.values())
 
     def _suspects(self) -> tuple[RankedEffect, ...]:
-        """Return effects that are nearly worth their prior cost beside the reported ones."""
+        """Return effects nearly worth their prior cost in addition to the reported ones."""
         return tuple(
             self._ranked(row.fits, row.fitted, candidate, self.table.best.cost - row.cost)
             for candidate, row in self.table.suspects(self.decisions.suspect_margin))

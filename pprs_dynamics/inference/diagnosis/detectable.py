@@ -1,7 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""From which size on an effect that was not found would have been told."""
+"""The smallest size of an effect that would have been reported."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 
 @dataclass(frozen=True)
 class DetectableSize:
-    """The size from which on an effect would have been told, on one drive or in the structure.
+    """The smallest size at which an effect would have been reported, by drive or structure.
 
     Parameters
     ----------
@@ -47,12 +47,11 @@ class DetectableSize:
 
 
 def detectable_sizes(fits: FittedSets, fitted: CandidateSet) -> tuple[DetectableSize, ...]:
-    """Return from which size on effects of one number would have been told beside a set.
+    """Return the smallest sizes at which effects of one number would have been reported.
 
-    Each by itself, at the noise of the set, as it stands: where the deviance is expected to fall
-    by the prior cost of the effect, and by as much again as rivals are apart; and where its force
-    is beyond the form errors of the other effects. For a coefficient
-    c of own information S and prior precision L the deviance falls by
+    Each alone in addition to a set, at its noise. The deviance must fall by the prior cost of the
+    effect and the margin of rivals, and its force must exceed the form errors of the others. For
+    a coefficient c of information S and prior precision L the deviance falls by
     (c S)^2 / (S + L) - ln(1 + S / L).
 
     Parameters

@@ -29,7 +29,7 @@ def diagnose(
     progress: Callable[[float], None] | None = None, decisions: Decisions = DECISIONS,
     as_it_is: bool = False, reference: Reference | None = None,
 ) -> Diagnosis:
-    """Return which physical effect a model lacks, as far as recordings can tell.
+    """Return which physical effect a model lacks, as far as recordings show it.
 
     Parameters
     ----------

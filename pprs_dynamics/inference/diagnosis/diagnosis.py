@@ -61,7 +61,7 @@ class SinceReference:
 
     @classmethod
     def of(cls, reference: Reference, design: Design) -> SinceReference:
-        """Return it for a design beside a reference."""
+        """Return it for a design with a reference."""
         assert design.carried is not None
         left = design.residuals.error
         whole = left + design.carried.shown(design.residuals)
@@ -111,7 +111,7 @@ class Diagnosis:
     residuals : Residuals
         Of the model as given.
     remaining : (M, D) array
-        What `adopted` leaves [N].
+        Measured minus `adopted` [N].
     noise : mapping of str to NoiseSpectrum
         By drive.
     noise_floors : mapping of str to float
@@ -119,21 +119,21 @@ class Diagnosis:
     noise_floor : float
         The same over drives [N].
     refit : float
-        Error of the input model with its numbers fitted beside the effects, without these [N].
+        Error with the fitted numbers of the model but without the effects [N].
     above_noise : mapping of str to float
-        How many times its noise a drive keeps, where that is more than what was found may leave.
+        Residual of a drive over its noise, where the reported effects do not explain it.
     little : mapping of str to float
-        Drives of whose effort little is explained with what was found, with the shares.
+        Drives of whose effort the reported effects explain little, with the shares.
     unseen_noise : tuple of str
-        Drives whose noise cannot be told apart from what may be missing: their floor is an upper
-        bound, what the best set leaves.
+        Drives whose noise the recordings do not determine: their floor is an upper bound, the
+        residual of the best set.
     held_out_on : {'blocks', 'validation'}
     effort_looks_like : mapping of str to NoMeasurement
         Drives whose efforts are no measurement: then nothing is claimed.
     stick_slip : mapping of str to StickSlip
         Drives that stick and slip for much of the time: then nothing else is claimed.
     since : SinceReference, optional
-        The reference run since which it is told what has changed; None: what the model lacks.
+        The reference run since which changes are reported; None: what the model lacks.
     selection : ModelTable, optional
         All rows that were fitted.
     decisions : Decisions
@@ -172,7 +172,7 @@ class Diagnosis:
 
     @cached_property
     def detectable(self) -> tuple[DetectableSize, ...]:
-        """From which size on other effects would have been told; none where the answer is open."""
+        """Smallest sizes of other effects; none where the answer is open."""
         if (self.selection is None or self.verdict not in ('adequate', 'effect')
                 or any(effect.course for effect in self.effects)):
             return ()

@@ -80,7 +80,7 @@ class FittedEffect:
 
     @property
     def places(self) -> tuple[tuple[str, ...], ...]:
-        """Links or joints that it is on, each with those that no motion tells it from."""
+        """Links or joints that it is on, each with those that no motion separates from it."""
         return self.effect.places_of(self.parameters)
 
 
@@ -91,7 +91,7 @@ class FoundEffect(FittedEffect):
     Parameters
     ----------
     evidence : float
-        By which the best set without it, whatever stands there, costs more than that with it.
+        Cost of the best set without it, less that of the best set.
     error_before, error_after : float
         Without its force, all else as it was fitted, and with it [N].
     held_out_before, held_out_after : float
@@ -183,7 +183,7 @@ class RivalEffect(FittedEffect):
     cost : float
         Of its set, above the best one's.
     remaining : (M, D) array
-        What its set leaves [N].
+        Residual of its set [N].
     """
 
     of: str

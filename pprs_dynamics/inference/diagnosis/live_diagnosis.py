@@ -3,12 +3,11 @@
 
 """What changed on a running robot: one window of its stream diagnosed after the other.
 
-A window is diagnosed as a recording is. What it names is only a hypothesis: it is claimed once
-the model that was fitted to the window also predicts the next one, which it was not fitted to,
-better than the model without it, and once that window's own diagnosis names it again. It is
-withdrawn when the latest window neither names nor needs it. When the change came is where the
-cumulated difference of the two models' whitened squared errors is lowest: the maximum-likelihood
-change point between two known models (Hinkley, Biometrika 57, 1970).
+A window is diagnosed as a recording. Its effects are claimed once the model that was fitted to it
+predicts the next window better than the model without them, and the diagnosis of that window
+reports them again. An effect is withdrawn when the latest window neither reports nor needs it. It
+began where the cumulated difference of the two models' whitened squared errors is lowest: the
+maximum-likelihood change point between two known models (Hinkley, Biometrika 57, 1970).
 """
 
 from __future__ import annotations
@@ -37,34 +36,16 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.rests import share_in_motion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
-
-@dataclass(frozen=True)
-class LiveDecisions:
-    """The numbers that decide what is claimed of a stream.
-
-    Parameters
-    ----------
-    certainty : float
-        Standard errors by which a change must lower the error of the next window. With ten blocks
-        a window, 2 keeps one effect in 30 that is none; two windows must name it besides.
-    least_motion : float
-        Share of a window's samples in which some drive moves, below which nothing is fitted: at
-        rest, friction is anything within its static value.
-    moving : float
-        Share of its highest speed above which a drive moves.
-    recent : int
-        Windows before the one that confirms a change in which its beginning is looked for: the one
-        that named it first, and the one before, which the change may have hidden from.
-    """
-
-    certainty: float = 2.0
-    least_motion: float = 0.2
-    moving: float = 0.02
-    recent: int = 2
-
-
-LIVE_DECISIONS = LiveDecisions()
-MOST_VALUES = 3  # of an effect that its sentence holds
+# Standard errors by which a change must lower the error of the next window. With ten blocks in a
+# window, 2 accept one wrong effect in 30; two windows must report it as well.
+CERTAINTY = 2.0
+# Share of a window's samples in which some drive moves, below which it is not diagnosed, and share
+# of a drive's highest speed above which it moves.
+LEAST_MOTION, MOVING = 0.2, 0.02
+# Windows before the confirming one, in which the beginning of a change is looked for: the first
+# that reported it, and the one before.
+RECENT = 2
+MOST_VALUES = 3  # of an effect in its sentence
 
 
 @dataclass(frozen=True)
@@ -78,9 +59,9 @@ class LiveEffect:
     since : float or None
         When it began [s], on the stream's clock; None where it was there from the start.
     confirmed : bool
-        Whether it held on a window that it was not fitted to.
+        Whether it was confirmed on a window that it was not fitted to.
     names : frozenset of str
-        Its own name and those of its rivals, which the window could not tell apart.
+        Its name and those of its rivals.
     """
 
     found: FoundEffect
@@ -123,9 +104,9 @@ class Window:
     diagnosis : dict
         JSON of `pprs diagnose`.
     adopted : DriveModel
-        The model with what was found, and its numbers as the fit moves them.
+        The model with the reported effects and its fitted numbers.
     plain : DriveModel
-        The same without what was found.
+        The same without the reported effects.
     """
 
     recording: Recording
@@ -173,11 +154,9 @@ class LiveDiagnosis:
         return tuple(effect for effect in self.effects if effect.confirmed)
 
     def adopted(self) -> dict[str, Any]:
-        """Return the values of the model with what is claimed; none where that cannot be adopted.
+        """Return the values of the model with the claimed effects; none where that is unknown.
 
-        Numbers of a window were fitted together: with one effect that is not confirmed among them
-        those of the others are not what they are without it. They are not known either where what
-        is claimed is not named by the latest window.
+        Numbers of a window were fitted together: they are valid only with all of its effects.
         """
         if self.last is None or not self.effects or not all(
                 effect.confirmed for effect in self.effects):
@@ -196,7 +175,7 @@ class LiveDiagnosis:
                 'since': min((effect.since for effect in self.claimed
                               if effect.since is not None), default=None),
                 'text': '; '.join(filter(None, [
-                    word_little(content.get('little_explained', {}), ' with what was found'),
+                    word_little(content.get('little_explained', {}), ' with the reported effects'),
                     *(effect.sentence(self.model.drives) for effect in self.claimed)])),
                 'window': [self.last.start, self.last.end] if self.last else None,
                 'note': self.note}
@@ -207,8 +186,7 @@ class LiveDiagnosis:
         Parameters
         ----------
         recording : Recording
-            Of the model's drives; it must not overlap the last one, on which it is judged
-            whether what was found there holds.
+            Of the model's drives, without overlap with the last window.
         start : float
             When it begins [s], on the stream's clock.
 
@@ -217,14 +195,13 @@ class LiveDiagnosis:
         PprsError
             As `diagnose`.
         """
-        live = LIVE_DECISIONS
-        if share_in_motion(recording.time, recording.position, live.moving) < live.least_motion:
-            return replace(self, withdrawn=(), note='the robot stands: nothing is fitted')
+        if share_in_motion(recording.time, recording.position, MOVING) < LEAST_MOTION:
+            return replace(self, withdrawn=(), note='the robot hardly moves: no diagnosis')
         answer = diagnose(self.model, [recording], reference=self.reference)
         window = Window(recording, start, start + float(recording.time[-1] - recording.time[0]),
                         answer.to_dict(), answer.adopted,
                         without_found(self.model, answer))
-        holds = self._holds(recording, live.certainty)
+        holds = self._holds(recording)
         beginning = cache(lambda: self._beginning(window))
         effects = []
         for found in answer.effects:
@@ -241,21 +218,19 @@ class LiveDiagnosis:
         if holds:
             effects += missed
         return replace(self, effects=tuple(effects), last=window, note='',
-                       recent=(*self.recent, (recording, start))[-live.recent:],
+                       recent=(*self.recent, (recording, start))[-RECENT:],
                        withdrawn=() if holds else tuple(missed))
 
-    def _holds(self, recording: Recording, least: float) -> bool:
-        """Return whether what the last window found predicts a recording better than without it.
+    def _holds(self, recording: Recording) -> bool:
+        """Return whether the model of the last window predicts a recording better.
 
-        By more than some standard errors. Numbers known to a tolerance move with the fit: what
-        they alone explain is no effect's, and an effect may only make up for what they have moved
-        too far.
+        Than the input model, and than the model with the fitted numbers alone.
         """
         if self.last is None or not self.effects:
             return False
         after, _ = measure_residuals(self.last.adopted, [recording])
         return all(
-            predictive_gain(measure_residuals(model, [recording])[0], after).confirms(least)
+            predictive_gain(measure_residuals(model, [recording])[0], after).confirms(CERTAINTY)
             for model in (self.model, self.last.plain))
 
     def _beginning(self, window: Window) -> float | None:
@@ -270,7 +245,7 @@ class LiveDiagnosis:
 
 
 def without_found(model: DriveModel, answer: Diagnosis) -> DriveModel:
-    """Return the model of a diagnosis without what it found, its other numbers as they are."""
+    """Return the model of a diagnosis without its effects, with its fitted numbers."""
     found = {effect.name for effect in answer.effects}
     given = {effect.name: effect for effect in model.effects}
     return replace(answer.adopted, effects=tuple(

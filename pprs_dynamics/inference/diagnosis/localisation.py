@@ -1,24 +1,22 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Where the model fails: patterns of each drive's error that stand out against its noise.
+"""Where the model fails: patterns of each drive's error that its noise does not explain.
 
-The same noise, criterion and patterns as in the search for missing effects, without any effect:
-per drive, the pattern that lowers the cost most is stated, what its variable can carry is taken
-out with it, and the search goes on until nothing lowers the cost.
+Noise, criterion and patterns are those of the search for missing effects, without any effect. The
+pattern that lowers the cost most is stated first. The columns of its variable then join the fit,
+until no pattern lowers the cost.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from statistics import NormalDist
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.diagnosis.quantities import in_unit, plain
-from pprs_dynamics.inference.diagnosis.statements import Statement, word_scatter, word_statement
+from pprs_dynamics.inference.diagnosis.statements import Statement, word_statement
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
@@ -26,7 +24,6 @@ from pprs_dynamics.inference.residuals.profiles import MOST_SHARE
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 from pprs_dynamics.inference.search.candidates import PriorCosts, UnknownCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions, outside_cost
-from pprs_dynamics.inference.search.patterns import Pattern
 from pprs_dynamics.inference.search.scan import with_fast_noise
 from pprs_dynamics.inference.search.unknown import DrivePatterns
 from pprs_dynamics.system.parallel import each
@@ -150,9 +147,6 @@ def _search(residuals: Residuals, drive: int) -> DriveFindings:
             candidate.parts[drive]), evidence, other_variables))
         blocks += [*candidate.blocks, *_carried(drive_patterns, candidate)]
         fit = regression.fit(blocks, found.amplitudes)
-    scatter = _scatter(drive_patterns, fit, {statement.variable for statement in statements})
-    if scatter is not None:
-        statements.append(scatter)
     return DriveFindings(tuple(statements), regression.noise(fit)[drive])
 
 
@@ -209,58 +203,3 @@ def _carried(drive_patterns: DrivePatterns, winner: UnknownCandidate) -> list[Bl
         variables = {'velocity', 'direction'}
     return [drive_patterns.family_block(family) for family in drive_patterns.families
             if family.variable in variables and not family.paired]
-
-
-def _scatter(drive_patterns: DrivePatterns, fit: JointFit, stated: set[str]) -> Statement | None:
-    """Return the statement of where the noise is larger than elsewhere, if any range stands out.
-
-    Ranks of the sizes of innovations stand for them, so that noise need not be Gaussian.
-    """
-    regression, d = drive_patterns.regression, drive_patterns.d
-    white = regression.innovations(fit, d)
-    n = len(white)
-    shares = (_ranks(np.abs(white)) - 0.5) / n
-    ranked = np.array([NormalDist().inv_cdf(share) for share in shares.tolist()])
-    # Equal sizes share a rank, which shifts and narrows the scores of quantised efforts.
-    scores = (ranked - ranked.mean()) / max(float(ranked.std()), 1e-12)
-    best: tuple[float, str, Pattern, Array] | None = None
-    for family in drive_patterns.families:
-        if family.paired or family.variable in stated or len(family.columns) == 1:
-            continue
-        # Bins do not overlap, so that sums over patterns are sums over their bins.
-        members = family.columns > 0.5
-        inside = family.weights @ members.sum(axis=1)
-        totals = family.weights @ (members @ scores)
-        gains = (totals ** 2 / np.maximum(inside * (1 - inside / n), 1e-9)
-                 - drive_patterns.prior_cost(family).total)
-        for at in np.argsort(-gains):
-            pattern, gain = family.patterns[at], float(gains[at])
-            if gain <= max(0.0, best[0] if best else 0.0):
-                break
-            if pattern.kind not in ('range', 'fast') or totals[at] <= 0:
-                continue
-            column = family.pattern_columns(int(at))[0]
-            held = column > 0.5
-            ratio = (np.mean(white[held] ** 2)
-                     / max(float(np.mean(white[~held] ** 2)), 1e-300))
-            if ratio >= drive_patterns.prior_costs.decisions.scatter_ratio:
-                best = (gain, family.variable, Pattern('scatter', pattern.limits, float(ratio)),
-                        column)
-    if best is None:
-        return None
-    gain, variable, pattern, column = best
-    # Scatter that comes and goes by itself makes sizes go together: they are worth fewer samples.
-    centred = scores.copy()
-    for part in (column > 0.5, column <= 0.5):
-        centred[part] -= centred[part].mean()
-    lags = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2)[:200]
-    worth = 1 / max(1 + 2 * float(np.maximum(lags[1:] / lags[0], 0.0)[:20].sum()), 1.0)
-    prior_cost = drive_patterns.prior_costs.of_pattern(1, 1, 1).total
-    score = worth * (gain + prior_cost) - prior_cost
-    return word_scatter(drive_patterns, variable, pattern, column, score) if score > 0 else None
-
-
-def _ranks(values: Array) -> Array:
-    """Return ranks from 1; equal values share the mean of theirs."""
-    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
-    return (np.cumsum(count) - (count - 1) / 2)[place]

@@ -47,7 +47,7 @@ def error_steps(diagnosis: Diagnosis, after: Residuals) -> tuple[ErrorStep, ...]
     """Return the steps, first the model as given, last the model with everything.
 
     Both ends are what a comparison with these models gives. In between, parameters are those of
-    the last fit, so that a step shows what one effect does beside those before it.
+    the last fit: a step shows what one effect adds to those before it.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class PartialResidual:
     error, force : (M,) array
         That error, and the effect [N].
     profile : Profile or None
-        Of the error, along `variable`; None where no variable tells much of the effect.
+        Of the error, along `variable`; None where no variable explains much of the effect.
     variable : str
     fitted : (K,) array
         Mean force of the effect in the bins of the profile [N].
@@ -129,7 +129,7 @@ def _with_error(residuals: Residuals, error: Array) -> Residuals:
 
 
 def _most_telling(residuals: Residuals, drive: int, force: Array) -> tuple[str, float]:
-    """Return the variable whose bins tell most of the variance of a force, and their share."""
+    """Return the variable whose bins explain most of the variance of a force, and their share."""
     variance = float(np.var(force))
     best, most = 'time', 0.0
     for name in UNITS:

@@ -41,7 +41,7 @@ def in_fitting_unit(values: Sequence[float], unit: str, digits: int = 2) -> str:
 
 
 def _fitting_unit(size: float, unit: str) -> tuple[float, str]:
-    """Return the unit in which a quantity of a size is read, as it is printed, and its factor."""
+    """Return the printed unit in which a quantity of a size is read, and its factor."""
     below, factor, name = READ_IN.get(unit, (0.0, 1.0, unit))
     if size >= below:
         factor, name = 1.0, unit
@@ -115,7 +115,7 @@ def word_little(little: Mapping[str, float], after: str = '') -> str:
     little : mapping of str to float
         See `little_explained`.
     after : str, optional
-        What stands behind 'the model', e.g. ' with what was found'.
+        Words after 'the model', e.g. ' with the reported effects'.
     """
     if not little:
         return ''

@@ -66,7 +66,7 @@ SHAPES = {
     'growth': 'a curve', 'directed_growth': 'a curve that changes sign with the direction',
     'one_way': 'a curve in one direction only', 'friction': 'a step at reversals',
     'fading': 'a step at reversals that fades with speed', 'fast': 'a curve at high speed',
-    'scatter': 'a larger scatter', 'bump': 'a bump', 'level': 'a slow drift',
+    'bump': 'a bump', 'level': 'a slow drift',
     'ripple': 'a wave', 'line': 'a vibration at one frequency',
 }
 
@@ -96,12 +96,11 @@ class Statement:
     evidence : float
         By which the cost rises without it.
     kind : str
-        Of pattern, see `patterns.Pattern`; 'scatter' for a changed variance, 'level' for noise
-        far above that of the other drives.
+        Of pattern, see `patterns.Pattern`; 'level' for noise far above that of the other drives.
     amplitude : float
         Size of the pattern [N].
     mean_square : float
-        Of the pattern over the record [N^2]; of a scatter what it is beyond the rest's.
+        Of the pattern over the record [N^2].
     other_variables : tuple of str
         Other variables that do nearly as well.
     """
@@ -179,19 +178,6 @@ def word_statement(
                      pattern.kind, amplitude, float(np.mean(shape ** 2)), other_variables)
 
 
-def word_scatter(drive_patterns: DrivePatterns, variable: str, pattern: Pattern, column: Array,
-                 evidence: float) -> Statement:
-    """Return the statement that the noise is larger in a range than elsewhere."""
-    drive = drive_patterns.residuals.drives[drive_patterns.d]
-    error = drive_patterns.series.error
-    held = column > 0.5
-    total = max(float(error @ error), 1e-300)
-    share, time = float(error[held] @ error[held]) / total, float(held.mean())
-    text = _sentence(variable, pattern, drive_patterns, 0.0, 0.0, share, time, np.zeros(0))
-    return Statement(drive, variable, pattern.limits, share, time, f'{drive}: {text}',
-                     evidence, 'scatter', 0.0, total / len(error) * max(share - time, 0.0))
-
-
 def _sentence(
     variable: str, pattern: Pattern, drive_patterns: DrivePatterns, signed: float, amplitude: float,
     share: float, time: float, shape: Array,
@@ -219,9 +205,6 @@ def _sentence(
                 f'the lowest to {with_sign(high)} {effort} at the highest{opposed} ({of})')
     place = _place(variable, pattern, drive_patterns)
     of += f' in {time:.0%} of the time'
-    if kind == 'scatter':
-        ratio = plain(float(np.sqrt(pattern.scale)), 2)
-        return f'{place} its error scatters {ratio} times as much as elsewhere ({of})'
     along = ' in the direction of motion' if kind in ('directed_range', 'fading') else ''
     return f'{place} its error is shifted by {with_sign(signed)} {effort}{along} ({of})'
 

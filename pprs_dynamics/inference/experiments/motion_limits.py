@@ -71,7 +71,7 @@ class MotionLimits:
                   for k in range(3)}
         found['tilt of the platform'] = state.motion.tilt / (self.tilt * left)
         found['condition number'] = condition_number(
-            model.robot.geometry, state.links.jacobians.J) / (
+            model.robot.geometry, state.links.J) / (
                 min(bounds.condition_number, self.condition_number) * left)
         return {name: float(share.max()) for name, share in found.items()}
 

@@ -58,7 +58,7 @@ class ArmColumns:
     measured : (M, n) array
         NaN where it was not measured.
     rest : (M, n) array
-        The model's efforts without what the columns stand for: added effects.
+        The model's efforts by added effects, which no column describes.
     inertial : (M, n, 10 n) array
         Per inertial parameter of the links.
     motion : (M, n, 2) array
@@ -225,17 +225,6 @@ def _with(model: DriveModel, inertial: Array, own: Array, width: Array) -> Drive
     return DriveModel.from_parameters(values, model.source)
 
 
-def numbers_at(model: DriveModel, motion: JointMotion) -> Array:
-    """Return the columns of all numbers in a motion, (M, n, P), as `ArmColumns.numbers`."""
-    position, velocity, acceleration = motion.position, motion.velocity, motion.acceleration
-    width = model.reversal.widths(len(model.drives))
-    joints = np.stack((acceleration, velocity, np.asarray(smooth_sign(velocity, width)),
-                       np.ones_like(velocity)), axis=-1)
-    numbers: Array = np.concatenate((model.robot.regressor(position, velocity, acceleration),
-                                     of_passive(model, motion), _of_each(joints)), axis=2)
-    return numbers
-
-
 def own_passive(model: DriveModel) -> tuple[PassiveJoint, ...]:
     """Return the passive joints of loops whose friction is not that of another joint.
 
@@ -261,7 +250,7 @@ def of_passive(model: DriveModel, motion: JointMotion) -> Array:
 
 
 def _of_each(joints: Array) -> Array:
-    """Return columns of each joint, (M, n, 4), beside those of the others, (M, n, 4 n)."""
+    """Return columns of each joint, (M, n, 4), as columns of all joints, (M, n, 4 n)."""
     samples, count = joints.shape[:2]
     own = np.zeros((samples, count, count, OF_JOINT))
     own[:, np.arange(count), np.arange(count)] = joints
@@ -288,7 +277,7 @@ def own_spread(efforts: Array, columns: Array) -> Array:
 def base_prior(model: DriveModel, efforts: Array, numbers: Array) -> Array:
     """Return directions of unit variance of a base's numbers, (P, P).
 
-    Of what is expected before any recording, about the model as it is. Passive joints may rub as
+    Of what is expected before any recording, about the input model. Passive joints may rub as
     much as the drive that would feel it first allows.
 
     Parameters
@@ -350,7 +339,7 @@ class _Problem:
         self.own_spread = own_spread(np.where(known, rest, np.nan), joints)
 
     def errors(self, point: Array, own: Array) -> list[Array]:
-        """Return what is left of each joint's efforts."""
+        """Return the residual of each joint's efforts."""
         numbers = np.concatenate((self.bodies.inertial(point).ravel(), own.ravel()))
         return [y - rows @ numbers for rows, y in zip(self.rows, self.target, strict=True)]
 

@@ -69,8 +69,8 @@ class BaseFit:
     told : tuple of str
         What the motion determines and what it does not, as sentences.
     before, after, held_out : dict of str to float
-        rms error by drive: of the model as it was and as it is on the recordings, and on data
-        that took no part in a fit.
+        rms error by drive: of the input model and of the fitted one on the recordings, and on
+        held-out data.
     held_out_on : {'recordings', 'halves', 'validation'}
         Each recording, or half of the only one, predicted from the others; or the validation.
     explained_before, explained : dict of str to float
@@ -199,7 +199,7 @@ def _fitted(model: DriveModel, recordings: Sequence[Recording],
 
 
 def _numbers(model: DriveModel, fit: ArmFit) -> tuple[FittedNumber, ...]:
-    """Return what was fitted of each joint; links are told in `_told`."""
+    """Return the fitted numbers of each joint; those of links are in `_told`."""
     found = []
     widths = {'friction.reversal_velocities': np.full(len(model.drives), np.inf)}
     for key, std in {**fit.std, **widths}.items():
@@ -253,7 +253,7 @@ class Refit:
 def refit_base(model: DriveModel, recordings: Sequence[Recording],
                validate: Sequence[Recording] = (),
                progress: Callable[[float], None] | None = None) -> Refit:
-    """Return the base model fitted again beside its effects, which stay as they are.
+    """Return the base model fitted again; its effects are unchanged.
 
     A base model that was fitted without them holds a part of what they explain: its friction that
     of loads and temperatures, its links that of a cable.

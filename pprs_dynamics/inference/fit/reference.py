@@ -8,14 +8,13 @@ r"""What a reference run says of another recording: its forces known in part, an
     y_r = X_r \theta + \delta(s_r) + n_r, \qquad
     y_l = X_l \theta + \rho\,\delta(s_l) + \sqrt{1 - \rho^2}\,\delta'(s_l) + n_l
 
-y are the errors of the model, theta the numbers of its base, and delta what no number of it
-explains but repeats: in each drive the sum of two Gaussian processes, one over the states of all
-drives, s = (q / l_q, tanh(v / v_0) / l_v), and one over its own, which other paths meet again, of
-standard deviations sigma of the drive's own; and of waves over its own position, finer than any
-length, as gears and motors have them. delta' is drawn anew for every run. Given y_r, X_l theta +
-delta(s_l) is Gaussian: its mean is carried over, and the principal directions of its covariance
-are columns of unit prior. Near the states of the reference the errors of the base cancel; far from
-them what is known is what the prior says.
+y are the errors of the model, theta the numbers of its base, and delta the repeatable error. Delta
+is in each drive the sum of two Gaussian processes, over the states of all drives,
+s = (q / l_q, tanh(v / v_0) / l_v), and over its own. Waves over its own position are added, as
+gears and motors have them. delta' is drawn anew for every run. Given y_r, X_l theta + delta(s_l) is
+Gaussian: its mean is carried over, and the principal directions of its covariance are columns of
+unit prior. Near the states of the reference the errors of the base cancel. Far from them the prior
+decides.
 
 The processes are those of `repeating_forces`; of features of states that the reference does not
 know it says nothing.
@@ -38,7 +37,7 @@ from scipy.spatial import cKDTree
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import PprsError
-from pprs_dynamics.inference.fit.arm_fit import ArmColumns, base_prior, numbers_at
+from pprs_dynamics.inference.fit.arm_fit import ArmColumns, base_prior
 from pprs_dynamics.inference.fit.repeating_forces import (
     Integers,
     Process,
@@ -54,7 +53,7 @@ from pprs_dynamics.inference.regression.base_columns import (
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.residuals.bands import LEAST_OPEN, DriveSeries, OpenForces
-from pprs_dynamics.inference.residuals.measuring import MOTION, join_tables, treated_table
+from pprs_dynamics.inference.residuals.measuring import join_tables, treated_table
 from pprs_dynamics.inference.residuals.reconstruction import (
     CHUNK,
     Reconstruction,
@@ -64,10 +63,8 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.reference_keys import DIRECTIONS, RESIDUAL
-from pprs_dynamics.system.plain_text import displayed
+from pprs_dynamics.physics.model.reference_keys import DIRECTIONS
 
 # Tried: in standard deviations of the positions, and in turns of the directions.
 LENGTHS = tuple((position, speed) for position in (0.5, 1.5) for speed in (0.7, 2.0))
@@ -83,7 +80,6 @@ LEAST_REPEATS = 0.1  # of the process in two runs, below which nothing of it is 
 FINER = 8  # points for each sample of a reference, among which the nearest is looked for
 OCTAVES = 6  # of frequency, in each of which another share of what no process tells comes back
 BLOCKS = 4  # of a single reference, each predicted from the others
-MOST_KEPT = 400  # means of a reference that a model file keeps
 MOST_DIRECTIONS = 24  # that become columns of all drives together
 
 
@@ -154,23 +150,6 @@ class Reference:
                            tuple(recordings))
 
     @classmethod
-    def of_residual(cls, model: DriveModel, text: str, kept: str = '') -> Reference:
-        """Return the fit of what a model file keeps of its reference runs; errors as `of`."""
-        count = len(model.drives)
-        content = _as_array(text, RESIDUAL).T
-        if content.shape[1] != 5 * count + 2:
-            raise ReferenceRunError(f'{RESIDUAL}: it is of {(content.shape[1] - 2) // 5} drives, '
-                                    f'must be of {count}: fit the model again')
-        time, record = np.cumsum(content[:, 0]), np.rint(content[:, 1]).astype(int)
-        motion = dict(zip(MOTION, np.split(content[:, 2:2 + 3 * count], 3, axis=1), strict=True))
-        error, measured = np.split(content[:, 2 + 3 * count:], 2, axis=1)
-        residuals = Residuals(model.drives, time, record, measured, measured - error, {}, motion,
-                              float(np.median(content[1:, 0])), model.units)
-        numbers = numbers_at(model, JointMotion(*(motion[name] for name in MOTION))) if (
-            model.is_described) else None
-        return cls._fitted(model, residuals, numbers, kept, (displayed(model.source),), ())
-
-    @classmethod
     def _fitted(cls, model: DriveModel, residuals: Residuals, numbers: Array | None, kept: str,
                 named: tuple[str, ...], recordings: tuple[Recording, ...]) -> Reference:
         names = ', '.join(named)
@@ -214,24 +193,6 @@ class Reference:
             return ''
         values, axes = np.linalg.eigh(self.fit.covariance[:told, :told])
         return _as_text(self.base[:, :told] @ (axes * np.sqrt(np.maximum(values, 0.0))))
-
-    @property
-    def residual(self) -> str:
-        """Motion, errors and efforts of the recordings, means over many samples, as a text."""
-        residuals = self.regression.residuals
-        known = np.isfinite(residuals.measured).all(axis=1)
-        size = -(-int(known.sum()) // MOST_KEPT)
-        blocks = np.concatenate([
-            np.flatnonzero(known & (residuals.record == one))[
-                :int(np.sum(known & (residuals.record == one))) // size * size].reshape(-1, size)
-            for one in np.unique(residuals.record)])
-        content = np.concatenate((
-            *(residuals.variables[name] for name in MOTION), residuals.error,
-            residuals.measured), axis=1)[blocks].mean(axis=1)
-        time = residuals.time[blocks].mean(axis=1)
-        return _as_text(np.concatenate((
-            np.diff(time, prepend=time[:1])[:, None], residuals.record[blocks[:, :1]],
-            content), axis=1).T)
 
     @property
     def note(self) -> str:

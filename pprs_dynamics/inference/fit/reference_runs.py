@@ -22,7 +22,6 @@ from pprs_dynamics.physics.model.ledger import values_before_changes
 from pprs_dynamics.physics.model.reference_keys import (
     DIRECTIONS,
     HASHES,
-    RESIDUAL,
     ReferenceFile,
     reference_files,
     with_reference,
@@ -62,9 +61,6 @@ def read_reference(model: DriveModel, files: Sequence[RunFile] = (),
     then = values_before_changes(model.values)
     if then != dict(model.values):
         model = replace(DriveModel.from_parameters(then), source=model.source)
-    kept_run = str(model.values.get(RESIDUAL, ''))
-    if not files and kept_run:
-        return Reference.of_residual(model, kept_run)
     given = files or [one.path for one in _own(model)]
     runs = excerpts_within_memory(model, [
         one if isinstance(one, Recording) else with_mistakes(
@@ -99,11 +95,10 @@ def _own(model: DriveModel) -> tuple[ReferenceFile, ...]:
 
 
 def with_own_reference(model: DriveModel, recordings: Sequence[Recording],
-                       paths: Sequence[Path], keep_residual: bool = False) -> DriveModel:
-    """Return a model that names the files it was fitted to, with what they left uncertain.
+                       paths: Sequence[Path]) -> DriveModel:
+    """Return a model that names the files it was fitted to, with its remaining uncertainty.
 
-    Where they are no reference, as they are too short, the model unchanged. With `keep_residual`
-    their errors stand in it, too: it needs no files then.
+    The model unchanged where they are too short for a reference.
     """
     try:
         reference = Reference.of(model, recordings)
@@ -111,5 +106,4 @@ def with_own_reference(model: DriveModel, recordings: Sequence[Recording],
         return model
     files = [ReferenceFile(path.absolute(), fingerprint(path)) for path in paths]
     return DriveModel.from_parameters(with_reference(
-        model.values, files, reference.directions, reference.residual if keep_residual else ''),
-        model.source)
+        model.values, files, reference.directions), model.source)

@@ -3,10 +3,9 @@
 
 r"""Forces that no number of a model explains but that repeat when the machine repeats its motion.
 
-A Gaussian process over the states of all drives or of one, s = (q / l_q, tanh(v / v_0) / l_v), is
-a finite sum, Phi(s) w, over states that a pivoted Cholesky factor of its kernel chooses; states of
-a recording that these do not reach get features of their own. Waves depend on the position of
-a drive, finer than any length.
+A Gaussian process over states, s = (q / l_q, tanh(v / v_0) / l_v), is a finite sum, Phi(s) w, over
+states that a pivoted Cholesky factor of its kernel chooses. States of a recording that these do not
+reach get features of their own. Waves depend on the position of a drive, finer than any length.
 
 References
 ----------

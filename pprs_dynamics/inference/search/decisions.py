@@ -73,9 +73,6 @@ class Decisions:
     # Periods of a line within the longest stretch, below which it is a drift. Slow noise has
     # bumps of one or two periods.
     line_periods: float = 3.0
-    # Ratio of variances in a range and elsewhere that is reported as scatter. Less does not show
-    # in a plot.
-    scatter_ratio: float = 1.5
     # Share by which friction by load may differ from friction that does not follow it, up to
     # which a warning asks for another load. Dry friction varies by as much along a guide.
     one_load: float = 0.05

@@ -15,8 +15,7 @@ from pprs_dynamics.errors import ModelError, UnknownNameError
 REFERENCE = 'reference'
 HASHES = 'reference_sha256'
 DIRECTIONS = 'reference_directions'
-RESIDUAL = 'reference_residual'
-KEYS = (REFERENCE, HASHES, DIRECTIONS, RESIDUAL)
+KEYS = (REFERENCE, HASHES, DIRECTIONS)
 
 
 class ReferenceFile(NamedTuple):
@@ -34,10 +33,10 @@ def reference_files(values: Mapping[str, Any], source: str) -> tuple[ReferenceFi
 
 
 def with_reference(values: Mapping[str, Any], files: Sequence[ReferenceFile],
-                   directions: str = '', residual: str = '') -> dict[str, Any]:
+                   directions: str = '') -> dict[str, Any]:
     """Return values that name reference runs, and what is kept of them, in place of others."""
     new = {REFERENCE: [str(one.path) for one in files], HASHES: [one.sha256 for one in files],
-           DIRECTIONS: directions, RESIDUAL: residual}
+           DIRECTIONS: directions}
     return {**{key: value for key, value in values.items() if key not in KEYS},
             **{key: value for key, value in new.items() if value}}
 
@@ -57,7 +56,7 @@ def check_reference(parameters: Mapping[str, Any]) -> None:
             continue
         if key not in KEYS:
             raise UnknownNameError('key', key, KEYS)
-        if key in (DIRECTIONS, RESIDUAL):
+        if key == DIRECTIONS:
             if not isinstance(value, str):
                 raise ModelError(key, value, 'be a text that pprs fit wrote')
         elif isinstance(value, str) or not hasattr(value, '__len__') or not all(

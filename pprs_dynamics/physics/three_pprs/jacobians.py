@@ -1,16 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Jacobians of the mechanism: [A], [B], [J], [J_u], [J_omega] of Eq. (4), (10) and (11).
+"""[B]^-1 of Eq. (4) and the Jacobian [J] of Eq. (11), far enough from singular poses.
 
 Rows of [B] are the wrenches that unit reactions H_i and V_i put on the platform, so that its
 transpose also carries the reactions in Eq. (6).
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -20,78 +17,9 @@ from pprs_dynamics.physics.mechanism.evaluation import evaluate
 from pprs_dynamics.physics.three_pprs.closure import (
     INVERSE_COLUMNS,
     InverseParameters,
-    Wrench,
-    closure_rows,
     inverse_kernel,
-    rod_row,
 )
 from pprs_dynamics.physics.three_pprs.geometry import Geometry
-from pprs_dynamics.physics.three_pprs.inverse_kinematics import ChainKinematics
-
-
-@dataclass(frozen=True)
-class Jacobians:
-    """Jacobians at N poses, evaluated where they are asked for.
-
-    Parameters
-    ----------
-    geometry : Geometry
-    chains : ChainKinematics
-    B_inverse : (N, 6, 6) array
-
-    Attributes
-    ----------
-    A : (N, 6) array
-        Diagonal of [A]: 1 for the slides, sin u_i for the lifts.
-    B : (N, 6, 6) array
-        [B] with A q_dot = B X_dot, X_dot = (v, omega) in `base`.        Eq. (4)
-    J : (N, 6, 6) array
-        [J] = [B]^-1 [A], X_dot = J q_dot.                               Eq. (11)
-    J_u : (N, 3, 6) array
-        u_dot = J_u q_dot.                                               Eq. (10)
-    J_omega : (N, 3, 6) array
-        Lower half of [J], omega = J_omega q_dot.
-    """
-
-    geometry: Geometry
-    chains: ChainKinematics
-    B_inverse: Array
-
-    @cached_property
-    def A(self) -> Array:
-        """Diagonal of [A], (N, 6)."""
-        return np.concatenate((np.ones_like(self.chains.sin_u), self.chains.sin_u),
-                              axis=1)                                          # Eq. (4)
-
-    @cached_property
-    def B(self) -> Array:
-        """[B], (N, 6, 6)."""
-        chains = self.chains
-        rows = closure_rows(self.geometry.frames, chains.arm, chains.cos_u, chains.sin_u)
-        return np.concatenate([_matrix(wrench) for wrench in rows], axis=1)
-
-    @cached_property
-    def J(self) -> Array:
-        """[J], (N, 6, 6)."""
-        return self.B_inverse * self.A[:, None, :]                    # Eq. (11)
-
-    @cached_property
-    def J_u(self) -> Array:
-        """[J_u], (N, 3, 6)."""
-        chains = self.chains
-        rows = _matrix(rod_row(self.geometry.frames, self.geometry.rod_length, chains.arm,
-                               chains.sin_u))
-        return rows @ self.J                                          # Eq. (10)
-
-    @property
-    def J_omega(self) -> Array:
-        """Lower half of [J], (N, 3, 6)."""
-        return self.J[:, 3:]
-
-
-def _matrix(wrench: Wrench) -> Array:
-    """Return wrenches as rows, (N, 3, 6)."""
-    return np.stack((*wrench.force, *wrench.moment), axis=-1)
 
 
 def inverse_table(geometry: Geometry, chains: Array, condition_limit: float) -> Array:
@@ -123,6 +51,20 @@ def inverse_table(geometry: Geometry, chains: Array, condition_limit: float) -> 
             _require_conditioning(geometry, chains[doubtful], inverse[doubtful], doubtful,
                                   condition_limit)
     return inverse
+
+
+def drive_jacobian(inverse: Array, sin_u: Array) -> Array:
+    """Return [J], X_dot = J q_dot with X_dot = (v, omega) in `base`, (N, 6, 6).
+
+    Parameters
+    ----------
+    inverse : (N, 36) array
+        [B]^-1.
+    sin_u : (N, 3) array
+    """
+    A = np.concatenate((np.ones_like(sin_u), sin_u), axis=1)                   # Eq. (4)
+    J: Array = inverse.reshape(-1, 6, 6) * A[:, None, :]                       # Eq. (11)
+    return J
 
 
 def condition_number(geometry: Geometry, J: Array) -> Array:
@@ -157,8 +99,7 @@ def _require_regular(inverse: Array) -> None:
 def _require_conditioning(
     geometry: Geometry, chains: Array, inverse: Array, samples: np.ndarray, limit: float,
 ) -> None:
-    A = np.concatenate((np.ones((len(chains), 3)), chains[:, 12:15]), axis=1)
-    number = condition_number(geometry, inverse.reshape(-1, 6, 6) * A[:, None, :])  # Eq. (11)
+    number = condition_number(geometry, drive_jacobian(inverse, chains[:, 12:15]))
     over = ~(number <= limit)
     if np.any(over):
         worst = int(np.argmax(over))

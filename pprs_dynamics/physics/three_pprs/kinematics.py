@@ -13,7 +13,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.three_pprs.geometry import Geometry
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import ChainKinematics, chain_table
-from pprs_dynamics.physics.three_pprs.jacobians import Jacobians, inverse_table
+from pprs_dynamics.physics.three_pprs.jacobians import drive_jacobian, inverse_table
 from pprs_dynamics.physics.three_pprs.kernel_parameters import REVOLUTE, Joints
 from pprs_dynamics.physics.three_pprs.passive_joints import solve_friction
 from pprs_dynamics.physics.three_pprs.rigid_body import RigidBody
@@ -64,9 +64,9 @@ class PlatformKinematics:
         return ChainKinematics.from_table(self.chain_table)
 
     @cached_property
-    def jacobians(self) -> Jacobians:
-        """Jacobians of the mechanism."""
-        return Jacobians(self.geometry, self.chains, self.inverse_table.reshape(-1, 6, 6))
+    def J(self) -> Array:
+        """[J], X_dot = J q_dot, (N, 6, 6)."""
+        return drive_jacobian(self.inverse_table, self.chains.sin_u)
 
     @property
     def tool_velocity(self) -> Array:

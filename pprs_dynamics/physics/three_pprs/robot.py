@@ -229,7 +229,7 @@ class ThreePprs:
         if position is not state.position:
             from scipy.spatial.transform import Rotation  # here: commands start without it
 
-            move = np.einsum('nij,nj->ni', state.links.jacobians.J, position - state.position)
+            move = np.einsum('nij,nj->ni', state.links.J, position - state.position)
             turned = Rotation.from_rotvec(move[:, 3:]) * Rotation.from_quat(motion.orientation)
             motion = PlatformMotion.at_rest(motion.position + move[:, :3], turned.as_quat())
         rates = platform_rates(self.geometry, motion, state.velocity, acceleration)
@@ -245,7 +245,7 @@ class ThreePprs:
         Condition number over its limit, smallest sine of a rod angle over that of the rods, and,
         with independent chains, the ratio for the cosine.
         """
-        bounds, J, chains = self.bounds, state.links.jacobians.J, state.links.chains
+        bounds, J, chains = self.bounds, state.links.J, state.links.chains
         number = condition_number(self.geometry, J[::-(-len(J) // MOST_CONDITIONS)])
         return float(1 - max(number.max() / bounds.condition_number,
                              bounds.rod_sine / np.abs(chains.sin_u).min(),
