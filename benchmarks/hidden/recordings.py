@@ -85,6 +85,8 @@ class Case:
         Correlation of 70 % of the noise from sample to sample; '1/f': all of it is 1/f.
     width : float
         Of the robot's reversals over the model's; 0: drawn, for all drives or each of them.
+    duration : float
+        [s]
     """
 
     row: str
@@ -93,6 +95,7 @@ class Case:
     snr: float = 1.0
     noise: float | str = 0.9
     width: float = 0.0
+    duration: float = DURATION
 
     @property
     def name(self) -> str:
@@ -112,13 +115,14 @@ class Scene:
     Parameters
     ----------
     seed : int
-    width : float
+    width, duration : float
         See `Case`.
     """
 
-    def __init__(self, seed: int, width: float) -> None:
+    def __init__(self, seed: int, width: float, duration: float = DURATION) -> None:
         rng = np.random.default_rng((seed, 2))
-        self.seed, self.tolerance = seed, float(rng.uniform(*TOLERANCES))
+        self.seed, self.duration = seed, duration
+        self.tolerance = float(rng.uniform(*TOLERANCES))
         self.model = tolerant_model(self.tolerance)
         numbers = list(tolerated_numbers(self.model.values))
         self.off = rng.uniform(-1, 1, len(numbers))
@@ -135,7 +139,7 @@ class Scene:
 
     def move(self, seed: int) -> None:
         """Let the robot move along the motion of a seed."""
-        self.path, self.platform, motion, closed = _motion(seed)
+        self.path, self.platform, motion, closed = _motion(seed, self.duration)
         self.plain = PlainRobot(simulated(
             self.model, self.robot, self.drive_width, self.passive_width), motion, ROUNDS, closed)
         kept = len(motion) - LEAD
@@ -231,16 +235,17 @@ def simulated(model: DriveModel, robot: Mapping[str, Any],
 
 
 @lru_cache(maxsize=2)
-def scene(seed: int, width: float) -> Scene:
+def scene(seed: int, width: float, duration: float = DURATION) -> Scene:
     """Return a scene, the last ones from memory."""
-    return Scene(seed, width)
+    return Scene(seed, width, duration)
 
 
 @lru_cache(maxsize=2)
-def _motion(seed: int) -> tuple[RandomMotion, PlatformMotion, JointMotion, ClosedMotion]:
+def _motion(seed: int, duration: float,
+            ) -> tuple[RandomMotion, PlatformMotion, JointMotion, ClosedMotion]:
     model = DriveModel.load()
-    path = draw_motion(model, seed, DURATION)
-    platform = path.motion(np.arange(-LEAD, round(DURATION * RATE)) / RATE)
+    path = draw_motion(model, seed, duration)
+    platform = path.motion(np.arange(-LEAD, round(duration * RATE)) / RATE)
     motion = driven(model, platform)
     return path, platform, motion, MechanismEngine(as_mechanism(model)).closed(motion)
 
@@ -270,7 +275,7 @@ def noise_settings(noise: float | str, deviation: float) -> SensorSettings:
 
 def make_case(case: Case) -> tuple[DriveModel, Recording, dict[str, Any]]:
     """Return the model, a recording, and the truth about it as data for JSON."""
-    place = scene(case.seed, case.width)
+    place = scene(case.seed, case.width, case.duration)
     found = [_draw(case, place, name) for name in case.effects]
     deviation = min([one.noise for one in found], default=NOISE)
     effects = [one.effect for one in found]

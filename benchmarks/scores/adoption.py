@@ -21,7 +21,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +55,7 @@ class Robot:
 
     def __init__(self, case: Case) -> None:
         self.case = case
-        self.place = hidden_recordings.scene(case.seed, case.width)
+        self.place = hidden_recordings.scene(case.seed, case.width, case.duration)
         drawn = [hidden_recordings._draw(case, self.place, name) for name in case.effects]
         self.effects: list[Choice] = [one.effect for one in drawn]
         self.noise = min([one.noise for one in drawn], default=hidden_recordings.NOISE)
@@ -145,9 +144,8 @@ def run_case(case: Case, wrong: str) -> dict[str, Any]:
             'wrong': wrong, 'wrong_status': refused.returncode, 'wrong_reason': reason}
 
 
-def outcome_of(drawn: tuple[Case, str], duration: float) -> dict[str, Any]:
-    """Return the outcome of a case and a wrong effect, with recordings of a duration [s]."""
-    hidden_recordings.DURATION = duration
+def outcome_of(drawn: tuple[Case, str]) -> dict[str, Any]:
+    """Return the outcome of a case and a wrong effect."""
     return run_case(*drawn)
 
 
@@ -156,14 +154,14 @@ def _error(model: Path, recording: Recording) -> float:
     return float(np.sqrt(np.nanmean(error ** 2)))
 
 
-def draw_cases(count: int, first: int, snr: float) -> list[tuple[Case, str]]:
+def draw_cases(count: int, first: int, snr: float, duration: float) -> list[tuple[Case, str]]:
     """Return cases, each with a wrong effect: every effect in turn, then again."""
     found = []
     names = sorted(IN_CATALOGUE)
     order = np.random.default_rng(first).permutation(len(names))
     for number in range(count):
         hidden = names[order[number % len(names)]]
-        case = Case('effects', (hidden,), first + number, snr)
+        case = Case('effects', (hidden,), first + number, snr, duration=duration)
         others = sorted(set(catalogue()) - {hidden})
         found.append((case, str(case.rng('wrong').choice(others))))
     return found
@@ -199,8 +197,9 @@ def main() -> int:
     parser.add_argument('--snr', type=float, default=1.0)
     parser.add_argument('--duration', type=float, default=40.0, help='of recordings [s]')
     options = parser.parse_args()
-    cases = {one[0].name: one for one in draw_cases(options.cases, options.first, options.snr)}
-    print(summary(outcomes_of(options, partial(outcome_of, duration=options.duration), cases,
+    cases = {one[0].name: one for one in draw_cases(
+        options.cases, options.first, options.snr, options.duration)}
+    print(summary(outcomes_of(options, outcome_of, cases,
                               lambda outcome: outcome['name'], one_line)))
     return 0
 

@@ -51,47 +51,25 @@ class Climate:
         return cls(hall, wave, period, phase, rng.uniform(*RISE, drives),
                    rng.uniform(*COOLING, drives))
 
-    def surroundings(self, time: Array | float) -> Array:
-        """Return the temperature of the hall [degC]."""
-        found: Array = self.hall + self.wave * np.sin(2 * np.pi * np.asarray(time) / self.period
-                                                      + self.phase)
-        return found
-
-    def start(self) -> Array:
-        """Return the temperatures of drives that rested long, (D,) [degC]."""
-        return np.full(len(self.rise), float(self.surroundings(0.0)))
-
-    def slope(self, temperature: Array, time: float, work: Array) -> Array:
-        """Return dT/dt of the drives, (D,) [K/s].
-
-        Parameters
-        ----------
-        temperature : (D,) array
-            [degC]
-        time : float
-            [s]
-        work : (D,) array
-            Speed over the usual one.
-        """
-        found: Array = (self.surroundings(time) + self.rise * work - temperature) / self.cooling
-        return found
-
-    def along(self, time: Array, velocity: Array, usual: float = 0.0) -> Array:
+    def along(self, time: Array, velocity: Array) -> Array:
         """Return the temperatures of drives along a motion, (N, D) [degC].
+
+        They begin at the temperature of the hall, and rise by `rise` at their mean speed.
 
         Parameters
         ----------
         time : (N,) array
             [s]
         velocity : (N, D) array
-        usual : float
-            Speed at which the drives warm as stated; 0: the mean speed of each.
         """
-        work = np.abs(velocity) / (usual or np.maximum(np.abs(velocity).mean(axis=0), 1e-12))
-        found = np.empty_like(velocity)
-        found[0] = self.start()
+        speed = np.abs(velocity)
+        work = speed / np.maximum(speed.mean(axis=0), 1e-12)
+        hall = self.hall + self.wave * np.sin(2 * np.pi * time / self.period + self.phase)
+        start = self.hall + self.wave * np.sin(self.phase)
+        found = np.full_like(velocity, start)
         for k, step in enumerate(np.diff(time)):
-            found[k + 1] = found[k] + step * self.slope(found[k], float(time[k]), work[k])
+            found[k + 1] = found[k] + step * (
+                hall[k] + self.rise * work[k] - found[k]) / self.cooling
         return found
 
 

@@ -9,10 +9,9 @@ import json
 import resource
 import shutil
 import subprocess
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ import pytest
 from node_bench import bench
 from pprs_command import pprs
 from ros_processes import environment, executable, node_process
-from short_recordings import hidden_friction, short_recordings
+from short_recordings import hidden_friction
 
 from benchmarks.scores import adoption
 from pprs_dynamics import DriveModel, PlatformMotion
@@ -57,13 +56,6 @@ class Files:
     text: str
     recordings: tuple[Recording, Recording]
     diagnosis: Diagnosis
-
-
-@pytest.fixture(scope='module')
-def score() -> Iterator[ModuleType]:
-    """Yield the script that hides effects, with short recordings."""
-    with short_recordings(DURATION):
-        yield adoption
 
 
 @pytest.fixture(scope='module')
@@ -275,10 +267,10 @@ def test_the_node_starts_with_the_written_file(
 
 @pytest.mark.slow
 def test_the_loop_walks_by_itself_until_nothing_is_left(
-    score: ModuleType, tmp_path: Path,
+    tmp_path: Path,
 ) -> None:
-    robot = score.Robot(score.Case(
-        'pairs', ('stribeck_friction', 'payload_offset'), 13, 1.0, width=1.0))
+    robot = adoption.Robot(adoption.Case(
+        'pairs', ('stribeck_friction', 'payload_offset'), 13, 1.0, width=1.0, duration=DURATION))
     first, second = robot.recordings()
     write_model(tmp_path / 'model.yaml', robot.model.values)
     write_recording(tmp_path / 'first.csv', first)

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import made_up_arm as arm
@@ -18,7 +17,6 @@ import pytest
 import yaml
 from pprs_command import pprs
 from shared_cases import shared_case
-from short_recordings import short_recordings
 
 from benchmarks.hidden import recordings
 from pprs_dynamics import DriveModel, JointMotion
@@ -150,18 +148,11 @@ def test_nothing_is_said_of_what_is_right(seed: int, path: str) -> None:
     assert find_mistakes(MODEL, bare) == ()
 
 
-@pytest.fixture(scope='module')
-def benchmark() -> Iterator[ModuleType]:
-    """The script that makes recordings with hidden effects, with short ones."""
-    with short_recordings(6.0):
-        yield recordings
-
-
 @pytest.mark.parametrize('name', [*recordings.IN_CATALOGUE, *NOT_IN_CATALOGUE])
-def test_no_hidden_effect_is_called_a_mistake(benchmark: ModuleType, name: str) -> None:
-    place = benchmark.scene(11, 0.0)
+def test_no_hidden_effect_is_called_a_mistake(name: str) -> None:
+    place = recordings.scene(11, 0.0, 6.0)
     run = place.inject([Choice(name, np.random.default_rng(4))])
-    part, time = slice(benchmark.LEAD, None), place.time
+    part, time = slice(recordings.LEAD, None), place.time
     effort = run.efforts[part] + np.random.default_rng(5).normal(0, 0.08, (len(time), 6))
     found = find_mistakes(place.model, Recording.from_arrays(
         name, time - time[0], np.round(run.position[part], 6), None, effort))

@@ -5,13 +5,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from short_recordings import short_recordings
 
 from benchmarks.hidden import motions, recordings, strength
 from benchmarks.scores import diagnosis, diagnosis_table
@@ -23,12 +21,6 @@ from pprs_dynamics.simulation.injection import Choice
 from pprs_dynamics.simulation.sensors import EffortNoise
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope='module', autouse=True)
-def short() -> Iterator[None]:
-    with short_recordings(8.0):
-        yield
 
 
 @pytest.mark.parametrize('seed', range(6))
@@ -54,7 +46,7 @@ def test_random_motions_are_exact_and_keep_the_limits(
 def test_a_robot_with_nothing_hidden_is_explained_by_its_own_numbers(
 
 ) -> None:
-    case = recordings.Case('nothing', (), 3, width=1.0)
+    case = recordings.Case('nothing', (), 3, width=1.0, duration=8.0)
     model, recording, truth = recordings.make_case(case)
     robot = DriveModel.from_parameters({**model.values, **truth['robot']})
     found = np.sqrt(np.mean(measure_residuals(robot, [recording])[0].error ** 2))
@@ -69,7 +61,7 @@ def test_a_robot_with_nothing_hidden_is_explained_by_its_own_numbers(
 def test_a_case_has_the_strength_it_promises_and_repeats(
     tmp_path: Path, names: tuple[str, ...],
 ) -> None:
-    case = recordings.Case('effects', names, 3, 1.0)
+    case = recordings.Case('effects', names, 3, 1.0, duration=8.0)
     model, recording, truth = recordings.make_case(case)
     assert [effect['name'] for effect in truth['effects']] == list(names)
     for effect in truth['effects']:
@@ -86,7 +78,7 @@ def test_a_case_has_the_strength_it_promises_and_repeats(
 
 def test_a_play_is_as_strong_as_a_comparison_sees_it() -> None:
     """It shows as bursts of acceleration, a hundred times what it is as an error of position."""
-    case = recordings.Case('effects', ('lost_motion',), 4, 3.0)
+    case = recordings.Case('effects', ('lost_motion',), 4, 3.0, duration=8.0)
     model, recording, truth = recordings.make_case(case)
     robot = DriveModel.from_parameters({**model.values, **truth['robot']})
     error = measure_residuals(robot, [recording])[0].error
@@ -101,7 +93,7 @@ def test_a_play_is_as_strong_as_a_comparison_sees_it() -> None:
 @pytest.mark.parametrize('name', ['viscous_friction', 'force_ripple'])
 def test_a_form_that_is_off_is_off_by_5_to_15_percent(name: str) -> None:
     noise = np.zeros((4000, 6))
-    place, quiet = recordings.scene(3, 1.0), recordings.noise_settings(0.9, 0.0)
+    place, quiet = recordings.scene(3, 1.0, 8.0), recordings.noise_settings(0.9, 0.0)
     effect = Choice(name, np.random.default_rng(1))
     plain, exact, off = (place.recording('run', effects, quiet, noise, rng).effort
                          for effects, rng in (((), ()), ([effect], ()),
@@ -114,7 +106,7 @@ def test_a_form_that_is_off_is_off_by_5_to_15_percent(name: str) -> None:
 
 def test_what_a_form_that_is_off_leaves_is_nothing_unknown() -> None:
     model, recording, _ = recordings.make_case(
-        recordings.Case('forms', ('asymmetric_friction',), 601, 10.0))
+        recordings.Case('forms', ('asymmetric_friction',), 601, 10.0, duration=8.0))
     found = diagnose(model, [recording])
     assert [one.name for one in found.effects] == ['asymmetric_friction']
     assert found.verdict != 'unknown'
@@ -171,7 +163,7 @@ def test_the_score_appends_continues_and_counts_failures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str],
 ) -> None:
     score, file = diagnosis, tmp_path / 'score.jsonl'
-    todo = [recordings.Case('nothing', (), 3, width=w) for w in (0.5, 1, 2)]
+    todo = [recordings.Case('nothing', (), 3, width=w, duration=8.0) for w in (0.5, 1, 2)]
     calls = []
 
     def diagnose(model: object, recordings: list[Any]) -> Answer:

@@ -56,7 +56,7 @@ def add_recordings(parser: argparse.ArgumentParser, required: bool = True) -> No
     """Declare RECORDING… and --topic."""
     parser.add_argument('recordings', metavar='RECORDING', nargs='+' if required else '*',
                         help='bag (rosbag2 folder, .mcap, .db3, ROS 1) or table (.csv, .csv.gz, '
-                        '.parquet, .mat, .npz)')
+                        '.parquet, .mat, .npz, .json)')
     add_topic(parser)
 
 

@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.bag_storage import (
     Bag,
-    damaged,
     opened_bag,
     require_rosbags,
 )
@@ -36,7 +34,6 @@ from pprs_dynamics.measurement.files.joint_state_cdr import (
 from pprs_dynamics.measurement.files.merged_states import (
     CONTROLLER,
     DYNAMIC,
-    Fields,
     fields_of,
     read_merged,
 )
@@ -87,12 +84,17 @@ def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: st
           progress: Progress | None, findings: list[Defect]) -> Samples:
     """Return motion and efforts."""
     fields = fields_of(bag, recorded)
+    named = {(field.joint, field.quantity) for field in fields}
+    topics = {field.topic for field in fields}
+    connections = [] if fields and all((drive, 'position') in named for drive in drives) else (
+        _chosen(bag, topic))
     if fields:
-        return _of_fields(bag, drives, fields, topic, findings)
-    connections = _chosen(bag, topic)
+        return read_merged(bag, [*connections, *(
+            one for one in bag.connections if one.topic in topics and one not in connections)],
+            drives, findings, fields)
     name = connections[0].topic
     if connections[0].msgtype != JOINT_STATE:
-        return _merged(bag, connections, drives, findings)
+        return read_merged(bag, connections, drives, findings)
     blocks = JointStateBlocks(drives)
     total = sum(connection.msgcount for connection in connections)
     messages, done = bag.messages(connections), 0
@@ -105,13 +107,13 @@ def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: st
         raise UnreadableFileError(bag.path, f'{name} holds no messages')
     if not blocks.samples:
         if set(drives) <= blocks.names:  # spread over several messages
-            return _merged(bag, connections, drives, findings)
+            return read_merged(bag, connections, drives, findings)
         _tell_missing(bag.path, name, drives, blocks)
     stamps, received, position, velocity, effort = blocks.arrays()
     others = [one for one in bag.connections if one.msgtype == JOINT_STATE
               and one.topic != name and channel_of(one.topic, one.msgtype) is None]
     if topic is None and others and np.all(np.isnan(effort)):
-        merged = _merged(bag, [*connections, *others], drives, findings)
+        merged = read_merged(bag, [*connections, *others], drives, findings)
         if np.any(np.isfinite(merged.effort)):
             return merged
     if not np.any(stamps):
@@ -119,48 +121,10 @@ def _read(bag: Bag, recorded: RecordedDrives, drives: tuple[str, ...], topic: st
             'receive_times', len(stamps), 'the stamps in all message headers are 0'))
         stamps = received
     findings += _ignored(name, done, drives, blocks)
-    return _samples(drives, stamps, (position, velocity, effort), name, findings)
-
-
-def _of_fields(bag: Bag, drives: tuple[str, ...], fields: Fields, topic: str | None,
-               findings: list[Defect]) -> Samples:
-    """Read messages of any type by their fields, and joint states."""
-    topics = {one.topic for one in fields}
-    connections = [one for one in bag.connections if one.topic in topics]
-    named = {(one.joint, one.quantity) for one in fields}
-    if any((drive, 'position') not in named for drive in drives):
-        chosen = _chosen(bag, topic)
-        connections = [*chosen, *(one for one in connections if one not in chosen)]
-    return _merged(bag, connections, drives, findings, fields)
-
-
-def _samples(drives: tuple[str, ...], stamps: Indices, arrays: Sequence[Array], topics: str,
-             findings: list[Defect]) -> Samples:
-    """Return positions, velocities and efforts at stamps [ns] as samples."""
     epoch = whole_epoch(stamps / 1e9)
-    position, velocity, effort = arrays
-    return Samples(
-        drives, (stamps - epoch * 10**9) / 1e9, position,
-        None if np.all(np.isnan(velocity)) else velocity, effort, epoch,
-        f'bag, {topics}', tuple(findings))
-
-
-def _merged(bag: Bag, connections: list[Connection], drives: tuple[str, ...],
-            findings: list[Defect], fields: Fields = ()) -> Samples:
-    """Read states that stand in several messages or in those of controllers."""
-    try:
-        merged = read_merged(bag, connections, drives, fields)
-    except UnreadableFileError:
-        raise
-    except Exception as error:
-        raise UnreadableFileError(bag.path, damaged(error)) from None
-    topics = ', '.join(sorted({one.topic for one in connections}))
-    if merged is None or not len(merged.stamps):
-        raise UnreadableFileError(bag.path, f'{topics} holds no positions of all of '
-                                  f'{", ".join(drives)} at the same times')
-    return replace(_samples(drives, merged.stamps, merged.arrays, topics,
-                            [*findings, *merged.findings]), in_amperes=merged.in_amperes,
-                   channels=merged.channels)
+    return Samples(drives, (stamps - epoch * 10**9) / 1e9, position,
+                   None if np.all(np.isnan(velocity)) else velocity, effort, epoch, f'bag, {name}',
+                   tuple(findings))
 
 
 def write_bag(path: Path, topics: Mapping[str, Samples],

@@ -19,11 +19,18 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import CHANNELS, RecordedDrives
+from pprs_dynamics.drives import RecordedDrives
 from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.measurement.files.bag_storage import Bag
+from pprs_dynamics.measurement.files.bag_storage import Bag, damaged
 from pprs_dynamics.measurement.files.joint_state_cdr import JOINT_STATE
-from pprs_dynamics.measurement.files.samples import CURRENT, QUANTITIES, Defect, Indices
+from pprs_dynamics.measurement.files.samples import (
+    CURRENT,
+    QUANTITIES,
+    Defect,
+    Indices,
+    Samples,
+    whole_epoch,
+)
 from pprs_dynamics.measurement.files.way_out import MOST
 
 if TYPE_CHECKING:
@@ -57,27 +64,7 @@ class Series(NamedTuple):
     is_command: bool
 
 
-class Merged(NamedTuple):
-    """States of all drives at the stamps of the first one's positions.
-
-    Parameters
-    ----------
-    stamps : (N,) array of int
-        [ns].
-    arrays : list of (N, D) arrays
-        Positions, velocities and efforts, NaN where unknown.
-    channels : dict of (N, D) arrays
-        Further measured channels.
-    in_amperes : tuple of D bool
-        Drives whose efforts are currents.
-    findings : list of Defect
-    """
-
-    stamps: Indices
-    arrays: list[Array]
-    channels: dict[str, Array]
-    in_amperes: tuple[bool, ...]
-    findings: list[Defect]
+NONE = Series([], [], False)
 
 
 def fields_of(bag: Bag, recorded: RecordedDrives) -> list[Field]:
@@ -118,8 +105,8 @@ def _value(message: Any, way: str) -> float:
 
 
 def read_merged(bag: Bag, connections: list[Connection], drives: tuple[str, ...],
-                fields: Fields = ()) -> Merged | None:
-    """Return the states of all drives, or None where some drive has no positions.
+                findings: Sequence[Defect], fields: Fields = ()) -> Samples:
+    """Return the states of all drives at the stamps of the first one's positions.
 
     Each quantity of a drive is read from one topic.
 
@@ -129,53 +116,56 @@ def read_merged(bag: Bag, connections: list[Connection], drives: tuple[str, ...]
     connections : list of Connection
         Topics that are read; the first has precedence.
     drives : tuple of D str
+    findings : sequence of Defect
+        Remarks that the samples get, too.
     fields : sequence of Field
         Of messages of any type.
 
     Raises
     ------
     UnreadableFileError
-        If several topics without precedence have the same quantity.
+        If several topics without precedence have the same quantity, some drive has no positions,
+        or messages are damaged.
     """
     series: dict[tuple[str, str], dict[str, Series]] = defaultdict(dict)
-    named = {(one.joint, one.quantity) for one in fields}
+    named = {(field.joint, field.quantity) for field in fields}
     for connection, received, message in bag.decoded(connections):
         stamp = stamp_of(message) or received
-        states = [(one.joint, one.quantity, _value(message, one.way), False)
-                  for one in fields if one.topic == connection.topic]
-        states += [one for one in states_of(message, connection.msgtype) if one[:2] not in named]
+        states = [(field.joint, field.quantity, _value(message, field.way), False)
+                  for field in fields if field.topic == connection.topic]
+        try:
+            states += [state for state in states_of(message, connection.msgtype)
+                       if state[:2] not in named]
+        except (AttributeError, TypeError, ValueError) as error:
+            raise UnreadableFileError(bag.path, damaged(error)) from None
         for joint, quantity, value, is_command in states:
             if joint in drives and np.isfinite(value):
-                one = series[joint, quantity].setdefault(
+                of_topic = series[joint, quantity].setdefault(
                     connection.topic, Series([], [], is_command))
-                one.times.append(stamp)
-                one.values.append(float(value))
-    first = connections[0].topic
-    chosen = {key: _only(bag, key, topics, first) for key, topics in series.items()}
-    if any((drive, 'position') not in chosen for drive in drives):
-        return None
-    in_amperes = tuple((drive, CURRENT) in chosen and (drive, 'effort') not in chosen
-                       for drive in drives)
-    stamps = np.unique(np.array(chosen[drives[0], 'position'].times, dtype=np.int64))
-
-    def array(quantity: str) -> Array:
-        keys = [(drive, CURRENT if current and quantity == 'effort' else quantity)
-                for drive, current in zip(drives, in_amperes, strict=True)]
-        none = Series([], [], False)
-        return np.stack([at_stamps(stamps, *chosen.get(key, none)[:2]) for key in keys], axis=1)
-
-    arrays = [array(quantity) for quantity in QUANTITIES]
-    kept = np.isfinite(arrays[0]).all(axis=1)
-    topics = sorted({connection.topic for connection in connections})
-    findings = [Defect('merged', int(kept.sum()), f'merged by stamp from {", ".join(topics)}')]
-    if any(one.is_command for one in chosen.values()):
-        findings.append(Defect(
-            'commanded_efforts', int(kept.sum()), 'the efforts are what the controller commands: '
-            'none were measured'))
-    channels = {name: array(name)[kept] for name in CHANNELS
-                if any((drive, name) in chosen for drive in drives)}
-    return Merged(stamps[kept], [one[kept] for one in arrays], channels,
-                  in_amperes if any(in_amperes) else (), findings)
+                of_topic.times.append(stamp)
+                of_topic.values.append(float(value))
+    chosen = {key: _only(bag, key, topics, connections[0].topic)
+              for key, topics in series.items()}
+    for drive in drives:
+        if (drive, 'effort') in chosen:
+            chosen.pop((drive, CURRENT), None)
+    stamps = np.unique(np.array(chosen.get((drives[0], 'position'), NONE).times, dtype=np.int64))
+    columns = {key: at_stamps(stamps, *found[:2]) for key, found in chosen.items()}
+    none = np.full(len(stamps), np.nan)
+    kept = np.isfinite([columns.get((drive, 'position'), none) for drive in drives]).all(axis=0)
+    topics = ', '.join(sorted({connection.topic for connection in connections}))
+    if not np.any(kept):
+        raise UnreadableFileError(bag.path, f'{topics} holds no positions of all of '
+                                  f'{", ".join(drives)} at the same times')
+    told = [*findings, Defect('merged', int(kept.sum()), f'merged by stamp from {topics}')]
+    if any(found.is_command for found in chosen.values()):
+        told.append(Defect('commanded_efforts', int(kept.sum()), 'the efforts are what the '
+                           'controller commands: none were measured'))
+    epoch = whole_epoch(stamps / 1e9)
+    return Samples.of_columns(
+        drives, (stamps[kept] - epoch * 10**9) / 1e9,
+        {key: values[kept] for key, values in columns.items()}, f'bag, {topics}', tuple(told),
+        epoch)
 
 
 def _only(bag: Bag, key: tuple[str, str], topics: dict[str, Series], first: str) -> Series:

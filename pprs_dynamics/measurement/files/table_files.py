@@ -55,7 +55,7 @@ def read_table(path: Path, drives: RecordedDrives, topic: str | None = None,
     Parameters
     ----------
     path : Path
-        .parquet, .mat (up to version 7.2), .npz, a LeRobot dataset, or anything else as CSV;
+        .parquet, .mat (up to version 7.2), .npz, .json, a LeRobot dataset, or else CSV;
         where the model names several files, their folder or one of them.
     drives : RecordedDrives
     topic : str, optional
