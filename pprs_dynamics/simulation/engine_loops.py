@@ -269,8 +269,9 @@ class EngineLoops:
         if J.shape[0] != J.shape[1]:
             carrying = np.concatenate((J[:first + count], J[first + len(self._rows):]))
             inverse = np.asarray(np.linalg.pinv(carrying, rcond=LEAST_SINGULAR), dtype=float)
-        for k in np.flatnonzero(self._slides[:count]):
-            found[self._of_loop[k]] += np.outer(leads[k], inverse[:, first + k])
+        rows = np.flatnonzero(self._slides[:count])
+        np.add.at(found, self._of_loop[rows],
+                  leads[rows, :, None] * inverse.T[first + rows, None])
         return found
 
     def follow(self, motion: JointMotion) -> ClosedMotion:

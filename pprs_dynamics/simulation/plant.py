@@ -324,9 +324,9 @@ class Plant:
         mass = T.T @ self.engine.inertia() @ T
         self._load = carried.efforts[0]
         self._pressed = np.abs(self._load)
-        for name in self._guides:
-            self._pressed[self.structure.drives.index(name)] = np.linalg.norm(
-                self.engine.across([name], carried))
+        if self._guides and self._pushes:
+            self._pressed[[self.structure.drives.index(name) for name in self._guides]] = (
+                np.linalg.norm(self.engine.across(self._guides, carried)[0], axis=1))
         rubbing = [self.engine.friction(table, closed, carried) for table in self._passive]
         count = len(position)
         rows = [np.concatenate((np.eye(count)[:, None], np.zeros((count, 2, count))), axis=1),

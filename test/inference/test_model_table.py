@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from single_axis import AXIS, axis_values
 
-from pprs_dynamics import DriveModel
+from pprs_dynamics import DriveModel, compare
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.regression.design import Design
@@ -161,6 +161,15 @@ def test_an_onset_is_a_row_beside_the_constant_effect() -> None:
     constant = next(row for row in table.rows
                     if row.effects and not row.fitted.is_dated)
     assert constant.cost > table.best.cost + DECISIONS.rival_margin
+
+
+@pytest.mark.parametrize('name', ['nothing', 'spring', 'friction', 'two'])
+def test_compare_and_diagnose_print_the_same_noise(name: str) -> None:
+    run = record(HIDDEN[name])
+    compared = compare(axis({}), run).comparison.drives[AXIS].noise_floor
+    assert compared == pytest.approx(diagnose(axis({}), [run]).noise_floors[AXIS], rel=1e-6)
+    # White noise of 0.3 N in means over 10 ms, of two samples each.
+    assert compared == pytest.approx(0.3 / 2 ** 0.5, rel=0.05)
 
 
 def test_a_residual_of_five_times_the_noise_is_never_an_effect() -> None:

@@ -58,7 +58,7 @@ from pprs_dynamics.inference.search.held_out import (
     hold_out,
     predictive_gain,
 )
-from pprs_dynamics.inference.search.noise_floors import noise_floors
+from pprs_dynamics.inference.search.noise_floors import noise_at_most, noise_floors
 from pprs_dynamics.inference.search.reversal_widths import estimate_widths, with_widths
 from pprs_dynamics.inference.search.table import ModelTable, Row
 from pprs_dynamics.measurement.files.recording import Recording
@@ -112,9 +112,10 @@ class Answer:
             for d, spectrum in fits.regression.noise(fitted.fit).items()}
         known = noise_floors(table.first)
         # The residual of the reported set is an upper bound of the noise.
-        self.floors = {self.drives[d]: min(known.get(self.drives[d], np.inf),
-                                           self.fits.regression.noise_floor(self.fitted.fit, d))
-                       for d in self.fits.regression.drives}
+        self.floors = {self.drives[d]: noise_at_most(
+            known.get(self.drives[d], np.inf),
+            self.fits.regression.noise_floor(self.fitted.fit, d))
+            for d in self.fits.regression.drives}
         self.unseen = tuple(name for name in self.floors if name not in known)
 
     def _remaining(self) -> Array:

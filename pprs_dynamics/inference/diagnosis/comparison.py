@@ -19,6 +19,7 @@ from pprs_dynamics.inference.diagnosis.statements import Statement
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.explained_effort import explained_shares
+from pprs_dynamics.inference.search.noise_floors import noise_at_most
 from pprs_dynamics.system.numbers import finite
 
 
@@ -248,7 +249,7 @@ def _compare_drive(
     noise = findings.noise
     if floor is not None and noise is not None and noise.period == residuals.period:
         # What no pattern explains is an upper bound of the noise.
-        floor = min(floor, noise.rms)
+        floor = noise_at_most(floor, noise.rms)
     most = max((statement.mean_square for statement in findings.statements
                 if statement.kind != 'level'), default=0.0)
     parts = [root_mean_square(part[known, index] - part[known, index].mean())

@@ -62,6 +62,11 @@ def noise_floors(fits: FittedSets, period: float | None = None) -> dict[str, flo
         for k, d in enumerate(regression.drives) if seen[k]}
 
 
+def noise_at_most(floor: float, bound: float) -> float:
+    """Return a noise level, or an upper bound of it that is lower beyond its accuracy."""
+    return bound if bound * (1 + DECISIONS.noise_accuracy) < floor else floor
+
+
 def _curve(position: Array) -> Array:
     """Return hat functions of a position, (CURVE, M)."""
     place = (position - position.min()) / max(float(np.ptp(position)), 1e-12) * (CURVE - 1)

@@ -31,7 +31,7 @@ from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 MOST_EFFECTS, MOST_UNKNOWN = 6, 8  # in a set: bounds of the effort
 BEAM, PROPOSALS = 3, 6  # sets from which effects are added, and candidates of a scan for the best
 REPLACEMENTS = 3  # candidates tried in the place of one or of two
-REFINED = 3  # of the sets fitted in a round
+REFINED, FIRST_REFINED = 3, 6  # of the sets fitted in a round, and of those of one effect
 USUAL_STEPS = 50  # sets fitted and drives scanned, after which a bar stands at half
 # How much worse than the best a replacement may look at the best one's noise (its own noise may
 # favour it by about as much), and how much of what is lost without it it has to make good there.
@@ -116,14 +116,15 @@ class Search:
         # A pattern of no catalogue is at its best from the start, an effect once its shape is.
         shaped = [fitted for fitted in new if any(component.effect.shape or component.centre
                                                   for component in fitted.blocks)]
+        # The first effect decides which way the search goes.
         for number, fitted in enumerate(sorted(shaped, key=lambda shaped: shaped.cost)):
-            # The first effect decides which way the search goes.
-            if number < REFINED or len(fitted.candidates) == 1:
+            if number < (FIRST_REFINED if len(fitted.candidates) == 1 else REFINED):
                 self.fits.refined(fitted)
-        # A scan puts it where each drive pays by itself: beside others that is seldom right.
-        for fitted in new:
-            if len(fitted.candidates) == len(fitted.effects) == 1:
-                simplified(self.fits, fitted)
+        # A scan puts it where each drive pays by itself: with others that is seldom right.
+        single = [fitted for fitted in new
+                  if len(fitted.candidates) == len(fitted.effects) == 1]
+        for fitted in sorted(single, key=lambda fitted: fitted.cost)[:FIRST_REFINED]:
+            simplified(self.fits, fitted)
 
     @staticmethod
     def _is_bounded(candidates: Candidates) -> bool:

@@ -45,7 +45,7 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 
 SAME = 1e-6  # share of a column's square outside a span, up to which it is inside
 MOST_STEPS = 6  # of relinearisation of one row
-MOST_EXACT = 8  # rows of one search that get exact costs
+MOST_EXACT = 4  # rows of one search that get exact costs
 LEAST_CHANGE = 2.0  # of a cost, for which a row is computed anew
 
 
