@@ -89,6 +89,7 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / 'binary.csv').write_bytes(bytes(range(256)) * 20)
     shutil.copy(CONFIG / 'paper.yaml', folder / 'model.yaml')
     shutil.copy(CONFIG / 'single_axis.yaml', folder / 'axis.yaml')
+    shutil.copy(CONFIG / 'single_axis.urdf', folder / 'single_axis.urdf')
     return folder
 
 

@@ -261,7 +261,7 @@ def test_commands_speak_of_torques(tmp_path: Path, capsys: pytest.CaptureFixture
     assert 'N m s/rad' in said
     assert 'held out' in said
     assert main(['compare', run, '--model', base, '--json', str(tmp_path / 'c.json')]) == 0
-    assert 'noise accounts for it' in ' '.join(capsys.readouterr().out.split())
+    assert 'all of it noise' in ' '.join(capsys.readouterr().out.split())
 
 
 def test_a_fault_in_the_run_that_is_fitted_is_hidden_by_the_fit_which_is_said(

@@ -124,8 +124,8 @@ def test_what_efforts_do_not_show_the_second_encoder_tells(tmp_path: Path) -> No
     assert found.verdict != 'effect'
     assert 'elastic_joint' not in [one.name for one in found.effects]
     said, = (one for one in found.warnings if 'second encoder' in one)
-    assert 'link of swing' in said
-    number = re.search(r'winds up by (\S+) rad/\(N m\), (\S+) ms', said)
+    assert 'encoder of swing' in said
+    number = re.search(r'wind-up of (\S+) rad/\(N m\), (\S+) ms', said)
     assert number is not None
     assert float(number[1]) == pytest.approx(2e-5, rel=0.1)
     assert 1e-3 * float(number[2]) == pytest.approx(LOSS, rel=0.3)

@@ -350,7 +350,7 @@ def test_a_design_that_cannot_separate_says_so(model: DriveModel) -> None:
 # From recordings to the question.
 
 def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np.ndarray) -> None:
-    """Coulomb friction on a drive: a freer form of it is no rival, another effect is one."""
+    """Coulomb friction on a drive, and friction by load."""
     robot = DriveModel.from_parameters({
         **model.values, 'effects.active': ['coulomb_friction'],
         'effects.coulomb_friction.lift_1.force': 0.6})
@@ -368,17 +368,14 @@ def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np
     table = ModelTable(fits, fits)
     assert table.reported is adopted
     assert question_after(table, []).kind == 'estimate'
-    free = fitted('asymmetric_friction', 'force_forward', 'force_backward')
     other = fitted('load_friction', 'coefficient')
     question = question_after(ModelTable(fits, fits), [
-        Rival(Row(fits, free), ('coulomb_friction',), ('asymmetric_friction',)),
         Rival(Row(fits, other), ('coulomb_friction',), ('load_friction',))])
     assert question.kind == 'separate'
     pairs = {(one.truth.name, one.rival.name) for one in question.contests}
     assert ('coulomb_friction', 'load_friction') in pairs
     assert ('load_friction', 'coulomb_friction') in pairs
-    assert ('coulomb_friction', 'asymmetric_friction') not in pairs
-    costs = {one.effects[0].name: one.cost for one in (adopted, free, other)}
+    costs = {one.effects[0].name: one.cost for one in (adopted, other)}
     for contest in question.contests:
         assert contest.now == costs[contest.rival.name] - costs[contest.truth.name]
     # What the same motion tells again doubles the misfit and leaves the priors as they are.

@@ -34,7 +34,7 @@ def outcome(folder: Path, seed: int) -> str:
     found = read_recording(file.path, first.model.recorded)
     if not np.allclose(found.time, time, atol=1e-5):
         return 'time'
-    if not np.allclose(found.position, q, atol=1e-3):
+    if not np.allclose(found.position, q, atol=max(file.tolerance, 1e-3)):
         return 'position'
     # Efforts of a file are right where their unit is.
     return 'right' if np.allclose(found.effort, effort, rtol=1e-3, atol=0.01) else 'effort'

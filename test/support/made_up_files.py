@@ -27,19 +27,23 @@ SLIDE = ('<robot name="lift"><link name="base"/><joint name="lift" type="prismat
          'ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>')
 # Factors to SI, and what is added: 2048 ticks are the zero of servos.
 ANGLES = ((1.0, 0.0), (np.pi / 180, 0.0), (2 * np.pi, 0.0), (np.pi / 2048, 0.0),
-          (np.pi / 2048, -np.pi))
+          (np.pi / 2048, -np.pi), (np.pi / 8192, 0.0), (np.pi / 512, -np.pi))
 LENGTHS = ((1.0, 0.0), (1e-3, 0.0))
 FORCES = (1.0, 1e-3)
 RATE, DURATION = 100.0, 4.0
 
 
 class Drawn(NamedTuple):
-    """A file, the rate that is given with it, the truth, and whether it must be asked about."""
+    """A file, the rate that is given with it, the truth, and whether it must be asked about.
+
+    Positions are known to a tolerance, as encoders count.
+    """
 
     path: Path
     rate: float | None
     truth: tuple[np.ndarray, ...]
     needs_question: bool
+    tolerance: float
 
 
 def motion(random: np.random.Generator, count: int, size: float) -> tuple[np.ndarray, ...]:
@@ -88,8 +92,10 @@ def drawn(folder: Path, seed: int) -> Drawn:
     has_time, has_velocity, has_names, interleaved, negated, in_amperes, wrong = (
         random.random(7) < (0.6, 0.7, 0.6, 0.4, 0.2, 0.15, 0.3))
     recorded = effort / (constants if in_amperes else force) * (-1 if negated else 1)
-    groups = [('q', (q - offset) / scale), *([('dq', v / scale)] if has_velocity else []),
-              (name, recorded)]
+    is_counted = is_arm and scale < np.pi / 180
+    counts = (q - offset) / scale
+    groups = [('q', np.round(counts) if is_counted else counts),
+              *([('dq', v / scale)] if has_velocity else []), (name, recorded)]
     if has_names:
         random.shuffle(groups)
     columns = [(f'{name}{j + 1}', values[:, j]) for j in range(q.shape[1])
@@ -108,4 +114,5 @@ def drawn(folder: Path, seed: int) -> Drawn:
     # Only recorded velocities can tell that a rate is wrong.
     is_wrong = bool(wrong and not has_time and has_velocity)
     rate = None if has_time else RATE * (random.choice([0.5, 1.25, 5.0]) if is_wrong else 1.0)
-    return Drawn(path, rate, (time, q, effort), bool(in_amperes or is_wrong))
+    return Drawn(path, rate, (time, q, effort), bool(in_amperes or is_wrong),
+                 scale if is_counted else 1e-3)

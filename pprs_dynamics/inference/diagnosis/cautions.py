@@ -69,10 +69,10 @@ def _second_encoders(fits: FittedSets, effects: Sequence[FoundEffect]) -> Iterat
         if clearance.explained > max(fits.decisions.explained,
                                      0.0 if windup is None else windup.explained):
             if clearance.size > 0 and (LostMotion.name, name) not in reported:
-                what = (f'a clearance of {clearance.size:.2g} {units.of("m")} ({LostMotion.name}), '
+                what = (f'a clearance of {clearance.size:.3g} {units.of("m")} ({LostMotion.name}), '
                         f'whose side the {clearance.of} chooses')
         elif windup is not None and (ElasticJoint.name, name) not in reported:
-            what = (f'a wind-up of {windup.compliance:.2g} {units.of("m/N")}, '
+            what = (f'a wind-up of {windup.compliance:.3g} {units.of("m/N")}, '
                     f'{1e3 * windup.loss:.2g} ms after its load')
         if what:
             yield (f'the second encoder of {name} shows {what}; it does not change the efforts '

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations, product
+from itertools import product
 from math import log
 from typing import Any
 
@@ -52,7 +52,6 @@ from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
 
-HELD = 1e-3  # of a column's square may lie outside the span of another effect's
 # Effects that most machines have, or that are most often entered wrongly.
 ON_DRIVES = ('viscous_friction', 'coulomb_friction', 'stribeck_friction', 'effort_offset',
              'drive_spring', 'drive_inertia')
@@ -148,16 +147,19 @@ def question_after(table: ModelTable, rivals: Sequence[Rival]) -> Question:
 
 
 def _separation(table: ModelTable, rivals: Sequence[Rival]) -> Question:
-    """Return how to separate sets: each is fitted to the data that each other one predicts."""
-    sets = _told_apart(table, rivals)
+    """Return how to separate the reported row from its rivals.
+
+    A contest is a pair of rows. Each of the two is refitted to the data that the other predicts.
+    """
+    sets = _separate_rows(table, rivals)
     # The last search, or the first where one of the sets is linear around its point.
     fits = (table.last if all(row.fitted.is_nonlinear for row in sets) else table.first)
     placed = [fits.evaluate(row.fitted.candidates) for row in sets]
     terms = _Terms()
     parts = [terms.of_set(fitted) for fitted in placed]
+    pairs = [pair for k in range(1, len(sets)) for pair in ((k, 0), (0, k))]
     # A set that is refitted to what another one predicts may also be on that one's drives.
-    joining = {(refitted, true): terms.on_drives_of(placed[refitted], placed[true])
-               for refitted, true in permutations(range(len(sets)), 2)}
+    joining = {pair: terms.on_drives_of(placed[pair[0]], placed[pair[1]]) for pair in pairs}
     plan = ColumnPlan.of_design(fits.design, terms.all)
     explanations = [_explanation(names, part, plan, 0.0)
                     for names, part in zip(_names_apart(placed), parts, strict=True)]
@@ -167,12 +169,7 @@ def _separation(table: ModelTable, rivals: Sequence[Rival]) -> Question:
             place for term in joined for place in _places(plan, term)[term.free])
         contest = Contest(explanations[true], explanations[refitted],
                           (*range(len(plan.base)), *free), sets[refitted].cost - sets[true].cost)
-        only_true = {name.partition(':')[0] for name in contest.sides[0]}
-        to_imitate = [term for term, _ in parts[true] if term.effect.name in only_true]
-        free_terms = [*(term for term, _ in parts[refitted]), *joined]
-        # An effect that can be all that another one is fits it on any motion.
-        if all(contest.sides) and not all(
-                _holds(free_terms, term, fits.design) for term in to_imitate):
+        if all(contest.sides):
             contests.append(contest)
     subjects = [_explanation([c.name], terms.of_candidate(placed[0], c), plan, 0.0)
                 for c in placed[0].effects]
@@ -180,7 +177,7 @@ def _separation(table: ModelTable, rivals: Sequence[Rival]) -> Question:
                   subjects)
 
 
-def _told_apart(table: ModelTable, rivals: Sequence[Rival]) -> list[Row]:
+def _separate_rows(table: ModelTable, rivals: Sequence[Rival]) -> list[Row]:
     """Return the reported set and, of each further pair of effects, the best set with it."""
     pairs: set[tuple[str, str]] = set()
     sets = [table.best]
@@ -322,22 +319,6 @@ def _explanation(names: Sequence[str], parts: Sequence[Part], plan: ColumnPlan, 
 def _places(plan: ColumnPlan, term: FittedTerm) -> range:
     place = plan.places()[term]
     return range(place.start, place.stop)
-
-
-def _holds(larger: Sequence[FittedTerm], smaller: FittedTerm, design: Design) -> bool:
-    """Return whether terms with more coefficients on the same drive can be all that one is."""
-    same = [term for term in larger if term.drive == smaller.drive]
-    if sum(len(term.values) for term in same) <= len(smaller.values):
-        return False
-    theirs = [term.rows(design) for term in same]
-    for d, mine in smaller.rows(design).items():
-        own = mine[:len(smaller.values)]
-        span = np.concatenate([rows[d][:len(term.values)] for term, rows in zip(
-            same, theirs, strict=True) if d in rows] or [np.zeros((1, own.shape[1]))])
-        rest = own - np.linalg.lstsq(span.T, own.T, rcond=None)[0].T @ span
-        if np.sum(rest ** 2) > HELD * np.sum(own ** 2):
-            return False
-    return True
 
 
 def commissioning(model: DriveModel, recordings: Sequence[Recording], noise: float,

@@ -105,7 +105,7 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
             return found  # no reading of the whole is right
     excerpts = {unit: excerpt for unit in (1.0, *_time_units(recording))
                 if (excerpt := excerpt_of(recording, unit, table.STRETCHES)) is not None}
-    search = Search(model, excerpts)
+    search = Search(model, excerpts, bool(np.all(recording.position % 1 == 0)))
     best = search.best()
     rival = None if best is None else search.rival(best)
     if best is not None and best.is_other_unit and rival is None:
@@ -144,10 +144,13 @@ class Search:
     model : DriveModel
     excerpts : dict of float to Excerpt
         Of the recording, by the unit of its times [s].
+    are_counts : bool
+        Whether all its positions are whole numbers.
     """
 
-    def __init__(self, model: DriveModel, excerpts: dict[float, Excerpt]) -> None:
-        self.model, self.excerpts = model, excerpts
+    def __init__(self, model: DriveModel, excerpts: dict[float, Excerpt],
+                 are_counts: bool = False) -> None:
+        self.model, self.excerpts, self.are_counts = model, excerpts, are_counts
         # Of currents without a known gain no force is known: masses say nothing.
         self.masses = np.inf if model.effort_kind == CURRENT and not model.knows_currents else (
             table.MASSES)
@@ -185,7 +188,7 @@ class Search:
         best: tuple[Fit | None, float] = (None, start.score)
         if not start.is_plain:
             best = start, start.score
-        for reading in (first, *readings(drives, self.model.units)):
+        for reading in (first, *readings(drives, self.model.units, self.are_counts)):
             if (reading.kind == 'drive_order' and best[0] is not None
                     and best[0].left < table.CLOSE_FIT):
                 break

@@ -507,15 +507,20 @@ def _explained(efforts: Array, position: Array, time: Array) -> float:
         return 0.0
     if not np.any(moves):
         return -1.0
-    half = max(1, len(time) // 400)
-    speed = np.zeros_like(position)
-    speed[half:-half] = (position[2 * half:] - position[:-2 * half]) / (
-        time[2 * half:] - time[:-2 * half])[:, None]
+    half = max(2, len(time) // 200)
+
+    def rate_of(values: Array) -> Array:
+        found = np.zeros_like(values)
+        found[half:-half] = (values[2 * half:] - values[:-2 * half]) / (
+            time[2 * half:] - time[:-2 * half])[:, None]
+        return found
+
+    speed = rate_of(position)
     width = root_mean_square(speed) / 10 or 1.0
-    rate = np.gradient(speed, time, axis=0)
+    rate = rate_of(speed)
     common = [np.ones(len(time)), speed, np.tanh(speed / width), rate]
     shares = []
-    for unit in (1.0, *table.ANGLES):
+    for unit in (1.0, *table.ANGLES, *table.COUNTS):
         angle = unit * position
         total = np.cumsum(angle, axis=1)
         columns = np.column_stack([

@@ -24,6 +24,9 @@ from pprs_dynamics.drives import DRIVES, DriveUnits
 TICK = 2 * math.pi / 4096
 LENGTHS = {1e-3: 'millimetres', 1e-2: 'centimetres', 1e-6: 'micrometres'}
 ANGLES = {math.pi / 180: 'degrees', 2 * math.pi: 'turns', TICK: 'ticks of 4096 per turn'}
+# Other encoders, tried where all positions are whole numbers.
+COUNTS = {2 * math.pi / 2 ** bits: f'ticks of {2 ** bits} per turn'
+          for bits in (10, 11, 13, 14, 15, 16, 17, 18, 19, 20)}
 TIMES = {1e-3: 'milliseconds', 1e-6: 'microseconds', 1e-9: 'nanoseconds'}
 # Multiples of N m and N that files have, and what a unit of effort is called in a sentence.
 EFFORTS = {1e3: 'm{}', 1e-3: 'k{}', 1 / 0.0980665: 'kgf cm'}
@@ -142,7 +145,7 @@ TIME_WORDS = {'ms': 1e-3, 'msec': 1e-3, 'millis': 1e-3, 'milliseconds': 1e-3, 'u
 # --------------------------------------------------------------------- columns by their numbers
 
 COPY = 0.995  # correlation of the changes of a column with those of what it was asked to be
-AS_WELL = 0.02  # difference of correlations that says nothing
+AS_WELL = 0.003  # difference of correlations that says nothing
 UNLIKE = 0.5  # correlation below which a column that is called a velocity is none
 SAME_UNIT = 0.05  # relative distance of a slope from a unit's
 CLEAR = 0.05  # share of the explained efforts by which one block of columns must win
@@ -209,11 +212,21 @@ def plain(count: int) -> Reading:
     return Reading('', '', (), same, same, 0.0)
 
 
-def readings(drives: tuple[str, ...], units: Sequence[DriveUnits]) -> Iterator[Reading]:
-    """Yield all readings of D drives but the plain one; those that need a close look last."""
+def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], are_counts: bool = False,
+             ) -> Iterator[Reading]:
+    """Yield all readings of D drives but the plain one; those that need a close look last.
+
+    Parameters
+    ----------
+    drives : tuple of D str
+    units : sequence of D DriveUnits
+    are_counts : bool
+        Whether all positions are whole numbers, as encoders count.
+    """
     count = len(drives)
     same, every = np.eye(count), tuple(range(count))
-    for names, turns in ((LENGTHS, False), (ANGLES, True)):
+    angles = {**ANGLES, **COUNTS} if are_counts else ANGLES
+    for names, turns in ((LENGTHS, False), (angles, True)):
         alike = tuple(k for k in every if units[k].turns == turns)
         for unit, name in names.items():
             # Encoders of a robot's turning joints count alike; its rails may not.
@@ -222,10 +235,11 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits]) -> Iterator[R
                 cost = COST['position_unit'] + (0.0 if len(group) == len(alike) else FEW)
                 what = f'the {_position(drives, group)} like {name}'
                 yield Reading('position_unit', what, group, scale, same, cost)
-                if unit == TICK:
+                if unit == TICK or unit in COUNTS:
                     middle = np.where(_scaled(count, group, -1.0) < 0, -math.pi, 0.0)
-                    yield Reading('position_unit', f'{what} with the zero at 2048', group, scale,
-                                  same, cost + 1, middle)
+                    yield Reading(
+                        'position_unit', f'{what} with the zero at {round(math.pi / unit)}', group,
+                        scale, same, cost + 1, middle)
     for group in _groups(drives, every):
         yield Reading('position_sign', f'the {_position(drives, group)} negated', group,
                       np.diag(_scaled(count, group, -1.0)), same, COST['position_sign'] + (

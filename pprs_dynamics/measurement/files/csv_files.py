@@ -88,57 +88,46 @@ class CsvTable:
         UnreadableFileError
             Where it is no text, or empty.
         """
-        separators = tuple(each for each in SEPARATORS if each != decimal)
-        if (below := cls._below_preamble(path, decimal, separators)) is not None:
-            return below
-        with _text_of(path) as (file, _):
-            above, remark, first = 0, '', file.readline()
-            while first.startswith(REMARKS) and (line := file.readline()):
-                above, remark, first = above + 1, first.lstrip('#% '), line
-            second = next((line for line in file if line.strip()), '')
-        if not first:
-            raise UnreadableFileError(path, 'the file is empty')
-        if '\x00' in first:
-            raise UnreadableFileError(path, NO_TEXT)
-        rows = {each: _cells(path, above + 1, first, each) for each in (*separators, BLANK)}
-        separator = max(separators, key=lambda each: len(rows[each]))
-        if len(rows[separator]) == 1:
-            separator = BLANK
-        separator = next((each for each, cells in rows.items() if any(
-            name in cells for name in likely)), separator)
-        header = rows[separator]
-        if all(_is_value(cell, decimal) for cell in header):
-            # A header as numpy.savetxt writes it is a remark.
-            titles = _cells(path, above, remark, separator) if remark else []
-            return cls(path, separator, decimal, titles if len(titles) == len(header) else [],
-                       len(header), above, header)
-        return cls(path, separator, decimal, header, len(header), above + 1,
-                   _cells(path, above + 2, second, separator) if second else [])
-
-    @classmethod
-    def _below_preamble(cls, path: Path, decimal: str, separators: Sequence[str],
-                        ) -> CsvTable | None:
-        """Return a table below lines about the recording, or with a line of units.
-
-        None for a table whose header, if any, is its first line.
-        """
         with _text_of(path) as (file, _):
             lines = list(islice(file, PREAMBLE))
         if not lines:
-            return None
-        for separator in separators:
-            rows = [_cells(path, number, line, separator) if line.strip() else []
-                    for number, line in enumerate(lines, 1)]
-            first = next((k for k in range(len(rows) - 1) if len(rows[k]) > 1 and all(
-                len(row) == len(rows[k]) and any(row) and all(
-                    _is_value(cell, decimal) for cell in row) for row in rows[k:k + 2])), 0)
-            titles = [row for row in rows[max(first - 2, 0):first] if len(row) == len(rows[first])]
-            if first < 2 or not titles or lines[0].startswith(REMARKS):
-                continue
-            names = [' '.join(filter(None, cells)) for cells in zip(*titles, strict=True)]
-            if len(titles) > 1 or len(rows[0]) != len(rows[first]):
-                return cls(path, separator, decimal, names, len(names), first, rows[first])
-        return None
+            raise UnreadableFileError(path, 'the file is empty')
+        if '\x00' in lines[0]:
+            raise UnreadableFileError(path, NO_TEXT)
+        tables = [cls._with(path, lines, separator, decimal)
+                  for separator in (*SEPARATORS, BLANK) if separator != decimal]
+        most = max(table.count for table in tables[:-1])
+        return next((table for table in tables if any(name in table.names for name in likely)),
+                    tables[-1] if most == 1 else next(
+                        table for table in tables if table.count == most))
+
+    @classmethod
+    def _with(cls, path: Path, lines: Sequence[str], separator: str, decimal: str) -> CsvTable:
+        """Return a table whose cells are apart by a separator, from its first lines.
+
+        Lines about the recording may be above its header, and a line of units below it.
+        """
+        remarks = 0
+        while remarks < len(lines) - 1 and lines[remarks].startswith(REMARKS):
+            remarks += 1
+        # A header as numpy.savetxt writes it is a remark.
+        rows = [_cells(path, number, line.lstrip('#% ') if number == remarks else line, separator)
+                if line.strip() and number >= remarks else []
+                for number, line in enumerate(lines, 1)]
+
+        def is_row(k: int) -> bool:
+            return any(rows[k]) and all(_is_value(cell, decimal) for cell in rows[k])
+
+        first = next((k for k in range(remarks, len(rows) - 1) if is_row(k) and is_row(k + 1)
+                      and 1 < len(rows[k]) == len(rows[k + 1])), remarks)
+        if first == remarks and not is_row(remarks):
+            first += 1
+        sample = rows[first] if first < len(rows) else []
+        # The header counts where the cells below it are no numbers, as of decimal commas.
+        count = len(sample if sample and is_row(first) else rows[remarks])
+        titles = [row for row in rows[max(first - 2, 0):first] if len(row) == count and any(row)]
+        names = [' '.join(filter(None, cells)) for cells in zip(*titles, strict=True)]
+        return cls(path, separator, decimal, names, count, first, sample)
 
     def read(self, wanted: Sequence[Column], progress: Progress | None = None) -> list[Array]:
         """Return columns, (N,) each; times of ISO 8601 as seconds since 1970.

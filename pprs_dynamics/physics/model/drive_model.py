@@ -32,6 +32,7 @@ from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisO
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.places import MECHANISM
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MechanismState
@@ -365,7 +366,8 @@ class DriveModel:
         EffectError
             Where an effect of another package fails.
         """
-        self._require_motion(motion)
+        if type(motion) is not self._usual_motion:
+            self._require_motion(motion)
         one_pass = self._one_pass
         found = None if one_pass is None else one_pass.forces(
             motion, None if state is None else state.closed)
@@ -382,6 +384,11 @@ class DriveModel:
         elif state is not None:
             state.advance(motion.time, self.initial_state)
         return found
+
+    @cached_property
+    def _usual_motion(self) -> type | None:
+        """The kind of motion whose shape needs no check."""
+        return None if self.moves_joints else PlatformMotion
 
     @cached_property
     def _one_pass(self) -> Any:

@@ -140,12 +140,21 @@ class PlatformPass:
         table = np.empty((FORCES + 3 if len(rows) <= SHORT else FORCES, len(rows), 6))
         if evaluate(forces_kernel, self.parameters, rows, table) >= 0:
             return None
-        drive_motion = ((table[FORCES], table[FORCES + 1], table[FORCES + 2])
-                        if len(table) > FORCES else None)
-        return Forces(table[0], lambda: {
-            RIGID_BODY: table[1], ACTIVE_FRICTION: table[2], PASSIVE_FRICTION: table[3]},
-            lambda: self._robot.state(motion, self._reversal, drive_motion=drive_motion),
+
+        def drive_motion() -> tuple[Array, Array, Array]:
+            return table[FORCES], table[FORCES + 1], table[FORCES + 2]
+
+        if len(table) == FORCES:
+            return Forces(table[0], lambda: self._parts(table),
+                          lambda: self._robot.state(motion, self._reversal))
+        return Forces(
+            table[0], lambda: self._parts(table),
+            lambda: self._robot.state(motion, self._reversal, drive_motion=drive_motion()),
             drive_motion)
+
+    @staticmethod
+    def _parts(table: Array) -> dict[str, Array]:
+        return {RIGID_BODY: table[1], ACTIVE_FRICTION: table[2], PASSIVE_FRICTION: table[3]}
 
 
 class TreePass:
@@ -194,7 +203,7 @@ class TreePass:
             closed[structure] = found.q[-1].copy()
         return Forces(found.efforts[TOTAL], lambda: self._parts(found),
                       lambda: self._state(motion, found),
-                      (motion.position, motion.velocity, motion.acceleration))
+                      lambda: (motion.position, motion.velocity, motion.acceleration))
 
     def _parts(self, found: InverseDynamicsResult) -> dict[str, Array]:
         """Return the parts of efforts by name, in the order of the effects."""
