@@ -210,9 +210,8 @@ def test_effort_kind_says_that_efforts_are_currents(tmp_path: Path) -> None:
     write_recording(tmp_path / 'run.csv', run.of(run.total))
     read = [read_recording(tmp_path / 'run.csv', one.recorded) for one in (run.model, model)]
     np.testing.assert_allclose(read[1].effort, read[0].effort * (2.0, 3.0, 4.0))
-    with pytest.raises(ModelError, match='only an arm and a robot with loops have a gain'):
-        DriveModel.from_parameters({**DriveModel.load('config/single_axis.yaml').values,
-                     'effort_kind': 'current'})
+    with pytest.raises(ModelError, match='effort_kind'):
+        DriveModel.from_parameters({**DriveModel.load().values, 'effort_kind': 'current'})
 
 
 def test_another_kind_is_refused(tmp_path: Path) -> None:
@@ -231,7 +230,7 @@ def test_commands_stop_or_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[s
         assert said['effort_looks_like'] == WITHOUT_GRAVITY
         told = ' '.join(capsys.readouterr().out.split())
         assert 'as if gravity was taken out' in told
-    assert 'Next Record the effort that is measured' in told
+    assert 'without_gravity' in told
     for command in (('adopt', 'payload_mass'), ('fit',)):
         assert main([*command, *given, '--output', str(tmp_path / 'x.yaml')]) == 1
         assert 'effort_kind: without_gravity' in capsys.readouterr().err

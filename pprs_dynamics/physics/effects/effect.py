@@ -15,6 +15,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
+from pprs_dynamics.physics.mechanism.state import MechanismState
 
 
 @dataclass(frozen=True)
@@ -113,12 +114,12 @@ class Effect(ABC):
     is_measurement: bool = False
 
     @abstractmethod
-    def force(self, state: Any, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the effect's drive forces [N, N m], (N, D).
 
         Parameters
         ----------
-        state : ThreePprsState or MechanismState
+        state : MechanismState
         memory : object, optional
             What `initial_memory` returned, advanced in place to the last sample.
         """

@@ -190,7 +190,7 @@ def _robot(result: Any, _: Any, __: Any, robot: Any) -> Any:
     return result
 
 
-def _load(result: Any, _: Any, __: Any, state: Any) -> StructureLoad | None:
+def _load(result: Any, _: Any, __: Any, state: MechanismState) -> StructureLoad | None:
     if result is None:
         return None
     samples, given = len(state.velocity), (state.velocity.sum(axis=1, keepdims=True),)
@@ -209,7 +209,7 @@ def _load(result: Any, _: Any, __: Any, state: Any) -> StructureLoad | None:
         _finite(_array(result.wrench, (samples, 6), 'a wrench'), given, 'a wrench'), torques)
 
 
-def _state(result: Any, _: Any, __: Any, state: Any) -> Any:
+def _state(result: Any, _: Any, __: Any, state: MechanismState) -> Any:
     if type(result) is not type(state):
         raise _WrongResultError(f'{result!r:.80}, must be a {type(state).__name__}')
     _finite(result.rigid_force, (state.rigid_force,), 'a state')

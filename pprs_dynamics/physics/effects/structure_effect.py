@@ -11,6 +11,7 @@ from typing import Any, Self
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 
 
@@ -56,15 +57,15 @@ class BodyEffect(StructureEffect):
         """Return the robot, a `Robot` or a `Mechanism`, with the effect; by default as it was."""
         return robot
 
-    def load(self, state: Any) -> StructureLoad | None:
+    def load(self, state: MechanismState) -> StructureLoad | None:
         """Return a load in addition to bodies and gravity, or None (default)."""
         return None
 
-    def apply(self, state: Any) -> Any:
+    def apply(self, state: MechanismState) -> Any:
         """Return the state with the effect in its bodies."""
         return state.with_load(self.changed(state.robot), self.load(state))
 
-    def force(self, state: Any, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the change of the rigid body's drive forces [N, N m], (N, D)."""
         added: Array = self.apply(state).rigid_force - state.rigid_force
         return added
@@ -82,7 +83,7 @@ class PassiveJointEffect(StructureEffect):
     """Friction in the passive joints: a force on top of the rigid body's."""
 
     @abstractmethod
-    def force(self, state: Any, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the effect's drive forces [N, N m], (N, D)."""
 
 

@@ -20,6 +20,7 @@ from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.places import MECHANISM
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
+from pprs_dynamics.physics.mechanism.state import MechanismState
 
 
 class CoupledDrives(StructureEffect):
@@ -50,7 +51,7 @@ class CoupledDrives(StructureEffect):
             (name, ratios) for name, ratios in robot.motors.items()
             if np.count_nonzero(ratios) > 1))
 
-    def force(self, state: Any, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
         force: Array = np.zeros_like(state.velocity)
         widths = state.reversal.widths(state.velocity.shape[1])

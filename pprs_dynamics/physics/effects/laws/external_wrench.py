@@ -10,13 +10,12 @@ L.-W. Tsai, Robot Analysis, 1999, on statics by virtual work.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
+from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 
 FORCES = tuple(f'force_{axis}' for axis in 'xyz')
@@ -57,7 +56,7 @@ class ExternalWrench(BodyEffect):
         'tell a downward force from a payload',
         'Tsai, Robot Analysis, 1999')
 
-    def load(self, state: Any) -> StructureLoad:
+    def load(self, state: MechanismState) -> StructureLoad:
         """Return the wrench, the same for every sample."""
         wrench = np.array([self.values[p.name] for p in self.parameters])
         return StructureLoad(np.tile(wrench, (len(state.velocity), 1)))

@@ -24,6 +24,7 @@ from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 from pprs_dynamics.physics.mechanism.alike import alike_joints
 from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 from pprs_dynamics.physics.mechanism.reversal import Reversal
+from pprs_dynamics.physics.mechanism.state import MechanismState
 
 RADIUS = 0.01  # [m] at which a load rubs where the model does not say
 
@@ -68,7 +69,7 @@ class JointFrictionEffect(PassiveJointEffect):
             tuple((one.name, one.radius or RADIUS) for one in robot.passive_joints),
             alike_joints(robot))
 
-    def force(self, state: Any, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
         blocks: dict[str, dict[str, float]] = self.to_file()
         for name, block in blocks.items():
@@ -121,7 +122,7 @@ class ModelJointFriction(Effect):
         self.blocks = {name: dict(one) for name, one in blocks.items()}
         self._tables: dict[Reversal, Any] = {}
 
-    def force(self, state: Any, memory: Any = None) -> Array:
+    def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the drives' efforts [N m, N], (N, D)."""
         force: Array = state.against_friction(self.table(state.robot, state.reversal))
         return force

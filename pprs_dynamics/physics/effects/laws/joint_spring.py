@@ -21,6 +21,7 @@ from pprs_dynamics.physics.effects.relaxed_position import FARTHEST, relaxed_pos
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.alike import alike_joints
 from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
+from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 
 
@@ -87,7 +88,7 @@ class JointSpring(BodyEffect):
                 coefficients.get(f'{joint}.moment', 0.0))
         return found
 
-    def load(self, state: Any) -> StructureLoad:
+    def load(self, state: MechanismState) -> StructureLoad:
         """Return k q + M in each joint."""
         torques = {}
         for joint in self.joints:

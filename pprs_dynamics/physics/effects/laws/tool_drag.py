@@ -10,13 +10,12 @@ F. M. White, Fluid Mechanics, on creeping flow.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from pprs_dynamics.physics.effects.effect import Card, Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
+from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 
 
@@ -48,7 +47,7 @@ class ToolDrag(BodyEffect):
         'Jacobian, and not that of one drive',
         card.causes, card.confirm, card.reference)
 
-    def load(self, state: Any) -> StructureLoad:
+    def load(self, state: MechanismState) -> StructureLoad:
         """Return (c v, c_r omega)."""
         c = [self.values['coefficient']] * 3 + [self.values['rotational']] * 3
         return StructureLoad(np.array(c) * state.tool_velocity)
