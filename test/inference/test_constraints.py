@@ -222,9 +222,9 @@ TIME = np.arange(0, 8, 0.005)
 def test_no_total_of_a_drive_is_negative_when_one_constraint_moves_another(inertia: float) -> None:
     """Less inertia than none moves the frictions; all are within their bounds afterwards."""
     moved = axis_motion(TIME)
-    own = 'links.mass', 'friction.viscous', 'friction.coulomb'
-    exact = DriveModel.from_parameters({
-        **MODEL.values, **dict.fromkeys((f'tolerances.{key}' for key in own), 1e-6)})
+    exact = DriveModel.from_parameters({**MODEL.values, **dict.fromkeys(
+        (f'tolerances.{key}' for key in ('links.mass', 'friction.viscous', 'friction.coulomb')),
+        1e-6)})
     effort = exact.drive_forces(moved).total + MODEL.values['links.mass'][0] * inertia * (
         moved.acceleration) - 0.99 * MODEL.values['friction.viscous'][0] * moved.velocity
     effort += np.random.default_rng(5).normal(0, 1.0, effort.shape)
