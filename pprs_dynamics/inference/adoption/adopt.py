@@ -150,8 +150,8 @@ class _Case:
 
     @outside_cost('adopt refuses an effect that does not lower the error, on the recordings and '
                   'held out')
-    def objections(self, gain: PredictiveGain | None, residuals: Sequence[Residuals],
-                   where: str) -> list[str]:
+    def objections(self, gain: PredictiveGain | None, residuals: Sequence[Residuals], where: str,
+                   sizes: Sequence[float] = ()) -> list[str]:
         """Return why an effect does not lower the error on some data for certain; none if it does.
 
         Parameters
@@ -162,6 +162,8 @@ class _Case:
             Before and after, for the sentence.
         where : str
             The data, for the sentence.
+        sizes : (before, after), optional
+            Errors over all drives, where `residuals` are of other data.
         """
         asked = FURTHER_ERRORS if any(
             isinstance(effect, CatalogueEffect) for effect in self.model.effects) else FIRST_ERRORS
@@ -172,7 +174,8 @@ class _Case:
         rank = min if gain.losing else max
         drive = rank(gain.by_drive, key=lambda name: gain.by_drive[name])
         before, after = (rms_by_drive(one)[drive] for one in residuals)
-        text = (f'the error of {drive} on {where} '
+        text = (f'the error on {where} {change(sizes[0], sizes[1], residuals[0].unit)}' if sizes
+                else f'the error of {drive} on {where} '
                 f'{change(before, after, residuals[0].units_of(drive).effort)}')
         return [f'{text}: worse by {-gain.by_drive[drive]:.2g} standard errors' if gain.losing
                 else f'{text}; over all drives the fall is {gain.certainty:.2g} standard errors, '
@@ -227,7 +230,8 @@ def _adopt_effect(case: _Case, request: EffectRequest) -> Adoption:
         held_out = [rms(residual) for residual in tested]
     gain = predictive_gain(residuals[0], residuals[1])
     against += (case.objections(gain, residuals, 'the recordings')
-                or case.objections(effect.gain, tested, case.held_out))
+                or case.objections(effect.gain, tested, case.held_out,
+                                   () if case.validate else held_out))
     rivals = tuple(dict.fromkeys(
         other for rival in table.rivals(margin)
         if request.name in (*rival.missing, *rival.instead)

@@ -146,7 +146,7 @@ class MechanismState(JointMotion):
         The motion of the tool, where the state was made from it.
     """
 
-    robot: Any = field(kw_only=True)
+    robot: Robot = field(kw_only=True)
     reversal: Reversal = field(default_factory=Reversal, kw_only=True)
     load: StructureLoad | None = field(default=None, kw_only=True)
     known: Any = field(default=None, kw_only=True)
@@ -164,16 +164,14 @@ class MechanismState(JointMotion):
     @property
     def drives(self) -> tuple[str, ...]:
         """Names of the drives."""
-        drives: tuple[str, ...] = self.robot.drives
-        return drives
+        return self.robot.drives
 
     @lazy
     def inverse_dynamics(self) -> InverseDynamicsResult | None:
         """Closed coordinates, efforts and own friction in one pass; None where links are needed."""
         if self.known is not None or self.load is not None:
             return None
-        found: InverseDynamicsResult | None = self.robot.inverse_dynamics(self)
-        return found
+        return self.robot.inverse_dynamics(self)
 
     @lazy
     def links(self) -> Any:
@@ -217,8 +215,7 @@ class MechanismState(JointMotion):
     @lazy
     def friction_load(self) -> Array:
         """Load of a drive's guide or gear [N m, N], without a sign; 0 if it is not known."""
-        load: Array = self.robot.friction_load(self)
-        return load
+        return self.robot.friction_load(self)
 
     @property
     def tool_velocity(self) -> Array:
@@ -235,17 +232,13 @@ class MechanismState(JointMotion):
         """Return the state with a drive at other positions, to first order; all move as before."""
         position = self.position.copy()
         position[:, drive] += step
-        return self._moved(position, self.acceleration)
+        return self.robot.moved(self, position, self.acceleration)
 
     def accelerated(self, drive: int, change: float) -> MechanismState:
         """Return the state with another acceleration of a drive."""
         acceleration = self.acceleration.copy()
         acceleration[:, drive] += change
-        return self._moved(self.position, acceleration)
-
-    def _moved(self, position: Array, acceleration: Array) -> MechanismState:
-        state: MechanismState = self.robot.moved(self, position, acceleration)
-        return state
+        return self.robot.moved(self, self.position, acceleration)
 
     def against_friction(self, friction: Any) -> Array:
         """Return the drives' efforts against friction of joints, (N, D)."""

@@ -128,7 +128,7 @@ class IndependentChainsFriction(PassiveFriction):
         k_r, k_s = np.hsplit(state.links.resistances(
             state.reactions, self.joints(state.reversal)), 2)
         omega_n = relative_rate(chains.u_dot, chains.angular_velocity)
-        lever = state.robot.geometry.rod_length * chains.cos_u
+        lever = state.links.geometry.rod_length * chains.cos_u
         sign = -1.0 if self.printed else 1.0
         M_s_up, M_s_n = -k_s * omega_n.k, -k_s * omega_n.n                     # Eq. (9)
         M_r_n = -k_r * chains.u_dot                                            # Eq. (9)
