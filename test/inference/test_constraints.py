@@ -223,7 +223,8 @@ def test_no_total_of_a_drive_is_negative_when_one_constraint_moves_another(inert
     """Less inertia than none moves the frictions; all are within their bounds afterwards."""
     moved = axis_motion(TIME)
     exact = DriveModel.from_parameters({**MODEL.values, **dict.fromkeys(
-        (f'tolerances.axis.{key}' for key in ('mass', 'viscous', 'coulomb')), 1e-6)})
+        (f'tolerances.{key}' for key in ('links.mass', 'friction.viscous', 'friction.coulomb')),
+        1e-6)})
     effort = exact.drive_forces(moved).total + MODEL.values['links.mass'][0] * inertia * (
         moved.acceleration) - 0.99 * MODEL.values['friction.viscous'][0] * moved.velocity
     effort += np.random.default_rng(5).normal(0, 1.0, effort.shape)

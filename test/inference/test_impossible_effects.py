@@ -148,8 +148,9 @@ def test_less_inertia_than_none_is_no_effect() -> None:
     light = DriveModel.from_parameters({**MODEL.values, 'links.mass': [1e-6]})
     effort = light.drive_forces(moved).total - 0.3 * MASS * moved.acceleration
     found = diagnose(MODEL, [recorded(effort)], as_it_is=True)
-    assert found.verdict != 'effect'
-    assert 'drive_inertia' not in [one.name for one in found.effects]
+    assert found.verdict == 'unknown'
+    assert all(one.parameters['axis.mass'].value >= -MASS for one in found.effects
+               if one.name == 'drive_inertia')
 
 
 @pytest.mark.parametrize('seed', [0, 1, 2])
