@@ -247,9 +247,8 @@ def test_noise_at_once_is_the_noise_sample_by_sample_and_has_the_stated_covarian
 CONTAINERS = (
     'drives', 'physics.mechanism.motion', 'physics.mechanism.joint_motion',
     'physics.mechanism.joint_series', 'physics.mechanism.description', 'physics.mechanism.urdf',
-    'physics.mechanism.mjcf', 'physics.mechanism.structure', 'physics.mechanism.tree_equations',
-    'physics.mechanism.passive_joints', 'physics.model.drive_model',
-    'physics.model.drive_model', 'physics.model.drive_model', 'physics.model.limits',
+    'physics.mechanism.mjcf', 'physics.mechanism.structure', 'physics.mechanism.tree_tables',
+    'physics.mechanism.passive_joints', 'physics.model.drive_model', 'physics.model.limits',
     'physics.model.robot_block', 'physics.effects.effect', 'physics.effects.laws.axis_friction',
     'physics.effects.laws.joint_friction', 'errors', 'arrays')
 # Of the equations, which are compiled functions over tables, names and kinds of rows alone.
@@ -263,7 +262,7 @@ def test_the_simulation_shares_no_physics_with_the_model() -> None:
                     'pprs_dynamics.'):
                 name = str(node.module).removeprefix('pprs_dynamics.')
                 assert name.startswith('simulation') or name in CONTAINERS, file
-                if name.endswith('tree_equations'):
+                if name.endswith('tree_tables'):
                     assert {each.name for each in node.names} <= NAMES_OF_TABLES, file
 
 
