@@ -77,12 +77,6 @@ def test_what_is_there_from_the_first_strokes_on_has_no_beginning() -> None:
     assert payload.parameters['mass'].value == pytest.approx(0.2, abs=0.01)
 
 
-def test_what_is_there_all_the_time_has_no_beginning() -> None:
-    found = diagnosed(loaded(0.2))
-    assert [one.name for one in found.effects] == ['payload_mass']
-    assert found.to_dict()['effects'][0]['since'] is None
-
-
 def test_a_contact_of_some_seconds_is_no_property_of_the_machine() -> None:
     touched = FORCES.total.copy()
     touched[(TIME > 6) & (TIME < 9), 4] += 3.0

@@ -82,13 +82,6 @@ def test_a_description_alone_is_fitted_first_and_explains_then(tmp_path: Path) -
     assert compare(fitted.model, made).comparison.little == {}
 
 
-def test_a_fit_that_explains_little_says_so_first(tmp_path: Path) -> None:
-    model = real_arm(tmp_path)
-    found = fit(model, unrelated(model))
-    assert 'turn' in found.fit.little
-    assert str(found).lstrip().startswith('the model explains')
-
-
 @pytest.mark.parametrize('size', [0.0, 0.05])
 def test_a_drive_that_stands_or_whose_effort_is_noise_has_nothing_to_explain(
     tmp_path: Path, size: float,
