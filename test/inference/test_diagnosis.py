@@ -19,11 +19,7 @@ from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.experiments.fourier_path import FourierPath
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.search.candidates import PriorCosts
-from pprs_dynamics.inference.search.components import Components
-from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
@@ -38,12 +34,6 @@ TOLERANCES = {'tolerances.masses.payload': 0.05, 'tolerances.masses.slides': 0.0
 @pytest.fixture(scope='module')
 def design() -> Design:
     return Design.of(DriveModel.from_parameters({**MODEL.values, **TOLERANCES}), [record(MODEL)])
-
-
-@pytest.fixture(scope='module')
-def components(design: Design) -> Components:
-    regression = Regression(design.residuals, design.base)
-    return Components(design, regression, PriorCosts.of(regression, DECISIONS))
 
 
 def change(design: Design, effect: str, values: dict[str, float], drive: str = '') -> np.ndarray:
