@@ -6,9 +6,6 @@
 from __future__ import annotations
 
 import json
-import resource
-import shutil
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -211,24 +208,6 @@ def test_a_damaged_model_file_is_left_alone(files: Files, tmp_path: Path, damage
         assert 'Traceback' not in done.stderr
     assert model.read_bytes() == content
     assert list(tmp_path.iterdir()) == [model]
-
-
-def test_a_full_disk_is_one_line_and_leaves_both_files_whole(
-    files: Files, tmp_path: Path,
-) -> None:
-    old, output = tmp_path / 'old.yaml', tmp_path / 'output.yaml'
-    shutil.copy(files.new, old)
-    output.write_text('what was there')
-    done = subprocess.run(
-        [executable('pprs'), 'history', str(old), '--undo', '--output', str(output)],
-        capture_output=True, text=True, preexec_fn=lambda: (
-            resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))))
-    assert done.returncode == 2
-    assert 'cannot be written' in done.stderr
-    assert len(done.stderr.strip().splitlines()) == 1
-    assert output.read_text() == 'what was there'
-    assert old.read_bytes() == files.new.read_bytes()
-    assert sorted(tmp_path.iterdir()) == [old, output]
 
 
 @pytest.mark.nodes
