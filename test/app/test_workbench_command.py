@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import argparse
 import http.client
 import json
 import signal
@@ -17,7 +16,6 @@ from workbench_bench import write_hidden
 from workbench_server import workbench
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.app.commands import workbench as workbench_command
 from pprs_dynamics.app.workbench import Session
 from pprs_dynamics.app.workbench.robot_motion import robot_motion
 from pprs_dynamics.measurement.files.recording import (
@@ -37,17 +35,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / 'data').mkdir()
     write_hidden(folder / 'data' / 'run.csv', 1, 8.0)
     return folder
-
-
-@pytest.mark.slow
-def test_without_a_recording_it_waits_for_one(folder: Path) -> None:
-    with workbench(folder / 'data', folder=folder) as bench:
-        bench.enter()
-        bench.wait(lambda screen: not screen['is_beginning'])
-        assert bench.screen()['is_empty']
-        assert bench.get('/api/curves').status == 400
-        assert bench.post('/api/open', name='0/run.csv').status == 200
-        assert not bench.settled().get('is_empty')
 
 
 def test_what_the_page_opens_is_read_as_the_command_line_says(folder: Path) -> None:
@@ -119,17 +106,3 @@ def test_a_single_axis_has_the_same_session(tmp_path: Path) -> None:
     json.dumps(session.to_dict(), allow_nan=False)
     drawn = robot_motion(session).skeleton.points
     assert np.ptp(drawn, axis=0).max() == pytest.approx(np.ptp(position), rel=0.05)
-
-
-@pytest.mark.parametrize(('arguments', 'heard'), [
-    ([], 'joint_states'), (['--topic', '/left/joint_states'], '/left/joint_states'),
-    (['--live-topic', '/left/joint_states'], '/left/joint_states'),
-    (['--topic', '/logged', '--live-topic', '/left/joint_states'], '/left/joint_states')])
-def test_live_data_have_a_topic_of_their_own(
-    arguments: list[str], heard: str, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    module = pytest.importorskip('pprs_dynamics.ros.live_joint_states')
-    monkeypatch.setattr(module, 'LiveNodes', lambda model, topic, *names: topic)
-    parser = argparse.ArgumentParser()
-    workbench_command.add_arguments(parser)
-    assert workbench_command._live(parser.parse_args(['--live', *arguments]), None) == heard
