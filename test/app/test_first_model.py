@@ -314,25 +314,6 @@ def test_a_joint_that_was_not_recorded_is_given_no_column_of_another(
     assert_read(read_recording(first.recordings[0], first.model.recorded), velocity=False)
 
 
-def two_arms(path: Path) -> Path:
-    text = '<link name="torso"/>'
-    for side in ('left_', 'right_'):
-        text += urdf(before=side) + (
-            f'<joint name="{side}on" type="fixed"><parent link="torso"/><child '
-            f'link="{side}base"/></joint>')
-    path.write_text(f'<robot name="two">{text}</robot>')
-    return path
-
-
-def test_of_two_arms_the_recorded_one_is_taken(tmp_path: Path) -> None:
-    robot = two_arms(tmp_path / 'two.urdf')
-    assert any('--tool' in note for note in first_model(robot).notes)
-    right = tuple(f'right_{joint}' for joint in JOINTS)
-    first = first_model(robot, bag(tmp_path, right))
-    assert first.model.drives == right
-    assert first.model.values['robot.tool'] == 'right_flange'
-
-
 def test_what_cannot_be_told_is_refused_with_what_to_write(robot: Path, tmp_path: Path) -> None:
     np.savetxt(tmp_path / 'a.csv', np.column_stack([TIME, Q, DQ[:, :2]]), delimiter=',')
     with pytest.raises(GuessError, match='no blocks of 3 joints'):

@@ -197,12 +197,6 @@ def test_an_effect_is_adopted_refused_exported_and_taken_back(tmp_path: Path) ->
     assert dict(session.ticks.model.values) == given
 
 
-def short_session(folder: Path) -> tuple[Session, Path]:
-    """Return a session of one recording, and another recording."""
-    return (Session.open([write_hidden(folder / 'one.csv', 1, 4.0)]),
-            write_hidden(folder / 'two.csv', 2, 4.0))
-
-
 def test_a_recording_may_be_given_once(recording: Path, tmp_path: Path) -> None:
     (tmp_path / 'again.csv').write_bytes(recording.read_bytes())
     with pytest.raises(UnreadableFileError, match='may be given once'):
@@ -297,25 +291,6 @@ def test_ticks_and_values_are_taken_back_and_done_again(session: Session) -> Non
     session.ticks.back()
     session.ticks.tick('effort_offset')
     assert not session.ticks.redoes
-
-
-def test_a_recording_is_let_go_of(tmp_path: Path) -> None:
-    session, other = short_session(tmp_path)
-    with pytest.raises(PprsError, match='at least one'):
-        session.recordings.remove(session.to_dict()['recordings'][0]['key'])
-    alone = session.ticks.fits.before
-    session.recordings.add(other)
-    session.ticks.tick('payload_mass')
-    with pytest.raises(PprsError, match='no recording nothing'):
-        session.recordings.remove('nothing')
-    session.recordings.remove(str(other))
-    np.testing.assert_array_equal(session.ticks.fits.before, alone)
-    assert set(session.ticks.view.ticks) == {'payload_mass'}
-    session.recordings.add(other, is_held_out=True)
-    fits = session.ticks.fits
-    session.recordings.remove(str(other))
-    assert session.to_dict()['held_out'] == []
-    assert session.ticks.fits is fits
 
 
 class TestASavedSession:

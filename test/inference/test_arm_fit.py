@@ -170,14 +170,6 @@ def test_a_gain_within_its_tolerance_is_calibrated_and_leaves_the_payload_alone(
     assert after['robot.gain[2]'] == pytest.approx(4.0, rel=0.01)
 
 
-def test_a_bag_in_amperes_is_multiplied_where_the_model_says_so(tmp_path: Path) -> None:
-    model = arm.real_arm(tmp_path, **{'robot.gain': (2.0, 2.0, 2.0), 'robot.effort_unit': 'A'})
-    run = arm.record(model, arm.motion(5.0), 0.0)
-    write_recording(tmp_path / 'bag.mcap', run)
-    read = read_recording(tmp_path / 'bag.mcap', model.recorded)
-    assert read.effort == pytest.approx(2 * run.effort)
-
-
 def test_a_joint_that_stands_does_not_count(tmp_path: Path) -> None:
     time = np.arange(0, 10, 0.01)
     position = np.where(time < 3, 0.0, np.where(time < 6, np.cos(time - 3) - 1, np.cos(3) - 1))

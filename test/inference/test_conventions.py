@@ -289,19 +289,6 @@ def test_efforts_in_percent_of_the_largest_are_told(tmp_path: Path) -> None:
         'reach: {effort_scale: 0.3}}')
 
 
-def test_a_joint_that_stands_is_no_reason_to_doubt_a_unit(tmp_path: Path) -> None:
-    """The constant effort of a standing joint is most alike where nothing moves at all."""
-    def standing(a: Arrays) -> Arrays:
-        position, velocity, effort = a[1].copy(), a[2].copy(), a[3].copy()
-        position[:, 1], velocity[:, 1] = 0.1, 0.0
-        effort[:, 1] += 40.0
-        return a[0], position, velocity, effort
-
-    model = DriveModel.load(arm.write_arm(tmp_path))
-    assert [one for one in find_mistakes(model, arm_recording(model, changes=standing))
-            if isinstance(one, OtherReading)] == []
-
-
 OTHERS = {  # folder, model, recording: kinds of what is told, and a clause of it
     'sign': ('kuka_sign', 'iiwa_unflipped.yaml', 'dyn.csv.gz', 'effort of all drives .* minus'),
     'sign read': ('kuka_sign', 'iiwa.yaml', 'dyn.csv.gz', ''),

@@ -65,17 +65,6 @@ def test_a_range_and_its_shares_are_those_of_the_error_in_it() -> None:
                                     'share_of_time', 'text'}
 
 
-def test_friction_names_the_direction_and_says_which_way_the_model_errs() -> None:
-    recording = noisy(FIRST_SEED + 201)
-    sign = np.tanh(recording.variables['velocity'][:, 0] / 0.001)
-    for factor, word in ((0.3, 'too little friction'), (-0.3, 'too much friction')):
-        measured = recording.measured.copy()
-        measured[:, 0] += factor * sign
-        first = localise(replace(recording, measured=measured)).statements[0]
-        assert (first.drive, first.variable) == ('slide_1', 'direction')
-        assert word in first.text
-
-
 def test_missing_samples_and_segments_do_not_hide_an_error_nor_make_one() -> None:
     clean = noisy(FIRST_SEED + 202)
     rng = np.random.default_rng(5)
@@ -100,11 +89,3 @@ def test_one_drive_and_few_variables_are_enough() -> None:
                      {'position': x[:, None], 'velocity': v[:, None]}, 0.01)
     first = localise(axis).statements[0]
     assert (first.drive, first.variable) == ('axis', 'direction')
-
-
-def test_too_few_samples_say_nothing() -> None:
-    few = noisy(FIRST_SEED + 203)
-    short = Residuals(few.drives, few.time[:40], few.segment[:40], few.measured[:40],
-                      few.model[:40], {}, {name: values[:40] for name, values
-                                           in few.variables.items()}, few.period)
-    assert localise(short).statements == ()

@@ -182,14 +182,6 @@ def test_misfit_is_what_least_squares_leaves() -> None:
     assert contest.misfit(columns.T @ columns) == pytest.approx(rest @ rest, rel=1e-6)
 
 
-def test_a_rival_that_can_do_the_same_is_never_told() -> None:
-    rng = np.random.default_rng(1)
-    columns = rng.normal(size=(50, 2))
-    columns = np.column_stack((columns, columns @ (1.0, 2.0)))
-    contest = Contest(_explained('a', (2,), [3.0]), _explained('b', (0, 1), [1.0, 1.0]), (0, 1))
-    assert contest.misfit(columns.T @ columns) < 1e-4
-
-
 def test_precision_is_the_scatter_of_estimates() -> None:
     rng = np.random.default_rng(2)
     columns = rng.normal(size=(40, 3)) @ np.array([[1, 0.5, 0], [0, 1, 0.3], [0, 0, 1]])

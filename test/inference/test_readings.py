@@ -148,24 +148,6 @@ def test_a_log_in_json_is_a_table(form: str, tmp_path: Path) -> None:
         read_recording(path, first.model.recorded)
 
 
-@pytest.mark.parametrize(('names', 'others'), [
-    (('q_free.csv', 'tau_free.csv'), ('q_free_load.csv', 'tau_free_load.csv')),
-    (('run1-q.csv', 'run1-tau.csv'), ('run2-q.csv', 'run2-tau.csv'))])
-def test_the_second_pair_of_files_in_a_folder_is_read_by_the_pattern_of_the_first(
-    names: tuple[str, str], others: tuple[str, str], tmp_path: Path,
-) -> None:
-    (tmp_path / 'arm.urdf').write_text(ARM)
-    for seed, pair in enumerate((names, others)):
-        _, q, _, effort = run(seed)
-        for name, values, word in zip(pair, (q, effort), ('q', 'tau'), strict=True):
-            np.savetxt(tmp_path / name, values, delimiter=',', comments='',
-                       header=f'{word}1,{word}2')
-    first = first_model(tmp_path / 'arm.urdf', [tmp_path / name for name in names],
-                        tmp_path / 'a.yaml', rate=100.0)
-    read = read_recording(tmp_path / others[0], first.model.recorded)
-    np.testing.assert_allclose(read.effort, effort)
-
-
 def test_no_reading_is_found_where_nothing_is_wrong(arm: DriveModel) -> None:
     for seed in range(3):
         time, q, _, effort = run(seed)

@@ -16,20 +16,18 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ConvergenceError, MotionError
-from pprs_dynamics.inference.residuals.reconstruction import read_by, reconstruct, treated_forces
+from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.differentiation import (
     SHORTEST_WINDOW,
     LocalPolynomial,
     Stretch,
     choose_smoothing,
-    position_noise,
 )
 from pprs_dynamics.measurement.motion.drive_motion import smooth_drives
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.physics.three_pprs.forward_motion import (
     find_pose_jumps,
@@ -141,29 +139,6 @@ def test_platform_rates_are_differences_of_forward_kinematics(elbow):
     assert np.abs(found.angular_velocity).max() > 0.1
 
 
-@pytest.mark.parametrize('elbow', ELBOWS)
-def test_forward_motion_undoes_inverse_kinematics(elbow):
-    geometry = random_robot(np.random.default_rng(5), elbow).geometry
-    motion = smooth_motion(np.linspace(0, 6, 3000), elbow)
-    chains = solve_inverse_kinematics(geometry, motion)
-    found = solve_forward_motion(geometry, chains.position, chains.velocity, chains.acceleration)
-    assert_allclose(found.motion.position, motion.position, rtol=0, atol=1e-11)
-    assert_allclose(found.motion.rotation, motion.rotation, rtol=0, atol=1e-11)
-    for name in ('linear_velocity', 'angular_velocity', 'linear_acceleration',
-                 'angular_acceleration'):
-        assert_allclose(getattr(found.motion, name), getattr(motion, name), rtol=0, atol=1e-9)
-    assert not found.near_branch.any()
-
-
-@pytest.mark.parametrize('far', [1e9, 1e300])
-def test_a_position_that_none_can_be_is_refused_whatever_its_size(far):
-    q = truth().drives.position[:200].copy()
-    q[100, 0] = far
-    still = np.zeros_like(q)
-    with pytest.raises(ConvergenceError, match='no pose'):
-        solve_forward_motion(MODEL.robot.geometry, q, still, still)
-
-
 def test_drives_that_cannot_close_are_named_with_sample_and_time():
     real = truth()
     q = real.drives.position.copy()
@@ -200,17 +175,6 @@ def test_local_polynomials_are_exact_for_polynomials_of_their_order(window):
         expected = polynomial.deriv(derivative)(t)[inner] if derivative else polynomial(t)[inner]
         assert_allclose(found[derivative], np.stack((expected, 2 * expected), axis=1), rtol=0,
                         atol=tolerance * max(1.0, np.abs(expected).max()))
-
-
-def test_noise_comes_out_as_its_gain_says_and_is_known_from_the_data():
-    noise = np.random.default_rng(7).normal(scale=1e-6, size=(40_000, 3))
-    filter_ = LocalPolynomial(41, STEP)
-    for derivative, values in enumerate(filter_.differentiated(noise)):
-        # 40 000 samples, correlated over some ten: 2 %.
-        assert_allclose(values.std(axis=0), 1e-6 * filter_.noise_gain(derivative), rtol=0.1)
-    real = truth(3.0, 0.03, 0.08).drives.position
-    found = position_noise([Stretch(encoder(real), STEP)])
-    assert_allclose(found, RESOLUTION / np.sqrt(12), rtol=0.05)
 
 
 @pytest.mark.parametrize(('motion', 'resolution'), [
@@ -252,23 +216,6 @@ def test_smoothed_motion_is_the_true_one():
     assert rms(found.acceleration - real.drives.acceleration[found.index]).max() < 3e-3
     assert not found.near_branch.any()
     assert not len(found.jumps)
-
-
-def test_zeros_elsewhere_are_those_of_a_whole_new_reconstruction():
-    recording = recording_of(truth())
-    shift = np.array([0.004, 0.0, -0.002, 0.001, 0.0, 0.003])
-    names = ['slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3']
-    moved = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['homing_error'], **{
-        f'effects.homing_error.{name}.zero': float(by)
-        for name, by in zip(names, shift, strict=True)}})
-    assert_allclose(moved.position_error(np.zeros((1, 6)))[0], shift)
-    whole, quick = reconstruct(moved, recording), read_by(reconstruct(MODEL, recording), moved)
-    assert_allclose(quick.position, whole.position, rtol=0, atol=1e-15)
-    for name in ('position', 'linear_velocity', 'angular_velocity', 'linear_acceleration'):
-        assert_allclose(getattr(quick.motion, name), getattr(whole.motion, name), rtol=0,
-                        atol=1e-10)
-    assert_allclose(treated_forces(moved, quick)['total'], treated_forces(moved, whole)['total'],
-                    rtol=0, atol=1e-9)
 
 
 # Treatment -----------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ import pprs_dynamics as pprs
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import MisreadError, ModelError, UnreadableFileError
+from pprs_dynamics.errors import ModelError, UnreadableFileError
 from pprs_dynamics.inference.diagnosis.diagnosis import SinceReference
 from pprs_dynamics.inference.diagnosis.sentences import word_reference
 from pprs_dynamics.inference.fit.reference import Reference, ReferenceRunError
@@ -26,7 +26,6 @@ from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.residuals import rms_by_drive
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_writer import write_model
 
 NOISE = 0.2
@@ -250,39 +249,3 @@ def test_what_is_no_reference_is_refused(machine: tuple[DriveModel, Reference]) 
             30 * np.cumsum(other, axis=0) / 40, whole.drives)])
     with pytest.raises(ModelError, match='SHA-256'):
         DriveModel.from_parameters({**model.values, 'reference': ['free.csv']}, model.source)
-
-
-@pytest.mark.slow
-def test_what_has_changed_is_added_since_the_reference(
-        machine: tuple[DriveModel, Reference], tmp_path: Path) -> None:
-    model, _ = machine
-    for name, one in (('free', run(model, 0, 1)), ('later', run(model, 0, 2, change=0.6)),
-                      ('last', run(model, 0, 3, change=0.6))):
-        write_recording(tmp_path / f'{name}.csv', one)
-    base, better = tmp_path / 'base.yaml', tmp_path / 'better.yaml'
-    write_model(base, model.values, model.source)
-    free, later, last = (str(tmp_path / f'{name}.csv') for name in ('free', 'later', 'last'))
-    words = ['adopt', 'coulomb_friction', later, '--model', str(base)]
-    said = tmp_path / 'said.json'
-    assert main([*words, '--reference', free, '--output', str(better), '--json', str(said)]) == 0
-    content = json.loads(said.read_text())
-    assert content['parameters']['swing.force']['value'] == pytest.approx(0.6, abs=0.05)
-    # Beyond what the reference shows as well.
-    assert content['error_after'] < 1.5 * NOISE < content['error_before']
-    (step,) = read_steps(DriveModel.load(better).values)
-    assert step.reference == ('free.csv',)
-    # With it in the model nothing else has changed.
-    assert pprs.diagnose(better, last, reference=free).verdict == 'adequate'
-    # Without the reference it is fitted to what the model lacks, on other joints as well.
-    assert main([*words, '--output', str(tmp_path / 'other.yaml'), '--json', str(said)]) in (0, 1)
-    assert json.loads(said.read_text())['drives'] != ['swing']
-
-
-def test_a_reference_in_other_signs_is_refused_as_a_recording_is(
-        machine: tuple[DriveModel, Reference], tmp_path: Path) -> None:
-    model, _ = machine
-    whole = run(model, 0, 1)
-    write_recording(tmp_path / 'negated.csv', Recording.from_arrays(
-        'negated', whole.time, whole.position, whole.velocity, -whole.effort, whole.drives))
-    with pytest.raises(MisreadError):
-        read_reference(model, [tmp_path / 'negated.csv'])

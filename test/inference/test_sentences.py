@@ -11,7 +11,6 @@ import shlex
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
 from made_up_diagnosis import (
     SUSPECT,
@@ -19,8 +18,6 @@ from made_up_diagnosis import (
     found_effect,
     made_up_diagnosis,
     made_up_residuals,
-    ranked_set,
-    ranked_sets,
     statement,
 )
 from rich.console import Console
@@ -30,12 +27,10 @@ from pprs_dynamics.app.report.diagnosis_report import diagnosis_page, diagnosis_
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, next_step
-from pprs_dynamics.inference.diagnosis.partial_errors import error_steps
 from pprs_dynamics.inference.diagnosis.quantities import (
     with_uncertainty,
 )
-from pprs_dynamics.inference.diagnosis.sentences import set_rows, word_diagnosis
-from pprs_dynamics.inference.search.candidates import DRIFT, SINCE, Course
+from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 
 
@@ -79,17 +74,6 @@ def test_an_effect_is_told_with_drive_values_errors_and_its_card() -> None:
                              'with_coulomb_friction.yaml')
 
 
-@pytest.mark.parametrize(('kind', 'said'), [
-    (SINCE, 'hysteresis since 4 s'), (DRIFT, 'hysteresis, growing from nothing at the start')])
-def test_what_changes_within_a_recording_is_not_added_throughout(kind: str, said: str) -> None:
-    changing = made_up_diagnosis(effects=(
-        found_effect('hysteresis', course=Course(kind, 4.0, 15.0)),
-        found_effect('coulomb_friction')))
-    words = word_diagnosis(changing)
-    assert said in words.following
-    assert words.command == 'pprs diagnose SECOND_RECORDING'
-
-
 def test_a_held_out_error_that_rises_stands_in_the_headline_and_forbids_adoption() -> None:
     worse = made_up_diagnosis('adequate', unconfirmed=(
         found_effect('hysteresis', held_out_after=0.3,
@@ -126,16 +110,6 @@ def test_unknown_names_drive_variable_shape_and_share_and_nothing_of_the_catalog
     assert not any(name in finding.what for name in CATALOGUE)
     assert finding.cause
     assert finding.confirm
-
-
-def test_negative_friction_is_said_to_be_impossible() -> None:
-    for value, sure in ((-0.6, True), (-0.015, False)):
-        diagnosis = made_up_diagnosis(effects=(found_effect('coulomb_friction', value=value),))
-        remark = word_diagnosis(diagnosis).effects[0].remarks[0]
-        assert 'is negative' in remark
-        assert 'Negative friction is impossible' in remark
-        assert ('zero is within its uncertainty' not in remark) is sure
-    assert word_diagnosis(one_effect()).effects[0].remarks == ()
 
 
 @pytest.mark.parametrize(('value', 'std', 'unit', 'text'), [
@@ -178,19 +152,6 @@ def test_with_details_the_terminal_shows_everything_within_its_width(
             assert sentence in shown
 
 
-def test_the_runner_up_stands_beside_the_best_set_with_its_cost() -> None:
-    diagnosis = one_effect(sets=(
-        *ranked_sets('coulomb_friction', 'hysteresis'),
-        ranked_set((), 120.4), ranked_set((('unknown, position', ('lift_2',)),), 130.0)))
-    assert set_rows(diagnosis) == [
-        ('coulomb_friction on lift_2', 'the best', ''),
-        ('hysteresis on lift_2', '+7.0', 'names + 7.0'),
-        ('nothing missing', '+120.4', 'names + 120.4'),
-        ('a pattern depending on position on lift_2', '+130.0', 'names + 130.0')]
-    page = diagnosis_page(diagnosis, word_diagnosis(diagnosis), made_up_residuals(), ['a'])
-    assert '>hysteresis on lift_2</th>' in page.html()
-
-
 @pytest.mark.parametrize('verdict', ['effect', 'ambiguous', 'unknown', 'adequate'])
 def test_every_command_keeps_model_and_topic_and_is_one(verdict: str) -> None:
     files = GivenFiles(('a.csv',), ('b.csv',), 'my robot.yaml', '/arm/joint_states')
@@ -201,18 +162,6 @@ def test_every_command_keeps_model_and_topic_and_is_one(verdict: str) -> None:
     assert "--model 'my robot.yaml' --topic /arm/joint_states" in command
     words = shlex.split(command)[1:]
     assert _parser(words).parse_args(words).topic == '/arm/joint_states'
-
-
-def test_the_steps_of_the_error_end_where_comparisons_do() -> None:
-    diagnosis = everything()
-    after = made_up_residuals()
-    steps = error_steps(diagnosis, after)
-    assert [step.label for step in steps] == [
-        'model as given', 'stribeck_friction', 'asymmetric_friction', 'payload_offset']
-    assert steps[0].overall == pytest.approx(np.sqrt(np.mean(diagnosis.residuals.error ** 2)))
-    np.testing.assert_allclose(steps[-1].drives, np.sqrt(np.mean(after.error ** 2, axis=0)))
-    # The second of them does not sit on lift_3.
-    assert steps[2].drives[5] == pytest.approx(steps[1].drives[5])
 
 
 def test_the_page_escapes_what_comes_from_files() -> None:

@@ -201,22 +201,6 @@ def test_gaps_split_and_lost_samples_do_not() -> None:
     assert recording.segments == (slice(0, 688), slice(688, 978))
 
 
-def test_one_late_stamp_is_not_a_lost_sample() -> None:
-    arrays = measured()
-    arrays['time'][500] += 0.7 * STEP
-    assert judged(arrays).findings == ()
-
-
-def test_irregular_steps_are_told() -> None:
-    arrays = measured(5000)
-    arrays['time'] = arrays['time'] + np.random.default_rng(0).uniform(0, 0.9, 5000) * STEP
-    assert 'irregular_steps' in kinds(judged(arrays))
-    # Losing samples at random does not make stamps irregular.
-    kept = np.sort(np.random.default_rng(1).choice(5000, 4500, replace=False))
-    lossy = judged({name: values[kept] for name, values in measured(5000).items()})
-    assert the(lossy, 'lost_samples').count == kept[-1] - kept[0] + 1 - 4500
-
-
 @pytest.mark.parametrize('count', [1001])
 @pytest.mark.parametrize(('unit', 'scale'), [('milliseconds', 1e3), ('nanoseconds', 1e9)])
 def test_stamps_of_another_unit_are_read_as_they_are_and_the_unit_is_named(
@@ -294,12 +278,6 @@ def test_numbers_that_nothing_can_have_measured_are_no_measurements(size: float)
     assert np.nanmax(np.abs(recording.effort)) < 1e3
 
 
-def test_a_recording_without_any_effort_says_what_that_means() -> None:
-    recording = judged({**measured(), 'effort': None})
-    assert 'compare, diagnose, fit and adopt need them' in the_one(recording, 'no_effort').text
-    assert 'effort_not_measured' not in kinds(recording)
-
-
 def test_efforts_at_the_limit_of_a_drive_are_left_out() -> None:
     arrays = measured()
     limit = 0.5 * float(np.abs(arrays['effort'][:, 1]).max())
@@ -313,25 +291,6 @@ def test_efforts_at_the_limit_of_a_drive_are_left_out() -> None:
     assert the_one(judgement, 'saturated_effort').drives == ('slide_2',)
     assert np.isnan(judgement.samples.effort[beyond, 1]).all()
     assert np.isfinite(judgement.samples.effort[:, [0, 2, 3, 4, 5]]).all()
-
-
-def test_missing_velocities_are_told_per_drive() -> None:
-    arrays = measured()
-    arrays['velocity'][:, 1] = np.nan
-    recording = judged(arrays)
-    finding = the(recording, 'missing_velocity')
-    assert (finding.count, finding.drives) == (1000, ('slide_2',))
-    assert 'slide_2 (all)' in finding.text
-    assert the(judged({**arrays, 'velocity': None}), 'missing_velocity').count == 1000
-
-
-@pytest.mark.parametrize('quantity', QUANTITIES)
-def test_values_that_never_change_are_told(quantity: str) -> None:
-    arrays = measured()
-    arrays[quantity][:, 4] = 0.25
-    finding = the(judged(arrays), f'constant_{quantity}')
-    assert (finding.count, finding.drives) == (1, ('lift_2',))
-    assert f'the {quantity} of lift_2 is 0.25' in finding.text
 
 
 def test_an_effort_that_stands_still_while_its_drive_moves_is_told() -> None:

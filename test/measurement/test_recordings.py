@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import random
 import re
-import sqlite3
 from collections.abc import Callable
 from pathlib import Path
 
@@ -42,10 +41,9 @@ from rosbags.rosbag2 import StoragePlugin
 from sensor_msgs.msg import JointState
 
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.errors import MotionError, UnreadableFileError
+from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.joint_state_cdr import (
     JointStateBlocks,
-    serialised,
 )
 from pprs_dynamics.measurement.files.recording import (
     Recording,
@@ -134,16 +132,6 @@ def test_a_csv_keeps_every_bit(tmp_path: Path, values: list[float], steps: float
                  'effort': effort})
 
 
-@settings(max_examples=30,
-          suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(order=st.permutations(range(19)))
-def test_csv_columns_may_stand_in_any_order(tmp_path: Path, order: list[int]) -> None:
-    arrays = measured(30)
-    columns = table(arrays)
-    columns.iloc[:, order].to_csv(tmp_path / 'x.csv', index=False)
-    assert_same(read_recording(tmp_path / 'x.csv'), arrays)
-
-
 @pytest.mark.parametrize('suffix', SUFFIXES)
 def test_a_single_axis_is_read_by_its_own_drive(suffix: str, tmp_path: Path) -> None:
     arrays = measured(200, ('axis',))
@@ -224,19 +212,6 @@ def test_bytes_of_ros_itself_are_understood(absent: tuple[str, ...], frame: str)
         np.testing.assert_array_equal(array, [expected] * 3)
 
 
-@pytest.mark.parametrize('velocity', [True, False])
-@pytest.mark.parametrize('names', [('axis',), DRIVES, ('a', 'bb', 'ccc', 'dddd', 'eeeee')])
-def test_our_bytes_are_those_of_rosbags(names: tuple[str, ...], velocity: bool) -> None:
-    values = np.random.default_rng(3).normal(size=(3, 4, len(names)))
-    stamps = np.array([0, 1, 10**9 - 1, 2**31 * 10**9 - 1])
-    rows = serialised(names, stamps, values[0], values[1] if velocity else None, values[2])
-    for k, stamp in enumerate(stamps):
-        state = message(int(stamp), names, values[0, k], values[1, k] if velocity else [],
-                        values[2, k])
-        state.header.frame_id = ''
-        assert rows[k].tobytes() == bytes(STORE.serialize_cdr(state, STATE))
-
-
 @settings(max_examples=200)
 @given(data=st.binary(max_size=200), start=st.booleans())
 def test_no_bytes_break_the_reader_of_messages(data: bytes, start: bool) -> None:
@@ -271,25 +246,6 @@ def test_several_topics_of_joint_states_must_be_chosen_from(tmp_path: Path) -> N
         read_recording(path, topic='/silent/joint_states')
 
 
-def test_storage_files_without_metadata_are_read_in_the_order_of_their_messages(
-    tmp_path: Path,
-) -> None:
-    arrays = measured(600)
-    path = by_own_writer('')(tmp_path, arrays)
-    (path / 'metadata.yaml').unlink()
-    recording = read_recording(path)
-    assert_same(recording, arrays)
-    assert the(recording, 'no_metadata').count == 1
-    split = tmp_path / 'split'
-    split.mkdir()
-    for name, part in (('b_0.mcap', slice(0, 200)), ('a_1.mcap', slice(200, 600))):
-        write_recording(split / name, judged({
-            key: values[part] for key, values in arrays.items()}))
-    recording = read_recording(split)
-    assert_same(recording, arrays)
-    assert the(recording, 'no_metadata').count == 2
-
-
 def test_header_stamps_of_0_are_replaced_by_times_of_recording(tmp_path: Path) -> None:
     arrays = measured(600)
     states = states_of(arrays, time=np.zeros(600))
@@ -309,13 +265,6 @@ def test_bags_are_not_overwritten_and_files_are_replaced(tmp_path: Path) -> None
         write_recording(tmp_path / 'bag', judged(second))
     assert_same(read_recording(tmp_path / 'bag'), first)
     assert sorted(file.name for file in tmp_path.iterdir()) == ['bag', 'x.csv', 'x.db3', 'x.mcap']
-
-
-@pytest.mark.parametrize('suffix', SUFFIXES)
-def test_what_cannot_be_written_is_told(suffix: str, tmp_path: Path) -> None:
-    (tmp_path / 'file').write_text('')
-    with pytest.raises(UnreadableFileError, match='cannot be written'):
-        write_recording(tmp_path / 'file' / f'x{suffix}', judged(measured(30)))
 
 
 # -------------------------------------------------------------------------------------- CSV
@@ -352,22 +301,6 @@ def test_other_columns_are_ignored_and_told_even_where_they_hold_words(tmp_path:
     finding = the_one(recording, 'ignored_columns')
     assert finding.count == 3
     assert all(name in finding.text for name in ('(no name)', 'phase', 'gripper/position'))
-
-
-def test_prefixes_of_other_tools_are_accepted_where_they_are_unambiguous(tmp_path: Path) -> None:
-    left, right = measured(40, seed=1), measured(40, seed=2)
-    one = table(left, prefix='/joint_states/')
-    one.to_csv(tmp_path / 'one.csv', index=False)
-    assert_same(read_recording(tmp_path / 'one.csv'), left)
-    pd.concat([one, table(right).drop(columns='time')], axis=1).to_csv(
-        tmp_path / 'plain.csv', index=False)
-    assert_same(read_recording(tmp_path / 'plain.csv'), right)
-    two = pd.concat([table(left, prefix='/left/joint_states/'),
-                     table(right, prefix='/right/joint_states/').drop(columns='time')], axis=1)
-    two.to_csv(tmp_path / 'two.csv', index=False)
-    with pytest.raises(UnreadableFileError, match='/left/joint_states, /right/joint_states'):
-        read_recording(tmp_path / 'two.csv')
-    assert_same(read_recording(tmp_path / 'two.csv', topic='/right/joint_states'), right)
 
 
 def test_rows_that_belong_to_other_topics_leave_the_motion_as_it_is(tmp_path: Path) -> None:
@@ -499,14 +432,6 @@ def test_a_changed_byte_in_a_bag_is_an_error_of_ours_or_none(
         assert np.isfinite(recording.position).all()
 
 
-def test_a_message_that_is_a_number_is_one_sentence(tmp_path: Path) -> None:
-    path = by_own_writer('.db3')(tmp_path, measured(60))
-    with contextlib.closing(sqlite3.connect(path)) as database, database:
-        database.execute('UPDATE messages SET data = 7 WHERE id = 30')
-    with pytest.raises(UnreadableFileError, match='damaged or something else'):
-        read_recording(path)
-
-
 # ------------------------------------------------------------------------------ description
 
 
@@ -528,14 +453,6 @@ def test_a_recording_is_described_by_its_rates_ranges_and_findings() -> None:
     bare = describe(judged({**arrays, 'velocity': None, 'effort': None}))
     assert bare.drives['lift_3'].velocity is None
     assert bare.drives['lift_3'].effort is None
-
-
-def test_arrays_that_do_not_fit_are_refused() -> None:
-    arrays = measured(30)
-    with pytest.raises(MotionError, match=r'effort: its shape is \(29, 6\)'):
-        judged({**arrays, 'effort': arrays['effort'][1:]})
-    with pytest.raises(MotionError, match='no sample is finite'):
-        judged({**arrays, 'time': np.full(30, np.nan)})
 
 
 # ------------------------------------------------------------- rows that are no rows of a table

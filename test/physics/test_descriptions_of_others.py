@@ -176,15 +176,6 @@ def test_a_continuous_joint_can_be_a_drive(tmp_path: Path) -> None:
     assert (structure.effort[0], structure.speed[0]) == (39, 2)
 
 
-def test_the_base_may_be_a_world_that_is_no_link(tmp_path: Path) -> None:
-    model = load(tmp_path, joint('j1', 'world', 'l1') + link('l1'),
-                 'robot: {base: world, tool: l1, drives: [j1]}')
-    q, v, a = random_motion(1)
-    urdf = (tmp_path / 'robot.urdf').read_text()
-    (tmp_path / 'robot.urdf').write_text(urdf.replace('<joint', '<link name="world"/><joint', 1))
-    assert efforts(model, q, v, a)[0] == pytest.approx(rnea(tmp_path, q, v, a), rel=1e-9)
-
-
 @pytest.mark.parametrize('mass', ['-1'])
 def test_masses_that_no_robot_has_are_refused(tmp_path: Path, mass: str) -> None:
     with pytest.raises(PprsError, match='link l1: its mass is '):

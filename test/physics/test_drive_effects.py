@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 
 from pprs_dynamics import DriveModel, Excitation
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
 from pprs_dynamics.physics.effects.laws.asymmetric_friction import AsymmetricFriction
 from pprs_dynamics.physics.effects.laws.coulomb_friction import CoulombFriction
 from pprs_dynamics.physics.effects.laws.drive_inertia import DriveInertia
@@ -45,8 +45,7 @@ WITH_MEMORY = (FrictionDrift, Hysteresis)
 FRICTION = (AsymmetricFriction, CoulombFriction, FrictionDrift, GearEfficiency, LoadFriction,
             QuadraticFriction, StribeckFriction, ViscousFriction)
 STEP = 0.002
-COVERED = DriveRange(duration=20.0, step=STEP, stroke=0.16, top_speed=0.25,
-                     channels={'temperature': (20.0, 30.0)})
+
 
 every_effect = pytest.mark.parametrize('effect', EFFECTS, ids=lambda effect: effect.name)
 
@@ -212,34 +211,6 @@ def test_force_is_the_sum_of_coefficients_times_columns(effect):
     expected = sum(coefficients[c.name] * column
                    for c, column in zip(effect.coefficients, columns, strict=True))
     assert_allclose(effect({'axis': values}).force(axes)[:, 0], expected, rtol=1e-12, atol=1e-12)
-
-
-def test_some_pitch_tried_shows_most_of_any_ripple():
-    q = np.linspace(0, COVERED.stroke, 2000)
-    drive = DriveSamples(None, q, q, q, q, q, q)
-    bases = [np.linalg.qr(np.stack(ForceRipple.columns(drive, **trial)[:2], axis=1))[0]
-             for trial in ForceRipple.trials(COVERED)]
-    rng = np.random.default_rng(64)
-    shortest = COVERED.stroke / 120
-    # Fewer than three waves over the stroke are a spring's curve as well: none is tried.
-    for pitch in np.geomspace(shortest, COVERED.stroke / 3, 200):
-        ripple = np.sin(2 * np.pi * q / pitch + rng.uniform(0, 2 * np.pi))
-        shown = max(np.sum((basis.T @ ripple) ** 2) for basis in bases) / np.sum(ripple ** 2)
-        # Half a step off: (sin(pi/4) / (pi/4))^2 = 0.81 over many periods.
-        assert shown > 0.75, pitch
-
-
-@pytest.mark.parametrize('middle', [0.0, 0.4])
-def test_some_position_tried_shows_most_of_any_stop(middle):
-    covered = replace(COVERED, middle=middle)
-    q = middle + np.linspace(-1, 1, 2001) * COVERED.stroke / 2
-    shown = np.maximum(q - np.array([trial['position'] for trial in StopContact.trials(covered)])[
-        :, None], 0.0)
-    shown /= np.maximum(np.linalg.norm(shown, axis=1, keepdims=True), 1e-300)
-    for reach in np.geomspace(0.025, 0.25, 20):
-        stop = np.maximum(q - q[-1] + reach * COVERED.stroke, 0.0)
-        assert (shown @ stop).max() > 0.9 * np.linalg.norm(stop), reach
-    assert {trial['position'] > middle for trial in StopContact.trials(covered)} == {False, True}
 
 
 @every_effect

@@ -18,7 +18,6 @@ import yaml
 from pprs_dynamics import DriveModel, JointMotion, PprsError
 from pprs_dynamics.errors import ModelError, UnreadableFileError
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
-from pprs_dynamics.physics.effects.laws.external_wrench import ExternalWrench
 from pprs_dynamics.physics.effects.laws.payload_mass import PayloadMass
 from pprs_dynamics.physics.model.model_writer import write_model
 
@@ -76,16 +75,6 @@ def test_a_tilted_base_is_another_gravity_to_mujoco(tmp_path: Path) -> None:
     gravity = (0.0, 9.81 * np.sin(0.1), -9.81 * np.cos(0.1))
     assert tilted.rigid_force == pytest.approx(
         mujoco_torques(arm.urdf(), motion, gravity), abs=1e-9)
-
-
-def test_an_upward_wrench_holds_what_a_mass_weighs(tmp_path: Path) -> None:
-    model = DriveModel.load(arm.write_arm(tmp_path))
-    rest = JointMotion(states().position, *np.zeros((2, SAMPLES, 3)))
-    names = [p.name for p in ExternalWrench.parameters]
-    wrench = ExternalWrench({name: 9.81 if name == 'force_z' else 0.0 for name in names})
-    state = model.mechanism(rest)
-    assert wrench.force(state) == pytest.approx(
-        PayloadMass.bound(model.robot).from_file({'mass': 1.0}).force(state), abs=1e-9)
 
 
 def test_torques_are_linear_in_the_regressor(tmp_path: Path) -> None:
@@ -211,18 +200,3 @@ def test_a_damaged_urdf_is_told_with_link_value_and_rule(
     path = arm.write_arm(tmp_path, arm.urdf().replace(old, new, 1))
     with pytest.raises(UnreadableFileError, match=re.escape(sentence)):
         DriveModel.load(path)
-
-
-def test_links_and_mimics_in_a_ring_are_told(tmp_path: Path) -> None:
-    hang = ('<link name="{0}"/><joint name="to_{0}" type="revolute"><parent link="{1}"/>'
-            '<child link="{0}"/></joint>')
-    ring = hang.format('a', 'b') + hang.format('b', 'a')
-    with pytest.raises(UnreadableFileError, match='hang on one another'):
-        DriveModel.load(arm.write_arm(tmp_path, arm.urdf().replace('</robot>', f'{ring}</robot>')))
-    mimics = ''.join(
-        f'<link name="{name}"/><joint name="{name}" type="revolute"><parent link="stand"/>'
-        f'<child link="{name}"/><axis xyz="0 0 1"/><mimic joint="{other}"/></joint>'
-        for name, other in (('c', 'd'), ('d', 'c')))
-    with pytest.raises(UnreadableFileError, match='must mimic none that mimics it'):
-        DriveModel.load(
-            arm.write_arm(tmp_path, arm.urdf().replace('</robot>', f'{mimics}</robot>')))

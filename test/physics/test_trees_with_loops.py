@@ -19,7 +19,7 @@ from random_states import random_motion
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
-from pprs_dynamics.errors import ModelError, PprsError, SingularityError, WorkspaceError
+from pprs_dynamics.errors import PprsError, SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism import tree_evaluation
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
@@ -397,23 +397,6 @@ def test_a_pose_past_a_singularity_is_not_answered_with_another_pose_of_the_same
                                                   np.tile(turned, (samples, 1))))
 
 
-def test_a_delta_follows_places_and_refuses_what_it_cannot_turn(tmp_path: Path) -> None:
-    model = DriveModel.load(robots.delta().write(tmp_path))
-    assert model.robot.tool_pose.chosen.tolist() == [0, 1, 2]
-    motion = states(model, SIZES['delta'])
-    links = model.mechanism(motion).links
-    row, _ = model.robot.structure.links['platform']
-    frame, m = links.frame_of('platform'), links.motion
-    found = model.mechanism(PlatformMotion(
-        frame.p, Rotation.from_matrix(frame.R).as_quat(), m.u[:, row], m.w[:, row], m.ud[:, row],
-        m.wd[:, row]))
-    for name in ('position', 'velocity', 'acceleration'):
-        assert getattr(found, name) == pytest.approx(getattr(motion, name), abs=1e-9), name
-    tilted = PlatformMotion.at_rest(frame.p[:1], Rotation.from_rotvec([[0.0, 0.01, 0.0]]).as_quat())
-    with pytest.raises(WorkspaceError, match='pitch'):
-        model.drive_forces(tilted)
-
-
 def test_a_mimic_joint_is_a_coupling(tmp_path: Path) -> None:
     """A counterweight that slides as the drive turns is an inertia and a weight more."""
     text = robots.RobotText('winch', tool='drum')
@@ -428,17 +411,6 @@ def test_a_mimic_joint_is_a_coupling(tmp_path: Path) -> None:
     q, v, a = np.random.default_rng(0).normal(size=(3, 5, 1))
     expected = 0.1 * a + 0.2 ** 2 * 3.0 * a - 0.2 * 3.0 * 9.81
     assert model.drive_forces(JointMotion(q, v, a)).total == pytest.approx(expected, abs=1e-12)
-
-
-def test_the_file_refuses_two_descriptions_and_none(tmp_path: Path) -> None:
-    path = robots.five_bar().write(tmp_path)
-    text = path.read_text()
-    path.write_text(text.replace('urdf: five_bar.urdf', 'gravity: [0.0, 0.0, 0.0]'))
-    with pytest.raises(ModelError, match=r'robot\.urdf'):
-        DriveModel.load(path)
-    path.write_text(text.replace('base: base', 'base: base\n      mjcf: bar.xml'))
-    with pytest.raises(ModelError, match='not stand beside'):
-        DriveModel.load(path)
 
 
 def test_friction_of_passive_hinges_and_slides_turns_over_in_widths_of_their_own(

@@ -142,15 +142,6 @@ def test_reductions_are_gear_ratios_unless_the_model_file_has_some(
     assert DriveModel.load(path).gear_ratios == (2.0, 3.0, 4.0)
 
 
-def test_gears_that_are_none_are_told(tmp_path: Path) -> None:
-    with pytest.raises(PprsError, match='reduction of transmission t is "fifty"'):
-        DriveModel.load(arm.write_arm(tmp_path, arm.urdf(
-            more=gear('mechanicalReduction', 'type', 'actuator', 'fifty'))))
-    other = gear('mechanicalReduction', 'type', 'actuator', '50').replace('Simple', 'FourBarish')
-    (remark,) = one_link(tmp_path, (0.01, 0.08, 0.08), other).remarks
-    assert '<transmission> t is not used' in remark
-
-
 def test_a_description_is_found_in_its_package(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
 ) -> None:
