@@ -18,7 +18,7 @@ from pprs_dynamics.inference.residuals.excerpt import excerpt_of, forces_on
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
 MODEL = DriveModel.load()
-TIME = np.arange(4000) * 0.005
+TIME = np.arange(10_000) * 0.002
 AFTER = (TIME > 12.0)[:, None]
 # Effects that the model lacks are no other unit.
 REAL = DriveModel.from_parameters(
@@ -47,7 +47,7 @@ def test_efforts_without_a_sign_are_told_within_seconds() -> None:
 
 
 @pytest.mark.parametrize(('factor', 'is_after', 'words'), [
-    (1e3, True, 'in mN'), (-1.0, False, 'negated')])
+    (1e3, True, 'in mN'), pytest.param(-1.0, False, 'negated', marks=pytest.mark.slow)])
 def test_efforts_that_change_their_unit_in_the_middle(factor: float, is_after: bool, words: str,
                                                       ) -> None:
     part = AFTER if is_after else ~AFTER
@@ -72,7 +72,7 @@ def test_positions_that_change_to_millimetres(is_after: bool, words: str) -> Non
 
 def test_a_drive_that_is_held_for_a_while_is_in_no_other_unit() -> None:
     """As axis 4 of a KR 300: next to nothing is asked of it at first, and a brake pushes."""
-    held = 1600
+    held = 4000
     position, effort = POSITION.copy(), EFFORT.copy()
     position[:held] = position[held]
     excerpt = excerpt_of(Recording.from_arrays('r', TIME, position, None, effort))
