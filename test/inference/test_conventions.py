@@ -17,7 +17,7 @@ from pprs_command import pprs
 from shared_cases import shared_case
 
 from benchmarks.hidden import recordings
-from pprs_dynamics import DriveModel, JointMotion
+from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.readings.check import find_mistakes
@@ -46,16 +46,6 @@ def robot(model: DriveModel = MODEL, seed: int = 0, path: str = 'excitation') ->
     return (motion.time, np.round(state.position, 6),
             state.velocity + rng.normal(0, 1e-4, state.velocity.shape),
             forces.total + rng.normal(0, NOISE, forces.total.shape))
-
-
-def axis() -> Arrays:
-    rng = np.random.default_rng(1)
-    time = np.arange(0.0, DURATION, 1 / RATE)[:, None]
-    rate = 2 * np.pi * 0.4
-    position, velocity = 0.1 * np.sin(rate * time), 0.1 * rate * np.cos(rate * time)
-    acceleration = -0.1 * rate ** 2 * np.sin(rate * time)
-    effort = AXIS.drive_forces(JointMotion(position, velocity, acceleration, time[:, 0])).total
-    return time[:, 0], position, velocity, effort + rng.normal(0, 1.0, effort.shape)
 
 
 def recording(arrays: Arrays, drives: tuple[str, ...] = DRIVES) -> Recording:
