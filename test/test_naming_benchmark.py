@@ -5,35 +5,27 @@
 
 from __future__ import annotations
 
-import gzip
 import json
-import runpy
-import sys
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.naming import columns, fetch, real, run
-from benchmarks.naming.entrants import ENTRANTS, PEERS, Entrant, ablations
+from benchmarks.naming import run
+from benchmarks.naming.entrants import ENTRANTS, Entrant
 from benchmarks.naming.entrants.controls import perfect
 from benchmarks.naming.entrants.cross_validation import block_cross_validation
-from benchmarks.naming.entrants.equations import Equations
 from benchmarks.naming.entrants.pprs import answer_of
-from benchmarks.naming.entrants.sindy import unlike
 from benchmarks.naming.entrants.spike_and_slab import spike_and_slab
 from benchmarks.naming.entrants.stepwise import stepwise
-from benchmarks.naming.generate import draws, make, write_problem
+from benchmarks.naming.generate import draws
 from benchmarks.naming.page import (
     fails_table,
     is_right,
     write_page,
 )
 from benchmarks.naming.problems import (
-    VERDICTS,
     Answer,
     AnswerError,
     Column,
@@ -41,11 +33,8 @@ from benchmarks.naming.problems import (
     Problem,
     Truth,
 )
-from benchmarks.naming.robots import OFFERED, ROBOTS, hidden_names
 from benchmarks.naming.run import enter_all, make_all, score_all
 from benchmarks.naming.scoring import FIGURES, Rate, Scored, figures, judge
-from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.simulation.injection import NAMES
 
 pytestmark = pytest.mark.slow
 
@@ -57,8 +46,8 @@ PAIR = Truth('p', 'axis', 'two', 'white', 1.0, (Named('spring', ('b',)), Named('
 NOTHING = Truth('p', 'axis', 'nothing', 'white', 0.0, ())
 UNKNOWN = Truth('p', 'axis', 'unknown', 'white', 5.0, (Named('bump', ('a',)),))
 FORM = Truth('p', 'axis', 'form', 'white', 5.0, (Named('viscous', ('a',)),))
-ABLATIONS = (ablations.white_noise, ablations.without_prices, ablations.greedy,
-             ablations.given_model)
+
+
 TRUTHS = (DRIFT, PAIR, NOTHING, UNKNOWN, FORM)
 
 
@@ -146,17 +135,6 @@ def test_answers_of_another_form_are_refused(text: dict[str, object]) -> None:
         Answer.from_dict(text)
 
 
-def test_the_entrant_of_the_protocols_page_runs_and_is_scored(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    page = (Path(run.__file__).parent / 'README.md').read_text()
-    (tmp_path / 'mine.py').write_text(page.partition('```python\n')[2].partition('```')[0])
-    folder_of(tmp_path, 'one', 'other')
-    monkeypatch.setattr(sys, 'argv', ['mine.py', str(tmp_path)])
-    runpy.run_path(str(tmp_path / 'mine.py'))
-    assert figures(score_all(tmp_path)['mine'])['exact, one'] == Rate(2, 2)
-
-
 def folder_of(tmp_path: Path, *problems: str) -> Path:
     """Return a folder with problems in which a spring is hidden."""
     (tmp_path / 'truth').mkdir()
@@ -181,20 +159,6 @@ def named(asked: Problem, value: float = 1.0) -> Answer:
 
 def asked(folder: Path, name: str) -> str:
     return (folder / 'problems' / name / 'asked').read_text()
-
-
-def test_only_what_changed_is_answered_again(tmp_path: Path) -> None:
-    folder = folder_of(tmp_path, 'one', 'other')
-    method = Entrant(named, {'value': 1.0}, ('value', (1.0, 2.0)))
-    assert enter_all(folder, {'mine': method}, 1) == 0
-    assert enter_all(folder, {'mine': method}, 1) == 0
-    assert asked(folder, 'one') == asked(folder, 'other') == '1 '
-    (folder / 'problems' / 'one' / 'recording.csv').write_text('another recording')
-    assert enter_all(folder, {'mine': method}, 1) == 0
-    assert (asked(folder, 'one'), asked(folder, 'other')) == ('1 1 ', '1 ')
-    assert enter_all(folder, {'mine': method.set_to(2.0)}, 1) == 0
-    assert (asked(folder, 'one'), asked(folder, 'other')) == ('1 1 2 ', '1 2 ')
-    assert enter_all(folder, {'mine': method}, 1, minutes=0.0) == 2  # the time is up
 
 
 def test_a_slice_is_made_entered_and_scored(
@@ -230,34 +194,6 @@ def test_who_ends_in_an_error_is_silent_and_is_told_so(tmp_path: Path) -> None:
     assert fails_table(score_all(folder))[-1].split('|')[-2].strip() == '1'
 
 
-def test_every_entrant_has_a_key_of_its_own() -> None:
-    keys = {name: one.key() for name, one in ENTRANTS.items()}
-    assert len(set(keys.values())) == len(keys)
-    assert all(one.tuning for one in PEERS.values())
-
-
-@pytest.mark.parametrize('without', ABLATIONS)
-def test_this_package_answers_without_a_part_of_it(
-    without: Callable[[Problem], Answer], tmp_path: Path,
-) -> None:
-    draw = next(one for one in draws(1, 24) if one.robot == 'axis')
-    write_problem(draw, tmp_path / draw.name, seconds=8.0)
-    assert without(replace(problem(0, {}), folder=tmp_path / draw.name)).verdict in VERDICTS
-
-
-def test_what_is_fetched_becomes_a_recording() -> None:
-    rows = np.arange(2 * 31.0).reshape(2, 31)
-    raw = '\n'.join(','.join(map(str, row)) for row in rows).encode()
-    head, first, *_ = gzip.decompress(fetch.ur10e(raw)).decode().splitlines()
-    assert head.startswith('time,shoulder_pan_joint/position,shoulder_pan_joint/velocity,'
-                           'shoulder_pan_joint/current,shoulder_lift_joint/position')
-    assert first.startswith('0.0000,1,7,13,2,8,14')
-    head, first, second = gzip.decompress(fetch.psm(200.0)(raw)).decode().splitlines()
-    assert head.startswith('time,yaw/position,yaw/velocity,yaw/effort,pitch/position')
-    assert first == '0.000,0,7,14,1,8,15,2,9,16'
-    assert second.startswith('0.005,31,38,45')
-
-
 def test_problems_come_back_from_their_files(tmp_path: Path) -> None:
     made = problem(3, {('spring', 'b'): 1.0})
     made.write(tmp_path)
@@ -278,37 +214,6 @@ def test_peers_find_what_stands_out_of_white_noise() -> None:
         assert abs(value - 0.2) < 4 * std
 
 
-def test_frols_gets_no_columns_that_others_make_up() -> None:
-    made = problem(2, {('spring', 'b'): 1.0})
-    equations = Equations(Problem(
-        made.drives, made.time, made.error, made.base,
-        (*made.columns, Column('twin', 'c', 'b'), Column('zero', 'c', 'a')),
-        np.concatenate((made.rows, made.rows[6:7], 0 * made.rows[:1]))))
-    found = unlike(equations.compressed()[0], equations.best_single())
-    assert len(found) == len(made.columns)
-    assert set(range(len(made.columns))) - set(found) <= {6}  # or its twin
-
-
-def test_as_many_rows_as_columns_say_the_same() -> None:
-    equations = Equations(problem(4, {('spring', 'b'): 1.0}))
-    rows, seen = equations.compressed()
-    assert rows.shape == (8, 8)
-    np.testing.assert_allclose(rows.T @ rows, equations.X.T @ equations.X, rtol=1e-9, atol=1e-6)
-    np.testing.assert_allclose(rows.T @ seen, equations.X.T @ equations.y, rtol=1e-9, atol=1e-6)
-    out = equations.blocks == 3
-    rows, seen = equations.compressed(out)
-    np.testing.assert_allclose(rows.T @ rows, equations.X[~out].T @ equations.X[~out], atol=1e-6)
-
-
-def test_whitening_keeps_quiet_where_white_noise_is_assumed_in_vain() -> None:
-    quiet = [stepwise(problem(seed, {}, correlation=0.97), whiten=True).verdict
-             for seed in range(10)]
-    loud = [stepwise(problem(seed, {}, correlation=0.97), whiten=False).verdict
-            for seed in range(10)]
-    assert quiet.count('none') >= 8
-    assert loud.count('none') <= 2
-
-
 def test_a_diagnosis_is_an_answer_with_its_rivals() -> None:
     effect = {'name': 'rod_mass', 'drives': None,
               'parameters': {'mass': {'value': 0.1, 'std': 0.01, 'unit': 'kg'}}}
@@ -316,35 +221,6 @@ def test_a_diagnosis_is_an_answer_with_its_rivals() -> None:
             'indistinguishable': [['rod_mass', 'payload_mass']]}
     assert [[one.name for one in found] for found in answer_of(said).sets] == [
         ['rod_mass'], ['payload_mass']]
-
-
-def test_what_may_be_hidden_can_be_simulated() -> None:
-    for robot in ROBOTS:
-        assert set(hidden_names(robot)) <= set(NAMES)
-
-
-def test_columns_are_of_the_library_whatever_the_catalogue_has(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    assert {name for robot in ROBOTS for name in hidden_names(robot)} <= OFFERED <= set(CATALOGUE)
-    draw = next(one for one in draws(1, 24) if one.robot == 'axis')
-    monkeypatch.setattr(columns, 'OFFERED', OFFERED - {'viscous_friction'})
-    make(draw, tmp_path)
-    effects = {one.effect for one in Problem.read(tmp_path / draw.name).columns}
-    assert 'coulomb_friction' in effects
-    assert 'viscous_friction' not in effects
-
-
-def test_recordings_are_shipped_with_licence_and_source() -> None:
-    text = (real.RECORDINGS / 'README.md').read_text()
-    folders = sorted(one for one in real.RECORDINGS.iterdir() if one.is_dir())
-    assert [one.name for one in folders] == ['iiwa', 'kr300', 'pendulum', 'schunk']
-    for folder in folders:
-        assert (folder / 'LICENSE').stat().st_size > 0
-        assert f'| `{folder.name}` | [' in text
-        needed = {file for part in real.PARTS if part.folder == folder.name
-                  for file in (part.recording, part.model, *part.fitted)}
-        assert needed <= {one.name for one in folder.iterdir()}
 
 
 def test_seeds_give_the_same_problems_and_names_that_tell_nothing() -> None:

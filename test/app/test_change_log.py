@@ -15,20 +15,6 @@ from pprs_dynamics.app.workbench.server.change_log import ChangeLog
 EFFECTS: list[dict[str, Any]] = [{'name': 'payload_mass'}]
 
 
-def test_what_is_equal_is_sent_once() -> None:
-    log = ChangeLog()
-    first = log.update({'drives': ['a', 'b'], 'effects': [{'name': 'payload_mass'}]}, log.version)
-    assert first == log.version  # nothing came in between: it need not be asked for again
-    assert set(log.since(first - 1)) == {'drives', 'effects', 'effect_names'}
-    log.count()
-    again = log.update({'drives': ['a', 'b'], 'effects': [{'name': 'payload_mass'}]}, log.version)
-    assert again == log.version
-    assert log.since(first) == log.since(again) == {'effects': []}
-    third = log.update({'drives': ['a'], 'effects': EFFECTS}, again)
-    assert log.since(again) == {'drives': ['a'], 'effects': []}
-    assert log.since(third) == {'effects': []}
-
-
 @given(st.lists(st.tuples(st.sampled_from(['change', 'tell', 'look', 'late']),
                           st.integers(0, 2)), max_size=30))
 def test_no_browser_misses_a_change(deeds: list[tuple[str, int]]) -> None:

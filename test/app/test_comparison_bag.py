@@ -84,14 +84,3 @@ def test_errors_of_two_models_on_one_recording(
     assert after < 0.1
     assert beside in capsys.readouterr().out
     assert beside in (folder / 'both.html').read_text()
-
-
-def test_a_model_of_other_drives_or_a_recording_beside_is_refused(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(folder)
-    assert main(['compare', 'run.csv', '--beside', 'config/single_axis.yaml']) == 2
-    said = capsys.readouterr().err.strip().splitlines()
-    assert len(said) == 1
-    assert 'drives of the model' in said[0]
-    assert main(['compare', 'run.csv', '--beside', 'other.csv']) == 2

@@ -11,14 +11,11 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import diagnosis_demo
 import numpy as np
 import pytest
-from diagnosis_demo import Story
 from pprs_command import pprs
-from rich.console import Console
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -64,19 +61,3 @@ def test_the_error_falls_and_the_secret_is_told_last(tmp_path: Path) -> None:
     assert error_on(adopted, tmp_path / 'other.mcap') < 1.05 * noise
     for file in ('demo.png', 'before.html', 'why.html', 'after.html'):
         assert (tmp_path / file).stat().st_size > 10_000
-
-
-HIDDEN: dict[str, Any] = {'name': 'viscous_friction', 'drives': ['lift_1']}
-
-
-def answer(verdict: str, *effects: str, rivals: list[list[str]] | None = None,
-           suspects: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return the keys of why.json that the story reads."""
-    return {'verdict': verdict,
-            'effects': [{'name': name, 'drives': ['lift_1']} for name in effects],
-            'indistinguishable': rivals or [], 'suspects': [{'name': name} for name in suspects]}
-
-
-@pytest.fixture
-def story(tmp_path: Path) -> Story:
-    return Story(Console(record=True, width=100, file=(tmp_path / 'said').open('w')), tmp_path)

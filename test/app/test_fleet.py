@@ -22,7 +22,6 @@ from pprs_dynamics.app.fleet.recordings import (
     read_manifest,
 )
 from pprs_dynamics.app.fleet.store import COLUMNS, write_rows
-from pprs_dynamics.app.fleet.survey import SurveyJob, examine
 from pprs_dynamics.app.fleet.trend import find_steps, fleet_trends
 from pprs_dynamics.errors import UnreadableFileError
 
@@ -136,14 +135,6 @@ def test_robots_have_the_names_of_their_folders(tmp_path: Path) -> None:
     for name in ('', str(tmp_path / 'none*')):
         with pytest.raises(UnreadableFileError, match='there is no recording'):
             list(find_recordings([name]))
-
-
-def test_a_refused_recording_is_a_row_with_the_reason(tmp_path: Path) -> None:
-    path = tmp_path / 'bad.csv'
-    path.write_text('this is no recording\n')
-    (row,) = examine(SurveyJob(SurveyedRecording(str(path), 'a'), MODEL, EFFECTS))
-    assert 'bad.csv' in row['error']
-    assert row['verdict'] == 'refused'
 
 
 def test_a_survey_writes_documented_columns_and_does_nothing_twice(

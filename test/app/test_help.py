@@ -14,8 +14,6 @@ from pathlib import Path
 import pytest
 
 from pprs_dynamics.app.commands.pprs import COMMANDS, _module, _parser, main
-from pprs_dynamics.errors import meant
-from pprs_dynamics.physics.effects.catalogue import catalogue
 
 
 def said(capsys: pytest.CaptureFixture[str]) -> str:
@@ -49,11 +47,9 @@ def test_help_ends_with_an_example_that_the_command_takes(
     (['comapre', 'x.csv'], 'did you mean compare?'),
     (['compare', 'x.csv', '--reprot', 'x.html'], 'did you mean --report?'),
     (['simulate', '--output', 'x.csv', '--effect', 'stribek'], 'did you mean stribeck_friction?'),
-    (['adopt', 'stribek', 'x.csv', '--output', 'y.yaml'], 'did you mean stribeck_friction?'),
     (['adopt', 'stribeck_friction:slide1', 'x.csv', '--output', 'y.yaml'],
      'did you mean slide_1?'),
     (['compare', 'rum.mcap'], 'did you mean run.mcap?'),
-    (['info', 'run.mcap', '--model', 'robto.yaml'], 'did you mean robot.yaml?'),
     (['info', 'run.mcap', '--model', 'robot.yaml'], 'did you mean masses.payload?'),
     (['info', 'run.mcap', '--model', 'arm.urdf'], '`pprs init arm.urdf RECORDING'),
 ])
@@ -83,38 +79,6 @@ def test_without_a_model_a_recording_of_another_robot_names_init_and_demo(
     assert 'no --model is given' in text
     assert '`pprs init ' in text
     assert '--demo' in text
-
-
-def test_without_a_model_the_paper_s_robot_is_named_and_demo_takes_it_silently(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str],
-) -> None:
-    run = tmp_path / 'run.csv'
-    drives = [f'{kind}_{k}' for kind in ('slide', 'lift') for k in (1, 2, 3)]
-    header = ','.join(f'{drive}/{what}' for drive in drives for what in ('position', 'effort'))
-    run.write_text(f'time,{header}\n' + ''.join(
-        f'{k / 100},{",".join(["0.1,1.0"] * 6)}\n' for k in range(50)))
-    assert main(['info', str(run)]) == 0
-    assert "the model is that of the paper's robot (--demo)" in said(capsys)
-    assert main(['info', str(run), '--demo']) == 0
-    assert 'No --model is given' not in said(capsys)
-    assert main(['info', str(run), '--demo', '--model', 'config/paper.yaml']) == 2
-
-
-def test_the_commands_have_few_options_and_the_help_fits_on_a_screen() -> None:
-    commands = [action for name in COMMANDS for parser in [_parser([name])]
-                for group in parser._actions if isinstance(group.choices, dict)
-                for action in group.choices[name]._actions if action.option_strings]
-    assert len(commands) <= 109  # with --help of each
-    assert len(_parser([]).format_help().splitlines()) <= 36
-
-
-def test_one_word_or_the_beginning_of_a_name_is_enough_and_nothing_is_made_up() -> None:
-    for name, effect in (('stribek', 'stribeck_friction'), ('hysterisis', 'hysteresis'),
-                         ('Payload', 'payload_mass'), ('tilt', 'base_tilt')):
-        assert meant(name, catalogue()) == effect
-    assert meant('zzz', catalogue()) == ''
-    assert meant('', catalogue()) == ''
-    assert meant('x', ()) == ''
 
 
 @pytest.mark.parametrize(('line', 'word'), [

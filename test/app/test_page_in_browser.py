@@ -6,21 +6,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from browser import LEAST_CONTRAST, LEAST_TEXT, READABLE, Seen, chromium, needs_browser
-from made_up_diagnosis import NOISE, made_up_diagnosis, made_up_residuals
 from made_up_pages import made_up_pages
 
-from pprs_dynamics.app.report.diagnosis_report import diagnosis_page
-from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.diagnosis.comparison import compare
-from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
-
-PAGES = ('diagnosis', 'comparison', 'adoption', 'history', 'experiment', 'fleet')
 MOST_BYTES = 4_000_000
 FIRST_PAINT = 500.0  # [ms]
 
@@ -60,17 +52,6 @@ def test_text_is_painted_at_once_and_files_are_small(see: Any, pages: dict[str, 
         paints.append(seen.tab.evaluate("performance.getEntriesByType('paint')[0].startTime"))
     # The least of them: other work on the machine only adds.
     assert min(paints) <= FIRST_PAINT
-
-
-@needs_browser
-@pytest.mark.parametrize('name', ['diagnosis', 'adoption'])
-def test_one_screen_has_verdict_fall_picture_and_the_command(see: Any, name: str) -> None:
-    seen = see(name)
-    seen.drawn(1)
-    for place in ('.lead', '.errors', '.plot', '.next code', '.next button'):
-        box = seen.tab.query_selector(place).bounding_box()
-        assert box['y'] + box['height'] <= 800, place
-    assert seen.tab.evaluate("document.querySelectorAll('.plot[data-drawn]').length") <= 2
 
 
 def check_structure(seen: Seen, figures: int) -> None:
@@ -134,23 +115,6 @@ def test_figures_over_time_share_their_span_and_their_cursor(see: Any) -> None:
 
 
 @needs_browser
-def test_menus_open_on_the_worst_drive_and_go_together(see: Any) -> None:
-    seen = see('comparison')
-    seen.unfold()
-    values = "[...document.querySelectorAll('select')].map((menu) => menu.value)"
-    chosen = seen.tab.evaluate(values)
-    assert len(chosen) == 3
-    assert set(chosen) == {'lift_2'} or set(chosen) == {'slide_1'}
-    visible = '''[...document.querySelectorAll('.plot')].flatMap((plot) => plot.data)
-        .filter((trace) => trace.meta?.drive && trace.visible !== false)
-        .map((trace) => trace.meta.drive)'''
-    assert set(seen.tab.evaluate(visible)) == set(chosen)
-    seen.tab.select_option('select', 'lift_3')
-    seen.tab.wait_for_function(f"{visible}.every((drive) => drive === 'lift_3')")
-    assert set(seen.tab.evaluate(values)) == {'lift_3'}
-
-
-@needs_browser
 def test_the_next_command_is_copied_with_the_real_names(see: Any) -> None:
     seen = see('diagnosis', permissions=['clipboard-read', 'clipboard-write'])
     seen.tab.click('.next button')
@@ -158,41 +122,3 @@ def test_the_next_command_is_copied_with_the_real_names(see: Any) -> None:
     assert seen.tab.evaluate('navigator.clipboard.readText()') == (
         "pprs adopt coulomb_friction 'my run.mcap' --validate other.mcap --output "
         'with_coulomb_friction.yaml')
-
-
-def test_on_an_adequate_page_nothing_is_marked_as_bad() -> None:
-    diagnosis = made_up_diagnosis('adequate')
-    html = diagnosis_page(diagnosis, word_diagnosis(diagnosis), made_up_residuals(), ['a']).html()
-    body = html[html.index('<main>'):html.index('</main>')]
-    assert not any(f'"{grade}"' in body for grade in ('poor', 'fair'))
-    assert 'class="card"' not in body
-    assert 'lacks' not in body
-
-
-def test_where_it_fails_is_ranked_by_squared_error_and_nothing_slight_is_listed() -> None:
-    residuals = made_up_residuals()
-    error = residuals.error.copy()
-    error[:, 0] += 0.2
-    error[:, 3] += 0.9
-    comparison = compare(replace(residuals, measured=residuals.model + error))
-    assert [one.drive for one in comparison.where][:2] == ['lift_1', 'slide_1']
-    sizes = [one.mean_square for one in comparison.where]
-    assert sizes == sorted(sizes, reverse=True)
-    for one in comparison.where:
-        assert one.mean_square >= 0.01 * comparison.drives[one.drive].rms ** 2
-    assert [one['drive'] for one in comparison.to_dict()['where']] == [
-        one.drive for one in comparison.where]
-    assert set(comparison.drives) == set(DRIVES)
-
-
-def test_a_payload_picked_up_in_mid_run_is_no_noise() -> None:
-    residuals = made_up_residuals()
-    error = residuals.error.copy()
-    error[len(error) // 2:, 3:] += 0.97
-    comparison = compare(replace(residuals, measured=residuals.model + error),
-                         floors=dict.fromkeys(DRIVES, NOISE))
-    for name in DRIVES[3:]:
-        assert comparison.drives[name].grade != 'noise'
-        assert any(one.drive == name for one in comparison.where)
-    for name in DRIVES[:3]:
-        assert comparison.drives[name].grade == 'noise'

@@ -9,17 +9,12 @@ import json
 import re
 from pathlib import Path
 
-import matplotlib.image
 import numpy as np
 import pytest
-from browser import Seen, chromium, needs_browser
 from pprs_command import pprs, simulate_into
 
 from pprs_dynamics.app.report.charts import thinned
-from pprs_dynamics.app.report.comparison_figures import worst_spans
-from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 
 
@@ -92,22 +87,6 @@ def test_the_page_needs_no_network_and_escapes_names(folder: Path) -> None:
     assert '&lt;script&gt;alert(1)' in text
 
 
-@needs_browser
-def test_a_browser_draws_the_page_without_complaints(folder: Path, tmp_path: Path) -> None:
-    with chromium() as browser:
-        seen = Seen(browser, folder / 'page.html', viewport={'width': 1280, 'height': 1600})
-        assert seen.unfold() >= 1
-        assert seen.complaints == []
-        seen.tab.evaluate('scrollTo(0, 0)')
-        seen.tab.screenshot(path=tmp_path / 'page.png')
-    picture = matplotlib.image.imread(tmp_path / 'page.png')
-    assert picture.shape[:2] == (1600, 1280)
-    # Text and curves: dark and coloured pixels, on a page mostly white.
-    pixels = picture[..., :3]
-    assert 0.003 < np.mean(pixels.min(axis=2) < 0.5) < 0.5
-    assert np.mean(np.ptp(pixels, axis=2) > 0.2) > 0.002
-
-
 def test_curves_of_a_figure_share_their_samples_and_keep_every_peak() -> None:
     time = np.arange(100_000.0)
     first, second = np.zeros(100_000), np.zeros(100_000)
@@ -116,37 +95,3 @@ def test_curves_of_a_figure_share_their_samples_and_keep_every_peak() -> None:
     assert len(times) == len(one) == len(other) <= 3000
     assert one.max() == 3.0
     assert other.min() == -4.0
-
-
-def test_long_recordings_are_thinned_without_losing_a_peak() -> None:
-    time = np.arange(1_000_000.0)
-    values = np.zeros(1_000_000)
-    values[[123_456, 777_777]] = (5.0, -7.0)
-    values[500_000:500_500] = np.nan
-    shown_time, shown = thinned(time, values)
-    assert len(shown) <= 3000
-    assert {5.0, -7.0} <= set(shown)
-    assert np.all(np.diff(shown_time) > 0)
-
-
-def test_the_worst_second_is_the_one_with_the_planted_error() -> None:
-    time = np.arange(0, 20, 0.01)
-    error = np.zeros((len(time), 6))
-    error[700:760, 2] = 1.0
-    residuals = Residuals(DRIVES, time, np.zeros(len(time), dtype=int), error, np.zeros_like(error))
-    start, end = worst_spans(residuals, 2)[0]
-    assert start <= 7.0
-    assert end >= 7.59
-    assert worst_spans(residuals, 1) == []
-
-
-def test_text_from_files_is_escaped_everywhere() -> None:
-    page = Page('<b>')
-    page.heading('<i>')
-    page.text('<u>', 'lead')
-    page.bullets(['<s>'])
-    page.table(('<p>', 'x'), [('<q>', '<r>')], ['good'])
-    html = page.html()
-    for letter in 'biuspqr':
-        assert f'&lt;{letter}&gt;' in html
-    assert '<th scope="row" class="good">&lt;q&gt;' in html

@@ -5,30 +5,18 @@
 
 from __future__ import annotations
 
-import argparse
 import http.client
-import json
 import signal
 from pathlib import Path
 
-import numpy as np
 import pytest
 from workbench_bench import write_hidden
 from workbench_server import workbench
 
-from pprs_dynamics import DriveModel
-from pprs_dynamics.app.commands import workbench as workbench_command
-from pprs_dynamics.app.workbench import Session
-from pprs_dynamics.app.workbench.robot_motion import robot_motion
 from pprs_dynamics.measurement.files.recording import (
-    Recording,
     read_recording,
     write_bag,
-    write_recording,
 )
-
-AXIS = 'config/single_axis.yaml'
-SPRING = 60.0  # [N/m]
 
 
 @pytest.fixture(scope='module')
@@ -37,17 +25,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / 'data').mkdir()
     write_hidden(folder / 'data' / 'run.csv', 1, 8.0)
     return folder
-
-
-@pytest.mark.slow
-def test_without_a_recording_it_waits_for_one(folder: Path) -> None:
-    with workbench(folder / 'data', folder=folder) as bench:
-        bench.enter()
-        bench.wait(lambda screen: not screen['is_beginning'])
-        assert bench.screen()['is_empty']
-        assert bench.get('/api/curves').status == 400
-        assert bench.post('/api/open', name='0/run.csv').status == 200
-        assert not bench.settled().get('is_empty')
 
 
 def test_what_the_page_opens_is_read_as_the_command_line_says(folder: Path) -> None:
@@ -95,41 +72,3 @@ def test_it_ends_at_once_and_in_a_line_while_a_browser_listens(folder: Path) -> 
         assert bench.process.wait(60) == 128 + signal.SIGINT
         connection.close()
     assert (folder / 'workbench.log').read_text() == 'pprs workbench: interrupted\n'
-
-
-def test_a_single_axis_has_the_same_session(tmp_path: Path) -> None:
-    time = np.arange(0.0, 15.0, 0.002)
-    position = 0.1 * np.sin(2 * np.pi * 0.4 * time) + 0.03 * np.sin(2 * np.pi * 1.1 * time)
-    velocity, acceleration = np.gradient(position, time), np.gradient(
-        np.gradient(position, time), time)
-    values = DriveModel.load(AXIS).values
-    effort = (values['links.mass'][0] * acceleration + values['friction.viscous'][0] * velocity
-              + values['friction.coulomb'][0]
-              * np.tanh(velocity / values['friction.reversal_velocity'])
-              + values['friction.offset'][0] + SPRING * position
-              + np.random.default_rng(0).normal(0, 0.3, len(time)))
-    write_recording(tmp_path / 'axis.csv', Recording.from_arrays(
-        'axis', time, position[:, None], velocity[:, None], effort[:, None], drives=('axis',)))
-    session = Session.open([tmp_path / 'axis.csv'], AXIS)
-    session.ticks.settle()
-    session.ticks.tick('drive_spring')
-    shown = session.ticks.settle()
-    assert shown.estimates['drive_spring']['axis.stiffness'].value == pytest.approx(SPRING, rel=0.1)
-    assert session.overall().now < 0.5 * session.overall().before
-    json.dumps(session.to_dict(), allow_nan=False)
-    drawn = robot_motion(session).skeleton.points
-    assert np.ptp(drawn, axis=0).max() == pytest.approx(np.ptp(position), rel=0.05)
-
-
-@pytest.mark.parametrize(('arguments', 'heard'), [
-    ([], 'joint_states'), (['--topic', '/left/joint_states'], '/left/joint_states'),
-    (['--live-topic', '/left/joint_states'], '/left/joint_states'),
-    (['--topic', '/logged', '--live-topic', '/left/joint_states'], '/left/joint_states')])
-def test_live_data_have_a_topic_of_their_own(
-    arguments: list[str], heard: str, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    module = pytest.importorskip('pprs_dynamics.ros.live_joint_states')
-    monkeypatch.setattr(module, 'LiveNodes', lambda model, topic, *names: topic)
-    parser = argparse.ArgumentParser()
-    workbench_command.add_arguments(parser)
-    assert workbench_command._live(parser.parse_args(['--live', *arguments]), None) == heard

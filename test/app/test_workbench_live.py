@@ -5,11 +5,10 @@
 
 from __future__ import annotations
 
-import json
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -17,18 +16,13 @@ import made_up_arm as arm
 import numpy as np
 import pytest
 import rclpy
-from browser import chromium, needs_browser
-from node_bench import LATCHED
 from rclpy.context import Context
 from rclpy.node import Node
 from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
-from workbench_bench import NOISE, write_hidden
-from workbench_page import Page
-from workbench_server import Workbench, workbench
+from workbench_server import workbench
 
-from pprs_dynamics.measurement.files.recording import Recording, read_recording
+from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
@@ -74,21 +68,6 @@ class Replay:
         self.thread.join(5)
         self.node.destroy_node()
         self.context.try_shutdown()
-
-
-@pytest.fixture
-def bench(tmp_path: Path, ros_domain: int) -> Iterator[Workbench]:
-    recorded, live = write_hidden(tmp_path / 'run.csv', 1), write_hidden(tmp_path / 'live.csv', 3)
-    with ExitStack() as stack:
-        for name in ('monitor', 'feedforward'):
-            stack.enter_context(node_process(
-                [executable(name), '--ros-args', '-p', 'demo:=true'], ros_domain,
-                tmp_path / f'{name}.log'))
-        replay = Replay(read_recording(live))
-        stack.callback(replay.close)
-        running = stack.enter_context(workbench(recorded, '--live', folder=tmp_path))
-        running.enter()
-        yield running
 
 
 def test_an_arm_is_compared_and_set_in_its_own_window_names_and_units(
@@ -144,57 +123,3 @@ def test_an_arm_is_compared_and_set_in_its_own_window_names_and_units(
         found = awaited(lambda found: found['monitor_error'] and min(
             found['error'][0] or 0.0, found['monitor_error'][0] or 0.0) > 0.5)
         awaited(lambda found: not found['can_restore'])
-
-
-@contextmanager
-def diagnosis(content: dict[str, Any]) -> Iterator[None]:
-    """Say something on the topic of the monitor's live diagnosis."""
-    context = Context()
-    rclpy.init(context=context)
-    node = Node('diagnosing', context=context)
-    node.create_publisher(String, '/monitor/diagnosis', LATCHED).publish(
-        String(data=json.dumps(content)))
-    yield
-    node.destroy_node()
-    context.try_shutdown()
-
-
-@pytest.mark.slow
-@needs_browser
-def test_ticked_effects_go_to_running_nodes_and_the_error_falls(bench: Workbench) -> None:
-    with chromium() as browser:
-        page = Page(browser, bench)
-        page.settled()
-        page.tick('payload_mass')
-        page.tick('coulomb_friction')
-        page.tab.locator('#live-tab').click()
-        page.tab.wait_for_function('bench.live && bench.live.kept > 6')
-        # Errors are of the last seconds, and grow and fall with the motion.
-        for key in ('error', 'monitor_error'):
-            page.tab.wait_for_function(
-                f'bench.live.{key} && Math.max(...bench.live.{key}) > {6 * NOISE}')
-        page.tab.locator('#live-set').click()
-        page.tab.locator('#live-confirm[open]').wait_for()
-        assert 'node /feedforward; robot 3-PPRS' in page.tab.locator(
-            '#live-machine').inner_text()
-        page.tab.locator('#live-yes').click()
-        page.tab.locator('#live-nodes li').wait_for()
-        assert page.tab.locator('#live-nodes').inner_text().splitlines() == [
-            'feedforward: took the effects']
-        for key in ('error', 'monitor_error'):
-            page.tab.wait_for_function(
-                f'bench.live.{key} && Math.max(...bench.live.{key}) < {3 * NOISE}')
-        assert 'payload mass' in page.tab.locator('#live-state').inner_text()
-        # What the monitor's live diagnosis says of the robot is told, from before as well.
-        assert page.tab.locator('#live-changes').inner_text() == ''
-        with diagnosis({'text': 'payload mass: mass 0.210 ± 0.004 kg, since 14:02:31',
-                        'confirmed': True, 'withdrawn': [{'name': 'base_tilt'}], 'note': ''}):
-            page.tab.wait_for_function(
-                "document.getElementById('live-changes').textContent === 'What changed: payload "
-                "mass: mass 0.210 ± 0.004 kg, since 14:02:31 Gone: base tilt.'")
-        # What came in is data for the session, too.
-        page.tab.locator('#live-take').click()
-        page.tab.wait_for_function('bench.state.recordings.length === 2')
-        assert page.settled()['recordings'][1]['now'] < 3 * NOISE
-        assert page.complaints == []
-        page.context.close()

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,11 +16,6 @@ from browser import LEAST_CONTRAST, LEAST_TEXT, READABLE, chromium, needs_browse
 from workbench_bench import write_hidden
 from workbench_page import Page
 from workbench_server import Workbench, workbench
-
-from pprs_dynamics.app.commands.pprs import main
-from pprs_dynamics.app.workbench.session_file import SavedSession
-from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.ledger import read_steps
 
 pytestmark = needs_browser
 
@@ -61,11 +55,6 @@ def page(browser: Any, bench: Workbench) -> Iterator[Page]:
     yield found
     assert found.complaints == []
     found.context.close()
-
-
-def parameters(state: dict[str, Any], effect: str) -> dict[str, Any]:
-    (found,) = (one for one in state['effects'] if one['name'] == effect)
-    return {one['key']: one for one in found['parameters']}
 
 
 def errors(state: dict[str, Any]) -> dict[str, float]:
@@ -127,27 +116,6 @@ def test_drives_are_chips_and_values_can_be_typed(page: Page) -> None:
     page.tab.locator('#message', has_text='must be between').wait_for()
 
 
-def test_a_shape_is_dragged(page: Page) -> None:
-    page.tick('payload_mass')
-    before = page.tick('stribeck_friction')
-    row = page.tab.locator('[data-effect=stribeck_friction] .parameter').filter(
-        has=page.tab.locator('input[type=range]')).first
-    key = row.locator('label').inner_text()
-    row.locator('input[type=range]').focus()
-    for _ in range(5):
-        page.tab.keyboard.press('ArrowRight')
-    page.tab.wait_for_function('bench.state.effects.some((one) => one.parameters.some('
-                               '(parameter) => parameter.is_chosen))')
-    after = page.settled()
-    old, new = (parameters(state, 'stribeck_friction') for state in (before, after))
-    assert [name for name, one in new.items() if one['is_chosen']] == [key]
-    assert new[key]['value'] > old[key]['value']
-    # The forces are fitted again around it, and the error follows.
-    forces = [name for name, one in old.items() if not one['is_shape']]
-    assert any(new[name]['value'] != old[name]['value'] for name in forces)
-    assert errors(after) != errors(before)
-
-
 def test_a_mark_says_where_the_error_is_from(page: Page) -> None:
     page.mark(3, 0.3, 0.6)
     page.tab.wait_for_function('bench.shares.length === 1')
@@ -166,18 +134,6 @@ def test_a_mark_says_where_the_error_is_from(page: Page) -> None:
     page.settled()
     page.tab.keyboard.press('Escape')
     page.tab.wait_for_function("!document.querySelector('#share-list li')")
-
-
-def test_the_robot_moves(page: Page) -> None:
-    page.tab.keyboard.press('3')
-    page.tab.wait_for_function('bench.robot.time')
-    picture = page.tab.locator('#robot').screenshot()
-    page.tab.locator('#robot-time').fill('300')
-    assert page.tab.locator('#robot').screenshot() != picture
-    assert ' s' in page.tab.locator('#robot-clock').inner_text()
-    picture = page.tab.locator('#robot').screenshot()
-    page.tab.locator('#robot').press('ArrowLeft')
-    assert page.tab.locator('#robot').screenshot() != picture
 
 
 def test_all_is_done_by_keyboard(page: Page) -> None:
@@ -213,109 +169,6 @@ def test_all_text_can_be_read(browser: Any, bench: Workbench, scheme: str, width
     page.tick('payload_mass')
     assert page.complaints == []
     page.context.close()
-
-
-def test_a_second_browser_follows(page: Page, browser: Any, bench: Workbench) -> None:
-    second = Page(browser, bench)
-    second.settled()
-    page.tick('payload_mass')
-    second.tab.wait_for_function("document.getElementById('tick-payload_mass').checked")
-    assert errors(second.settled()) == errors(page.settled())
-    second.context.close()
-
-
-@pytest.mark.slow
-def test_adopt_refuse_export_undo(page: Page, folder: Path) -> None:
-    page.tick('payload_mass')
-    page.tick('drive_spring')
-    page.tab.locator('[data-effect=drive_spring]').get_by_role('button', name='Adopt').click()
-    page.tab.locator('#message', has_text='drive spring is refused').wait_for()
-    assert page.tab.locator('#ledger li').count() == 1
-    page.tick('drive_spring')
-    page.tab.locator('[data-effect=payload_mass]').get_by_role('button', name='Adopt').click()
-    page.tab.locator('#message', has_text='payload mass is adopted').wait_for()
-    assert 'payload mass' in page.tab.locator('#ledger').inner_text()
-    state = page.settled()
-    with page.tab.expect_download() as started:
-        page.tab.locator('#export').click()
-    started.value.save_as(folder / 'model.yaml')
-    assert [step.effect for step in read_steps(DriveModel.load(folder / 'model.yaml').values)] == [
-        'payload_mass']
-    page.tick('coulomb_friction')
-    ticked = page.settled()
-    with page.tab.expect_download() as started:
-        page.tab.locator('#export-ticked').click()
-    started.value.save_as(folder / 'ticked.yaml')
-    for name, key, shown in (('model.yaml', 'before', state), ('ticked.yaml', 'now', ticked)):
-        assert main(['compare', str(folder / 'run.csv'), '--model', str(folder / name),
-                     '--json', str(folder / 'compared.json')]) == 0
-        found = json.loads((folder / 'compared.json').read_text())
-        for drive, one in shown['errors'].items():
-            assert one[key] == pytest.approx(found['drives'][drive]['rms'], rel=5e-5)
-    with page.tab.expect_download() as started:
-        page.tab.locator('#save-session').click()
-    started.value.save_as(folder / 'session.json')
-    saved = SavedSession.read(folder / 'session.json')
-    assert [one.effect for one in saved.ticks] == ['coulomb_friction']
-    assert [step.effect for step in read_steps(saved.model.values)] == ['payload_mass']
-    page.tab.locator('#back').click()  # the tick, then the adoption
-    page.tab.wait_for_function("bench.state.undoes === 'payload_mass adopted'")
-    page.tab.locator('#back').click()
-    page.tab.wait_for_function('bench.state.steps.length === 0')
-    page.settled()
-    # What cannot be saved is told on the page.
-    run = folder / 'run.csv'
-    run.rename(folder / 'elsewhere.csv')
-    page.tab.locator('#save-session').click()
-    page.tab.locator('#message', has_text='run.csv: No such file').wait_for()
-    (folder / 'elsewhere.csv').rename(run)
-
-
-@pytest.mark.slow
-def test_the_next_experiment_is_designed_and_downloaded(page: Page, folder: Path) -> None:
-    page.tab.keyboard.press('4')
-    page.tab.locator('#experiment-duration').fill('5')
-    page.tab.locator('#design').click()
-    page.tab.locator('#experiment-file').wait_for()
-    assert page.tab.locator('#experiment-text').inner_text()
-    with page.tab.expect_download() as started:
-        page.tab.locator('#experiment-file').click()
-    started.value.save_as(folder / 'next.csv')
-    lines = (folder / 'next.csv').read_text().splitlines()
-    assert lines[0].startswith('time,x,y,z,qx,qy,qz,qw')
-    assert len(lines) == 1 + 501
-
-
-def test_a_tick_is_taken_back_and_done_again_by_keys(page: Page) -> None:
-    before = errors(page.settled())
-    after = errors(page.tick('payload_mass'))
-    page.tab.locator('h1').click()
-    page.tab.keyboard.press('Control+z')
-    page.tab.wait_for_function("!document.getElementById('tick-payload_mass').checked")
-    assert errors(page.settled()) == before
-    assert 'payload_mass ticked' in page.tab.locator('#forward').get_attribute('title')
-    page.tab.keyboard.press('Control+y')
-    page.tab.wait_for_function("document.getElementById('tick-payload_mass').checked")
-    assert errors(page.settled()) == pytest.approx(after, rel=1e-3)
-
-
-def test_files_are_dropped_and_let_go_of(page: Page, folder: Path) -> None:
-    """A recording of another motion comes in by a drop, and goes by its button."""
-    write_hidden(folder / 'dropped.csv', 3, 4.0)
-    text = (folder / 'dropped.csv').read_text()
-    page.tab.evaluate("""text => {
-        const data = new DataTransfer();
-        data.items.add(new File([text], 'dropped.csv', {type: 'text/csv'}));
-        for (const kind of ['dragover', 'drop']) {
-            document.body.dispatchEvent(new DragEvent(kind, {
-                dataTransfer: data, bubbles: true, cancelable: true}));
-        }
-    }""", text)
-    page.tab.wait_for_function('bench.state.recordings.length === 2')
-    page.settled()
-    page.tab.get_by_role('button', name='Remove dropped.csv').click()
-    page.tab.wait_for_function('bench.state.recordings.length === 1')
-    page.settled()
 
 
 @pytest.mark.parametrize('scheme', ['light', 'dark'])

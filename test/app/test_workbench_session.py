@@ -14,29 +14,18 @@ import time
 from pathlib import Path
 from typing import Any
 
-import made_up_arm as arm
 import numpy as np
 import pytest
 from workbench_bench import HIDDEN, write_hidden
 
-from pprs_dynamics import DriveModel, read_recording
-from pprs_dynamics.app.api.inputs import Inputs
+from pprs_dynamics import DriveModel
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.app.workbench import Session
 from pprs_dynamics.app.workbench.background import Cancelled, EndedError, Job, run_in_process
 from pprs_dynamics.app.workbench.errors import SessionError, StaleError
-from pprs_dynamics.app.workbench.jobs import DesignedMotion
-from pprs_dynamics.app.workbench.masks import (
-    MOST_POINTS,
-    drawn_samples,
-    region_mask,
-)
-from pprs_dynamics.app.workbench.session_file import SavedSession, SavedTick
+from pprs_dynamics.app.workbench.session_file import SavedSession
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
-from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
-from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.physics.model.ledger import read_steps
 
 FORCE = HIDDEN['effects.coulomb_friction.lift_2.force']
@@ -145,16 +134,6 @@ def test_shares_say_where_an_error_is_from_less_its_prior_cost(session: Session)
     assert all(one.net < 0.05 for one in session.shares(2.0, 6.0))
 
 
-def test_a_region_of_a_scatter_is_found_in_time(session: Session) -> None:
-    mask = region_mask(session.ticks, 'velocity', 'error before', (0.0, 1.0), (0.0, 10.0), 'lift_2')
-    velocity = session.ticks.fits.design.residuals.variables['velocity'][:, 4]
-    chosen = (velocity >= 0) & (session.ticks.fits.before[:, 4] >= 0)
-    np.testing.assert_array_equal(mask[:, 4], chosen)
-    assert not mask[:, :4].any()
-    with pytest.raises(PprsError, match='must be one of time'):
-        region_mask(session.ticks, 'speed', 'error now', (0, 1), (0, 1), 'lift_2')
-
-
 def test_bad_requests_are_a_sentence_and_change_nothing(session: Session) -> None:
     session.ticks.tick('coulomb_friction', ['lift_2'])
     revision = session.ticks.revision
@@ -190,21 +169,6 @@ def test_a_tick_in_between_ends_what_follows_the_one_before(session: Session) ->
     assert session.ticks.settle().stage == EXACT
 
 
-def test_everything_on_the_screen_is_json(session: Session) -> None:
-    session.ticks.tick('payload_mass')
-    session.ticks.settle()
-    # A design may leave numbers that nothing tells.
-    session.jobs.experiment = DesignedMotion(
-        {'contests': [], 'accuracy': [{'std_before': float('inf')}]}, HelicalPath().motion([0.0]))
-    found = json.loads(json.dumps(session.to_dict(), allow_nan=False))
-    session.jobs.experiment = None
-    assert found['experiment']['accuracy'] == [{'std_before': None}]
-    names = [one['name'] for one in found['effects']]
-    assert names == [one.name for one in session.ticks.fits.candidates()]
-    assert {'payload_mass', 'joint_friction', 'coulomb_friction', 'time_delay'} <= set(names)
-    assert found['errors']['lift_1']['now'] < found['errors']['lift_1']['before']
-
-
 def test_an_effect_is_adopted_refused_exported_and_taken_back(tmp_path: Path) -> None:
     recording, other = (write_hidden(tmp_path / f'{seed}.csv', seed, 6.0) for seed in (1, 2))
     session = Session.open([recording], validation=[other])
@@ -231,12 +195,6 @@ def test_an_effect_is_adopted_refused_exported_and_taken_back(tmp_path: Path) ->
         assert error.before == pytest.approx(found['drives'][name]['rms'], rel=5e-5)
     session.ticks.back()
     assert dict(session.ticks.model.values) == given
-
-
-def short_session(folder: Path) -> tuple[Session, Path]:
-    """Return a session of one recording, and another recording."""
-    return (Session.open([write_hidden(folder / 'one.csv', 1, 4.0)]),
-            write_hidden(folder / 'two.csv', 2, 4.0))
 
 
 def test_a_recording_may_be_given_once(recording: Path, tmp_path: Path) -> None:
@@ -304,22 +262,6 @@ def test_the_session_imports_neither_ros_nor_a_server() -> None:
     assert not set(loaded) & {'rclpy', 'starlette', 'uvicorn', 'plotly', 'rich', 'matplotlib'}
 
 
-@pytest.mark.slow
-def test_the_notebook_runs_as_it_stands(capsys: pytest.CaptureFixture[str]) -> None:
-    file = Path(__file__).parents[2] / 'docs' / 'workbench_session.ipynb'
-    notebook = json.loads(file.read_text())
-    assert notebook['nbformat'] == 4
-    names: dict[str, Any] = {'__name__': '__main__'}
-    for cell in notebook['cells']:
-        if cell['cell_type'] == 'code':
-            exec(compile(''.join(cell['source']), cell['id'], 'exec'), names)
-    said = capsys.readouterr().out
-    assert 'adopted - the error on held-out blocks' in said
-    assert said.endswith("['payload_mass']\n[]\n")
-    costs = names['costs']
-    assert costs[0] > costs[4] < costs[-1]
-
-
 def ticked(session: Session) -> dict[str, Any]:
     return {name: (one.best.drives, dict(one.chosen))
             for name, one in session.ticks.view.ticks.items()}
@@ -349,98 +291,6 @@ def test_ticks_and_values_are_taken_back_and_done_again(session: Session) -> Non
     session.ticks.back()
     session.ticks.tick('effort_offset')
     assert not session.ticks.redoes
-
-
-def test_an_adoption_is_taken_back_and_done_again_with_its_ledger(tmp_path: Path) -> None:
-    session, _ = short_session(tmp_path)
-    given = session.ticks.model
-    session.ticks.tick('coulomb_friction')
-    assert session.jobs.adopt('payload_mass', force=True).result(300).adopted
-    adopted = session.ticks.model
-    assert session.ticks.undoes == 'payload_mass adopted'
-    session.ticks.back()
-    assert session.ticks.model is given
-    assert steps_of(session) == []
-    assert set(session.ticks.view.ticks) == {'coulomb_friction'}
-    session.ticks.forward()
-    assert session.ticks.model is adopted
-    assert steps_of(session) == ['payload_mass']
-
-
-def test_a_recording_is_let_go_of(tmp_path: Path) -> None:
-    session, other = short_session(tmp_path)
-    with pytest.raises(PprsError, match='at least one'):
-        session.recordings.remove(session.to_dict()['recordings'][0]['key'])
-    alone = session.ticks.fits.before
-    session.recordings.add(other)
-    session.ticks.tick('payload_mass')
-    with pytest.raises(PprsError, match='no recording nothing'):
-        session.recordings.remove('nothing')
-    session.recordings.remove(str(other))
-    np.testing.assert_array_equal(session.ticks.fits.before, alone)
-    assert set(session.ticks.view.ticks) == {'payload_mass'}
-    session.recordings.add(other, is_held_out=True)
-    fits = session.ticks.fits
-    session.recordings.remove(str(other))
-    assert session.to_dict()['held_out'] == []
-    assert session.ticks.fits is fits
-
-
-def test_a_scatter_of_a_long_recording_keeps_every_peak() -> None:
-    x = np.linspace(0.0, 1.0, 100_003)
-    y = np.random.default_rng(0).normal(0.0, 1.0, len(x))
-    peaks = [12_345, 77_777]
-    y[peaks] = 40.0, -40.0
-    at = drawn_samples(x, y)
-    assert set(peaks) < set(at.tolist())
-    assert len(at) <= MOST_POINTS
-    # As dense everywhere as all of them.
-    share, _ = np.histogram(x[at], 20, (0.0, 1.0))
-    assert share.min() > 0.95 * share.max()
-    assert drawn_samples(x[:500], y[:500]).tolist() == list(range(500))
-
-
-@pytest.mark.slow
-def test_a_reference_stays_when_a_recording_goes(tmp_path: Path) -> None:
-    healthy, run, other = (write_hidden(tmp_path / f'{seed}.csv', seed, hidden={
-        'effects.active': ['coulomb_friction'], 'effects.coulomb_friction.lift_2.force': 0.2})
-        for seed in (1, 2, 3))
-    alone = Session.of(Inputs.of('config/paper.yaml', run).since([healthy])).ticks.fits.before
-    # What was there in the reference, too, is no error.
-    without = Session.open([run]).ticks.fits.before
-    assert root_mean_square(alone[:, 4]) < 0.8 * root_mean_square(without[:, 4])
-    session = Session.of(Inputs.of('config/paper.yaml', [run, other]).since([healthy]))
-    session.recordings.remove(str(other))
-    np.testing.assert_allclose(session.ticks.fits.before, alone, atol=1e-9)
-
-
-@pytest.mark.slow
-def test_a_session_says_since_when(tmp_path: Path) -> None:
-    """Of an arm with drag that was always there: only the dry friction has changed."""
-    moved = arm.motion(12.0, seed=0)
-    model = DriveModel.load(arm.write_arm(tmp_path, **{
-        key.replace('.', '__'): list(value) for key, value in arm.FRICTION.items()}))
-
-    def write(name: str, seed: int, force: float = 0.0) -> Path:
-        clean = arm.record(model, moved, 0.05, seed)
-        effort = clean.effort + np.tanh(3 * np.sin(4 * moved.position))
-        effort[:, 1] += force * np.tanh(moved.velocity[:, 1] / 0.002)
-        write_recording(tmp_path / name, Recording.from_arrays(
-            name, clean.time, clean.position, clean.velocity, effort, clean.drives))
-        return tmp_path / name
-
-    healthy, later = write('healthy.csv', 1), write('later.csv', 2, 0.6)
-    session = Session.open([later], tmp_path / 'arm.yaml', reference=[healthy])
-    said = session.to_dict()['reference']
-    assert said['recordings'] == ['healthy.csv']
-    assert 'a fault that was already in the reference cannot be seen' in said['text']
-    assert said['explained']['turn'] > 0.9
-    assert session.jobs.diagnose().result(120).verdict == 'effect'
-    called_for = [one['name'] for one in session.to_dict()['effects'] if one['is_called_for']]
-    assert called_for == ['coulomb_friction']
-    with pytest.raises(UnreadableFileError, match='another run'):
-        session.recordings.add(healthy)
-    assert Session.open([later], tmp_path / 'arm.yaml').to_dict()['reference'] is None
 
 
 class TestASavedSession:
@@ -485,22 +335,3 @@ class TestASavedSession:
         change(run, file)
         with pytest.raises(PprsError, match=said):
             SavedSession.read(file)
-
-    def test_has_effects_of_the_catalogue(self, session: Session, tmp_path: Path) -> None:
-        ticks = session.ticks
-        saved = SavedSession(ticks.inputs, ticks.model, (SavedTick('payload', None, {}),))
-        with pytest.raises(PprsError, match="unknown effect 'payload'"):
-            session.resume(saved)
-
-    def test_is_not_written_of_what_is_in_no_file(self, recording: Path, tmp_path: Path) -> None:
-        session = Session(DriveModel.load('config/paper.yaml'), {'run': read_recording(recording)})
-        with pytest.raises(SessionError, match='recording run is in no file'):
-            session.save(tmp_path / 'session.json')
-        assert not (tmp_path / 'session.json').exists()
-
-    def test_is_opened_alone(self, session: Session, recording: Path, tmp_path: Path,
-                             capsys: pytest.CaptureFixture[str]) -> None:
-        file = tmp_path / 'session.json'
-        session.save(file)
-        assert main(['workbench', str(file), str(recording), '--no-browser']) == 2
-        assert 'is a session, must be given alone' in capsys.readouterr().err

@@ -5,15 +5,12 @@
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
 import sys
 from pathlib import Path
-from shutil import copy
 
 import pytest
-import yaml
 from documents import PROJECT
 
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
@@ -65,22 +62,3 @@ def test_the_api_has_a_page_for_each_folder(generated: Path) -> None:
                if file.stem != '__init__' and file.parent != PROJECT / 'pprs_dynamics'}
     names = {'.'.join(folder.relative_to(PROJECT / 'pprs_dynamics').parts) for folder in folders}
     assert {file.stem for file in (generated / 'api').glob('[a-z]*.md')} == names
-
-
-def test_rosdoc2_builds_this_site() -> None:
-    assert '<rosdoc2>rosdoc2.yaml</rosdoc2>' in (PROJECT / 'package.xml').read_text()
-    head, config = yaml.safe_load_all((PROJECT / 'rosdoc2.yaml').read_text())
-    assert head == {'type': 'rosdoc2 config', 'version': 1}
-    (builder,) = config['builders']
-    assert (PROJECT / builder['sphinx']['sphinx_sourcedir'] / 'conf.py').is_file()
-
-
-def test_a_copy_of_the_pages_that_stands_elsewhere_is_configured_too(tmp_path: Path) -> None:
-    """As rosdoc2 does, which reads Markdown itself where it is not told that we do."""
-    for file in (PROJECT / 'docs').glob('*.py'):
-        copy(file, tmp_path)
-    code = "import runpy; print(runpy.run_path('conf.py')['rosdoc2_settings'])"
-    found = subprocess.run([sys.executable, '-c', code], cwd=tmp_path, capture_output=True,
-                           text=True, env={**os.environ, 'PYTHONPATH': str(PROJECT)})
-    assert found.returncode == 0, found.stderr
-    assert yaml.safe_load(found.stdout)['support_markdown'] is False

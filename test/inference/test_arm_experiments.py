@@ -130,12 +130,3 @@ def test_a_motion_is_designed_that_tells_rivals_apart(
                              read_recording(second, model.drives)])
     assert [one.name for one in found.effects] == ['viscous_friction']
     assert found.indistinguishable == ()
-
-
-def test_a_purpose_that_reads_recordings_asks_for_them(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str],
-) -> None:
-    path = str(arm.write_arm(tmp_path))
-    assert main(['next-experiment', '--model', path,
-                 '--output', str(tmp_path / 'next.csv')]) == 2
-    assert 'no recording is given' in capsys.readouterr().err

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import gzip
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import made_up_arm as arm
@@ -20,7 +19,7 @@ from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.fit.arm_fit import columns_of, fit_arm
 from pprs_dynamics.inference.fit.base_fit import fit_base, refit_base
-from pprs_dynamics.inference.fit.bodies import Bodies, pseudo_inertia
+from pprs_dynamics.inference.fit.bodies import pseudo_inertia
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 from pprs_dynamics.measurement.motion.rests import find_rests
@@ -100,36 +99,11 @@ def test_what_does_not_move_stays_and_is_told(tmp_path: Path) -> None:
     assert any('reach hardly moves' in sentence for sentence in fit.told)
 
 
-def test_a_joint_stands_however_sharply_another_ones_friction_turns_over(tmp_path: Path) -> None:
-    # Its noise is motion to the narrow width that is fitted to the others, and would be its only.
-    model = DriveModel.load(arm.write_arm(tmp_path, friction__reversal_velocity=0.01))
-    sharp = DriveModel.from_parameters({**model.values, **arm.FRICTION,
-                         'friction.reversal_velocities': (1e-4, 1e-4, 1e-4)}, model.source)
-    moved = arm.motion()
-    still = JointMotion(*(values * [1, 1, 0] for values in (
-        moved.position, moved.velocity, moved.acceleration)), moved.time)
-    recording = arm.record(sharp, still, NOISE)
-    recording.position[:, 2] += 2e-4 * np.random.default_rng(1).normal(size=len(recording.time))
-    fit = fit_base(model, [replace(recording, velocity=None)])
-    assert set(fit.before) == set(fit.after) == set(fit.held_out) == {'turn', 'swing'}
-    assert fit.after['turn'] < 0.2 * fit.before['turn']
-    assert any('reach hardly moves' in sentence for sentence in fit.told)
-    before, after = (measure_residuals(one, [recording])[0] for one in (model, fit.model))
-    assert np.array_equal(np.isfinite(before.error), np.isfinite(after.error))
-
-
 def test_fitted_links_are_bodies(tmp_path: Path) -> None:
     described = DriveModel.load(arm.write_arm(tmp_path))
     fit = fit_base(described, [arm.record(heavier(tmp_path), arm.motion(20.0), 5.0)])
     for link in fit.model.robot.inertial:
         assert np.linalg.eigvalsh(pseudo_inertia(link)).min() > -1e-6
-
-
-def test_points_of_bodies_begin_at_the_description(tmp_path: Path) -> None:
-    described = DriveModel.load(arm.write_arm(tmp_path)).robot.inertial
-    bodies = Bodies(described)
-    assert bodies.inertial(np.zeros(len(bodies))) == pytest.approx(described, rel=1e-9, abs=1e-12)
-    assert np.all(bodies.distance(np.zeros(len(bodies))) == 0)
 
 
 def test_tolerances_of_other_models_are_fitted(tmp_path: Path) -> None:
@@ -168,11 +142,10 @@ def write_currents(folder: Path, model: DriveModel, gain: tuple[float, ...], nam
     return path
 
 
-@pytest.mark.parametrize('name', ['run.csv', 'run.csv.gz'])
-def test_currents_times_gains_are_efforts(tmp_path: Path, name: str) -> None:
+def test_currents_times_gains_are_efforts(tmp_path: Path) -> None:
     gain = (10.0, 4.0, 30.0)
     model = arm.real_arm(tmp_path, **{'robot.gain': gain})
-    path = write_currents(tmp_path, model, gain, name)
+    path = write_currents(tmp_path, model, gain, 'run.csv.gz')
     run = read_recording(path, model.recorded)
     assert run.effort == pytest.approx(arm.record(model, arm.motion(20.0), NOISE).effort)
     error = measure_residuals(model, [run])[0].error
@@ -195,14 +168,6 @@ def test_a_gain_within_its_tolerance_is_calibrated_and_leaves_the_payload_alone(
     assert found.verdict == 'adequate'
     after = {one.label: one.after for one in found.calibrated}
     assert after['robot.gain[2]'] == pytest.approx(4.0, rel=0.01)
-
-
-def test_a_bag_in_amperes_is_multiplied_where_the_model_says_so(tmp_path: Path) -> None:
-    model = arm.real_arm(tmp_path, **{'robot.gain': (2.0, 2.0, 2.0), 'robot.effort_unit': 'A'})
-    run = arm.record(model, arm.motion(5.0), 0.0)
-    write_recording(tmp_path / 'bag.mcap', run)
-    read = read_recording(tmp_path / 'bag.mcap', model.recorded)
-    assert read.effort == pytest.approx(2 * run.effort)
 
 
 def test_a_joint_that_stands_does_not_count(tmp_path: Path) -> None:
@@ -228,40 +193,6 @@ def test_a_hidden_payload_is_named_alone_and_its_mass_is_right(tmp_path: Path) -
     mass = found.effects[0].parameters['mass']
     assert mass.value == pytest.approx(1.2, abs=3 * mass.std)
     assert mass.unit == 'kg'
-
-
-def test_friction_on_a_turning_joint_has_its_units(tmp_path: Path) -> None:
-    real = arm.real_arm(tmp_path)
-    without = list(arm.FRICTION['friction.viscous'])
-    without[1] = 0.0
-    given = DriveModel.from_parameters(
-        {**real.values, 'friction.viscous': tuple(without)}, real.source)
-    found = diagnose(given, [arm.record(real, arm.motion(), NOISE)])
-    assert found.effects[0].name == 'viscous_friction'
-    assert found.effects[0].drives == ('swing',)
-    (value,) = found.effects[0].parameters.values()
-    assert value.value == pytest.approx(5.0, rel=0.05)
-    assert value.unit == 'N m s/rad'
-
-
-def test_commands_speak_of_torques(tmp_path: Path, capsys: pytest.CaptureFixture[str],
-                                   monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv('COLUMNS', '200')
-    real = arm.real_arm(tmp_path)
-    write_recording(tmp_path / 'run.csv', arm.record(real, arm.motion(15.0), NOISE))
-    model, run = str(tmp_path / 'arm.yaml'), str(tmp_path / 'run.csv')
-    assert main(['info', run, '--model', model]) == 0
-    said = capsys.readouterr().out
-    assert 'position [rad]' in said
-    assert 'effort [N m]' in said
-    assert 'effort [N]' in said  # of the prismatic joint
-    base = str(tmp_path / 'base.yaml')
-    assert main(['fit', run, '--model', model, '--output', base, '--details']) == 0
-    said = capsys.readouterr().out
-    assert 'N m s/rad' in said
-    assert 'held out' in said
-    assert main(['compare', run, '--model', base, '--json', str(tmp_path / 'c.json')]) == 0
-    assert 'all of it noise' in ' '.join(capsys.readouterr().out.split())
 
 
 def test_a_fault_in_the_run_that_is_fitted_is_hidden_by_the_fit_which_is_said(

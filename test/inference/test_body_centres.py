@@ -15,10 +15,6 @@ import pytest
 from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.body_centres import find_centre
-from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
-from pprs_dynamics.inference.search.decisions import DECISIONS
-from pprs_dynamics.inference.search.estimates import estimate
-from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.effects.laws.link_mass import LinkMass
 from pprs_dynamics.physics.mechanism.description import body_at
 
@@ -62,15 +58,3 @@ def test_the_centre_is_found_from_the_error(tmp_path: Path) -> None:
     found = find_centre(term, f'{prefix}mass', design.residuals.error,
                         dict.fromkeys(range(3), 1.0), design.given)
     assert found == pytest.approx(away, abs=0.02)
-
-
-def test_a_mass_that_no_motion_decides_is_one_that_the_robot_could_carry(tmp_path: Path) -> None:
-    """A body on a column that turns about the vertical shows by its inertia about that alone."""
-    real = arm.real_arm(tmp_path)
-    kind = real.bound(LinkMass)
-    body = next(names for names in kind.variants if len(names) == 4 and names[0] == 'column.mass')
-    candidate = EffectCandidate.of([Component.of(kind, None, {}, body)])
-    fits = FittedSets(Design.of(real, [arm.record(real, arm.motion(20.0), 0.01)]), DECISIONS)
-    found = fits.evaluate((candidate,))
-    mass = estimate(fits, found, candidate).parameters['column.mass']
-    assert abs(mass.value) < mass.std < 1.01 * real.robot.masses.sum()

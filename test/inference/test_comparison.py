@@ -5,20 +5,16 @@
 
 from __future__ import annotations
 
-import io
 import json
 import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up_diagnosis import NOISE, made_up_residuals, statement
-from rich.console import Console
 from scipy.signal import lfilter
 
-from pprs_dynamics.app.report.comparison_report import comparison_view
 from pprs_dynamics.inference.diagnosis.comparison import compare
-from pprs_dynamics.inference.diagnosis.localisation import DriveFindings, Localisation, localise
+from pprs_dynamics.inference.diagnosis.localisation import Localisation, localise
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.inference.residuals.profiles import error_profile, error_spectrum
@@ -96,14 +92,6 @@ def test_a_constant_effort_has_no_relative_error_and_raises_no_warning() -> None
     assert 'constant' in found.drives['drive_0'].verdict
 
 
-def test_a_model_without_error_leaves_nothing() -> None:
-    effort = np.sin(np.arange(400) / 30)[:, None]
-    found = compare(recording(np.zeros((400, 1)), effort))
-    assert found.rms == 0
-    assert found.drives['drive_0'].grade == 'noise'
-    assert 'negligible' in found.drives['drive_0'].verdict
-
-
 def test_noise_is_called_noise_and_an_error_beyond_it_is_not() -> None:
     rng = np.random.default_rng(6)
     time = PERIOD * np.arange(3000)
@@ -161,19 +149,6 @@ def test_arrays_that_do_not_fit_are_refused_in_one_sentence() -> None:
             replace(right, **change)
 
 
-def test_a_vibration_on_one_drive_is_told_and_no_noise() -> None:
-    rng = np.random.default_rng(15)
-    time = PERIOD * np.arange(4000)
-    error = 0.05 * rng.normal(size=(4000, 6))
-    error[:, 3] += 0.9 * np.sin(2 * np.pi * 6.1 * time)
-    found = compare(recording(error, 3 * np.sin(0.7 * time)[:, None] * np.ones(6)),
-                    floors={f'drive_{k}': 0.05 for k in range(6)})
-    assert [(one.drive, one.variable) for one in found.localisation.statements] == [
-        ('drive_3', 'frequency')]
-    assert found.drives['drive_3'].grade == 'poor'
-    assert 'all of it noise' not in found.verdict
-
-
 def test_a_drive_that_drifts_far_more_than_its_peers_is_told() -> None:
     rng = np.random.default_rng(16)
     error = 0.05 * rng.normal(size=(4000, 6))
@@ -182,47 +157,3 @@ def test_a_drive_that_drifts_far_more_than_its_peers_is_told() -> None:
     assert ('drive_2', 'time') in [(one.drive, one.variable)
                                    for one in found.localisation.statements]
     assert found.drives['drive_2'].grade != 'noise'
-
-
-@pytest.mark.parametrize(('share', 'is_noise'), [(0.5, False), (0.05, True), (0.001, True)])
-def test_what_a_statement_explains_is_never_put_down_to_noise(
-    share: float, is_noise: bool,
-) -> None:
-    residuals = made_up_residuals()
-    error = residuals.error[:, 1]
-    told = replace(statement('slide_2'), mean_square=share * float(np.mean(error ** 2)))
-    where = Localisation((told,), {name: DriveFindings((told,) if name == 'slide_2' else (), None)
-                                   for name in residuals.drives})
-    # A noise that would account for all of the error.
-    found = compare(residuals, where, dict.fromkeys(residuals.drives, NOISE))
-    drive = found.drives['slide_2']
-    assert found.where == ((told,) if share >= 0.01 else ())
-    assert ('except on slide_2' in found.verdict) is (is_noise and bool(found.where))
-    assert (drive.grade == 'noise') is is_noise
-
-
-@pytest.mark.parametrize('count', [0, 1, 12])
-def test_verdict_places_and_next_step_fit_25_lines_of_80_columns(count: int) -> None:
-    residuals = made_up_residuals()
-    long = ('{}: 62% of its squared error lies at a position of slide_3 between -25.1 and 42.6 mm, '
-            'in 82% of the time; it is shifted there by +0.0844 N in the direction of motion')
-    told = tuple(replace(statement(name), text=long.format(name), mean_square=0.5 * NOISE ** 2)
-                 for name in (*residuals.drives, *residuals.drives))[:count]
-    found = compare(residuals, Localisation(told, {
-        name: DriveFindings(tuple(one for one in told if one.drive == name), None)
-        for name in residuals.drives}), dict.fromkeys(residuals.drives, NOISE))
-    command = 'pprs diagnose a_recording_with_a_long_name.mcap --model robot.yaml --report why.html'
-
-    def printed(details: bool) -> list[str]:
-        screen = Console(width=80, file=io.StringIO())
-        screen.print(comparison_view(found, ('Find out why', command), details))
-        assert isinstance(screen.file, io.StringIO)
-        return screen.file.getvalue().splitlines()
-
-    short, whole = printed(False), printed(True)
-    # The command adds a finding of a recording and the name of the page.
-    assert len(short) <= 25 - 2
-    assert max(map(len, [*short, *whole])) <= 80
-    assert ('Next' in ' '.join(short)) is (count > 0)
-    assert ('--details' in ' '.join(short)) is (count == 12)
-    assert all(one.text in ' '.join(' '.join(whole).split()) for one in found.where)

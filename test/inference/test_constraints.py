@@ -8,9 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from made_up_arm import real_arm
-from single_axis import axis_motion
 
-from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.constrained import (
     Inequalities,
@@ -18,15 +16,11 @@ from pprs_dynamics.inference.regression.constrained import (
     constrained,
     nearest,
 )
-from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.inference.search.body_centres import REACH
-from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
+from pprs_dynamics.inference.search.candidates import Component
 from pprs_dynamics.inference.search.constraints import DOUBTED, body_planes
-from pprs_dynamics.inference.search.decisions import DECISIONS
-from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.description import pseudo_inertia
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
@@ -213,34 +207,3 @@ def test_a_body_of_which_the_fit_says_nothing_is_any(robot: Mechanism) -> None:
 
 
 # Totals of a drive.
-
-MODEL = DriveModel.load('config/single_axis.yaml')
-TIME = np.arange(0, 8, 0.005)
-
-
-@pytest.mark.parametrize('inertia', [-1.2, -1.6])
-def test_no_total_of_a_drive_is_negative_when_one_constraint_moves_another(inertia: float) -> None:
-    """Less inertia than none moves the frictions; all are within their bounds afterwards."""
-    moved = axis_motion(TIME)
-    exact = DriveModel.from_parameters({**MODEL.values, **dict.fromkeys(
-        (f'tolerances.{key}' for key in ('links.mass', 'friction.viscous', 'friction.coulomb')),
-        1e-6)})
-    effort = exact.drive_forces(moved).total + MODEL.values['links.mass'][0] * inertia * (
-        moved.acceleration) - 0.99 * MODEL.values['friction.viscous'][0] * moved.velocity
-    effort += np.random.default_rng(5).normal(0, 1.0, effort.shape)
-    design = Design.of(exact, [Recording.from_arrays('run', TIME, moved.position, None, effort,
-                                                     ('axis',))])
-    fits = FittedSets(design, DECISIONS)
-    kinds = ('drive_inertia', 'viscous_friction', 'asymmetric_friction')
-    components = [Component.of(CATALOGUE[kind], 0, {}, max(CATALOGUE[kind].variants, key=len))
-                  for kind in kinds]
-    found = fits.evaluate(tuple(EffectCandidate.of([one]) for one in components))
-    assert found.terms.feasibility > 0
-    mass, viscous, more = (dict(zip(one.names, found.coefficients(one), strict=True))
-                           for one in components)
-    values, tiny = exact.values, 1e-6
-    assert values['links.mass'][0] + mass['mass'] > -tiny
-    for way in ('forward', 'backward'):
-        assert (values['friction.viscous'][0] + viscous['coefficient']
-                + more[f'viscous_{way}']) > -tiny
-        assert values['friction.coulomb'][0] + more[f'force_{way}'] > -tiny

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -14,13 +13,11 @@ from typing import Any
 import made_up_arm as arm
 import numpy as np
 import pytest
-import yaml
 from pprs_command import pprs
 from shared_cases import shared_case
 
 from benchmarks.hidden import recordings
 from pprs_dynamics import DriveModel, JointMotion
-from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.readings.check import find_mistakes
@@ -30,12 +27,12 @@ from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath
 from pprs_dynamics.simulation.injection import NOT_IN_CATALOGUE, Choice
 
-ROOT = Path(__file__).parents[2]
-DOCS = ROOT / 'docs'
 MODEL = DriveModel.load()
 AXIS = DriveModel.load('config/single_axis.yaml')
 RATE, DURATION = 250.0, 10.0
 NOISE = 0.05  # [N]
+# Effects most like another unit or sign; the others are slow tests.
+OFTEN = 'effort_gain', 'homing_error', 'time_delay', 'vibration'
 Arrays = tuple[Array, Array, Array, Array]
 
 
@@ -87,35 +84,20 @@ def backwards(a: Arrays) -> Arrays:
 MINUS, TIMES = 'looks like minus what the model says', 'times what the model says'
 MISTAKES: dict[str, tuple[Callable[[Arrays], Arrays], list[str]]] = {
     'kN': (scaled(effort=1e-3), [f'effort of all drives looks like 0.001 {TIMES}, as if .* kN']),
-    'mN': (scaled(effort=1e3), [f'effort of all drives looks like 1000 {TIMES}, as if .* mN']),
     'sign': (scaled(effort=-1.0), [f'effort of all drives {MINUS}']),
-    'kN, sign': (scaled(effort=-1e-3), [f'effort of all drives looks like -0.001 {TIMES}']),
-    'sign of slides': (scaled(effort=[-1, -1, -1, 1, 1, 1]), [f'effort of the slides {MINUS}']),
     'sign of a slide': (scaled(effort=[1, -1, 1, 1, 1, 1]), [f'effort of slide_2 {MINUS}']),
-    'sign of a lift': (scaled(effort=[1, 1, 1, 1, 1, -1]), [f'effort of lift_3 {MINUS}']),
     'a lift in kN': (scaled(effort=[1, 1, 1, 1e-3, 1, 1]), [f'of lift_1 looks like 0.001 {TIMES}']),
     'ms': (scaled(time=1e3), ['times look like milliseconds: .* 1000 times too slow']),
-    'us': (scaled(time=1e6), ['times look like microseconds']),
-    'ns': (scaled(time=1e9), ['times look like nanoseconds']),
     'mm': (scaled(motion=1e3), ['positions of all drives look like millimetres']),
-    'cm': (scaled(motion=1e2), ['positions of all drives look like centimetres']),
     'lifts in mm': (scaled(motion=[1, 1, 1, 1e3, 1e3, 1e3]), ['positions of the lifts .*milli']),
-    'a slide in mm': (scaled(motion=[1, 1e3, 1, 1, 1, 1]), ['position of slide_2 .* millimetres']),
     'negated': (scaled(motion=-1.0), ['positions of all drives look negated']),
-    'slides negated': (scaled(motion=[-1, -1, -1, 1, 1, 1]), ['positions of the slides .*negated']),
-    'lifts negated': (scaled(motion=[1, 1, 1, -1, -1, -1]), ['positions of the lifts .* negated']),
     'a slide negated': (scaled(motion=[1, 1, -1, 1, 1, 1]), ['position of slide_3 looks negated']),
     'a slide counts the other way': (
         scaled(motion=[-1, 1, 1, 1, 1, 1], effort=[-1, 1, 1, 1, 1, 1]),
         ['position of slide_1 looks negated', f'effort of slide_1 {MINUS}']),
     'lifts for slides': (ordered(3, 4, 5, 0, 1, 2), ['another order: .*slide_1 like lift_1']),
-    'chain by chain': (ordered(0, 3, 1, 4, 2, 5), ['another order: .*slide_2 like lift_1']),
-    'last to first': (ordered(5, 4, 3, 2, 1, 0), ['drives look recorded in another order']),
-    'slides in another order': (ordered(1, 0, 2, 3, 4, 5), ['slide_2 like slide_1']),
     'backwards': (backwards, ['played backwards: friction drives the motion']),
-    'mm and ms': (scaled(time=1e3, motion=1e3), ['times look like milli', 'look like millimetres']),
-    'mm and kN': (scaled(motion=1e3, effort=1e-3), ['look like millimetres', 'as if .* kN']),
-    'ms and sign': (scaled(time=1e3, effort=-1.0), ['look like milliseconds', MINUS])}
+    'mm and kN': (scaled(motion=1e3, effort=1e-3), ['look like millimetres', 'as if .* kN'])}
 
 
 def expect(found: list[str], patterns: list[str]) -> None:
@@ -130,7 +112,7 @@ def test_a_mistake_is_said_in_one_sentence_each(mistake: str) -> None:
     expect(told(change(robot())), patterns)
 
 
-@pytest.mark.parametrize('mistake', ['kN', 'sign', 'ms', 'mm', 'negated', 'lifts for slides'])
+@pytest.mark.parametrize('mistake', ['kN', 'lifts for slides'])
 def test_a_mistake_is_recognised_where_the_model_lacks_an_effect(mistake: str) -> None:
     lacking = DriveModel.from_parameters({**MODEL.values, 'masses.payload': 1.3, 'effects.active': [
         'viscous_friction'], 'effects.viscous_friction.slide_2.coefficient': 5.0})
@@ -139,16 +121,17 @@ def test_a_mistake_is_recognised_where_the_model_lacks_an_effect(mistake: str) -
 
 
 @pytest.mark.parametrize('path', ['excitation', 'helix'])
-@pytest.mark.parametrize('seed', range(3))
-def test_nothing_is_said_of_what_is_right(seed: int, path: str) -> None:
-    time, position, velocity, effort = robot(seed=seed, path=path)
+def test_nothing_is_said_of_what_is_right(path: str) -> None:
+    time, position, velocity, effort = robot(path=path)
     assert told((time, position, velocity, effort)) == []
     assert told((time + 1.7e9, position, velocity, effort)) == []
     bare = Recording.from_arrays('bare', time, position)
     assert find_mistakes(MODEL, bare) == ()
 
 
-@pytest.mark.parametrize('name', [*recordings.IN_CATALOGUE, *NOT_IN_CATALOGUE])
+@pytest.mark.parametrize('name', [
+    name if name in OFTEN else pytest.param(name, marks=pytest.mark.slow)
+    for name in (*recordings.IN_CATALOGUE, *NOT_IN_CATALOGUE)])
 def test_no_hidden_effect_is_called_a_mistake(name: str) -> None:
     place = recordings.scene(11, 0.0, 6.0)
     run = place.inject([Choice(name, np.random.default_rng(4))])
@@ -159,13 +142,7 @@ def test_no_hidden_effect_is_called_a_mistake(name: str) -> None:
     assert found == ()
 
 
-@pytest.mark.parametrize('gain', [0.15, 5.0])
-def test_a_factor_that_no_masses_explain_is_a_drive_constant(gain: float) -> None:
-    time, position, velocity, effort = robot()
-    expect(told((time, position, velocity, effort * gain)), ['looks like currents in amperes'])
-
-
-@pytest.mark.parametrize('gain', [0.15, 0.5, 2.0, 8.0])
+@pytest.mark.parametrize('gain', [0.5, 8.0])
 def test_a_gain_that_the_catalogue_knows_is_no_unit(gain: float) -> None:
     time, position, velocity, effort = robot()
     if 1 / 3 < gain < 3:
@@ -173,7 +150,7 @@ def test_a_gain_that_the_catalogue_knows_is_no_unit(gain: float) -> None:
     assert told((time, position, velocity, effort * [1, 1, gain, 1, gain, 1])) == []
 
 
-@pytest.mark.parametrize('offset', [0.005, -0.03])
+@pytest.mark.parametrize('offset', [-0.03])
 def test_a_zero_that_is_off_is_no_mistake_of_units(offset: float) -> None:
     time, position, velocity, effort = robot()
     assert told((time, position + np.eye(6)[0] * offset, velocity, effort)) == []
@@ -217,20 +194,6 @@ def test_velocities_that_are_not_the_derivative_are_told(factor: float, word: st
            [f'velocity of all drives is {word} the derivative of the position'])
     velocity[:, 3:] *= factor
     expect(told((time, position, velocity, effort)), [f'velocity of the lifts is {word}'])
-
-
-AXIS_MISTAKES: dict[str, tuple[Callable[[Arrays], Arrays], list[str]]] = {
-    'right': (scaled(), []), 'kN': (scaled(effort=1e-3), ['of axis looks like 0.001 times']),
-    'sign': (scaled(effort=-1.0), [r'of axis looks like minus .* \(or its position is negated\)']),
-    'ms': (scaled(time=1e3), ['milliseconds']), 'mm': (scaled(motion=1e3), ['millimetres']),
-    'backwards': (backwards, ['backwards'])}
-
-
-@pytest.mark.parametrize('mistake', AXIS_MISTAKES)
-def test_a_single_axis_tells_the_same(mistake: str) -> None:
-    change, patterns = AXIS_MISTAKES[mistake]
-    found = find_mistakes(AXIS, recording(change(axis()), ('axis',)))
-    expect([finding.what for finding in found], patterns)
 
 
 def test_a_real_drive_is_called_right() -> None:
@@ -326,42 +289,6 @@ def test_efforts_in_percent_of_the_largest_are_told(tmp_path: Path) -> None:
         'reach: {effort_scale: 0.3}}')
 
 
-def test_beside_columns_the_line_that_is_told_is_added_to_theirs(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str],
-) -> None:
-    columns = {joint: {'position': f'{joint}/position', 'effort': f'{joint}/effort'}
-               for joint in arm.JOINTS}
-    path = arm.write_arm(tmp_path)
-    plain = path.read_text()
-
-    def with_columns(more: dict[str, dict[str, float]]) -> None:
-        block = json.dumps({joint: {**one, **more.get(joint, {})}
-                            for joint, one in columns.items()})
-        path.write_text(f'{plain}    columns: {block}\n')
-
-    write_recording(tmp_path / 'run.csv', arm_recording(DriveModel.load(path), effort=-1.0))
-    with_columns({})
-    assert main(['info', str(tmp_path / 'run.csv'), '--model', str(path)]) == 0
-    told = ' '.join(capsys.readouterr().out.split())
-    _, _, entries = told.partition('under columns, beside what stands there: ')
-    with_columns(yaml.safe_load(f'{{{entries}}}'))
-    assert main(['info', str(tmp_path / 'run.csv'), '--model', str(path)]) == 0
-    assert 'looks like' not in capsys.readouterr().out
-
-
-def test_a_joint_that_stands_is_no_reason_to_doubt_a_unit(tmp_path: Path) -> None:
-    """The constant effort of a standing joint is most alike where nothing moves at all."""
-    def standing(a: Arrays) -> Arrays:
-        position, velocity, effort = a[1].copy(), a[2].copy(), a[3].copy()
-        position[:, 1], velocity[:, 1] = 0.1, 0.0
-        effort[:, 1] += 40.0
-        return a[0], position, velocity, effort
-
-    model = DriveModel.load(arm.write_arm(tmp_path))
-    assert [one for one in find_mistakes(model, arm_recording(model, changes=standing))
-            if isinstance(one, OtherReading)] == []
-
-
 OTHERS = {  # folder, model, recording: kinds of what is told, and a clause of it
     'sign': ('kuka_sign', 'iiwa_unflipped.yaml', 'dyn.csv.gz', 'effort of all drives .* minus'),
     'sign read': ('kuka_sign', 'iiwa.yaml', 'dyn.csv.gz', ''),
@@ -377,7 +304,7 @@ def test_recordings_of_other_people(case: str) -> None:
     folder, model_file, run, clause = OTHERS[case]
     model, whole = shared_case(folder, model_file, run)
     count = len(whole.time)
-    for part in (slice(0, count), slice(0, count // 2), slice(count // 3, count)):
+    for part in (slice(0, count), slice(count // 3, count)):
         piece = Recording.from_arrays('piece', whole.time[part], whole.position[part], None,
                                       whole.effort[part], model.drives)
         expect([one.what for one in find_mistakes(model, piece)], [clause] * bool(clause))

@@ -68,21 +68,6 @@ def test_what_begins_in_the_middle_is_not_adopted_throughout() -> None:
     assert 'it is there since 4' in answer.reason
 
 
-@pytest.mark.slow
-def test_what_is_there_from_the_first_strokes_on_has_no_beginning() -> None:
-    """Before it the robot has hardly moved, as friction that has not turned over would show."""
-    picked = np.where((TIME > 0.3)[:, None], loaded(0.2), FORCES.total)
-    payload = next(one for one in diagnosed(picked).effects if one.name == 'payload_mass')
-    assert payload.course is None
-    assert payload.parameters['mass'].value == pytest.approx(0.2, abs=0.01)
-
-
-def test_what_is_there_all_the_time_has_no_beginning() -> None:
-    found = diagnosed(loaded(0.2))
-    assert [one.name for one in found.effects] == ['payload_mass']
-    assert found.to_dict()['effects'][0]['since'] is None
-
-
 def test_a_contact_of_some_seconds_is_no_property_of_the_machine() -> None:
     touched = FORCES.total.copy()
     touched[(TIME > 6) & (TIME < 9), 4] += 3.0

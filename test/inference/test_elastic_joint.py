@@ -149,12 +149,6 @@ def test_a_clearance_that_the_second_encoder_tells_is_lost_motion(
     assert number[2] == of
 
 
-def test_a_zero_that_is_off_is_none(tmp_path: Path) -> None:
-    model = made_up_arm.real_arm(tmp_path)
-    found = diagnose(model, [wound_up(model, 0.0, shift=0.02)])
-    assert [(one.name, one.drives) for one in found.effects] == [('homing_error', ('swing',))]
-
-
 def test_without_a_second_encoder_it_is_told_by_the_load(tmp_path: Path) -> None:
     model = made_up_arm.real_arm(tmp_path)
     found = diagnose(model, [wound_up(model, COMPLIANCE, second=False)])

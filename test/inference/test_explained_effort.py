@@ -10,15 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_up_arm import JOINTS, motion, real_arm, record, write_arm
+from made_up_arm import motion, real_arm, record, write_arm
 
 from pprs_dynamics import DriveModel, compare, diagnose, fit
-from pprs_dynamics.inference.diagnosis.next_step import GivenFiles, first_step
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
-from pprs_dynamics.inference.search.explained_effort import explained_shares, little_explained
+from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.model.reference_keys import ReferenceFile, with_reference
 
 UNRELATED = 12.0  # [N m] of an effort that is no force of this machine
 
@@ -32,14 +30,6 @@ def unrelated(model: DriveModel, seed: int = 5) -> Recording:
     effort[:, 0] = np.interp(np.arange(len(made.time)) / 40, np.arange(len(knots)), knots)
     effort[:, 0] += 0.2 * rng.normal(size=len(made.time))  # as measured, not computed
     return replace(made, effort=effort)
-
-
-def test_shares_are_those_of_the_variance(tmp_path: Path) -> None:
-    model = real_arm(tmp_path)
-    residuals, _ = measure_residuals(model, [record(model, motion())])
-    left = residuals.measured * np.array([0.5, 1.0, 2.0])
-    shares = explained_shares(residuals, left + 7.0)
-    assert [shares[name] for name in JOINTS] == pytest.approx([0.75, 0.0, -3.0])
 
 
 def test_compare_says_first_that_a_model_explains_little(tmp_path: Path) -> None:
@@ -82,13 +72,6 @@ def test_a_description_alone_is_fitted_first_and_explains_then(tmp_path: Path) -
     assert compare(fitted.model, made).comparison.little == {}
 
 
-def test_a_fit_that_explains_little_says_so_first(tmp_path: Path) -> None:
-    model = real_arm(tmp_path)
-    found = fit(model, unrelated(model))
-    assert 'turn' in found.fit.little
-    assert str(found).lstrip().startswith('the model explains')
-
-
 @pytest.mark.parametrize('size', [0.0, 0.05])
 def test_a_drive_that_stands_or_whose_effort_is_noise_has_nothing_to_explain(
     tmp_path: Path, size: float,
@@ -106,12 +89,3 @@ def test_a_drive_that_stands_or_whose_effort_is_noise_has_nothing_to_explain(
     assert little_explained(model, still) == {}
     moving = replace(residuals, measured=still.measured)
     assert set(little_explained(model, moving)) == {'turn'}
-
-
-def test_after_a_fit_the_next_step_is_not_the_fit_again(tmp_path: Path) -> None:
-    bare = DriveModel.load(write_arm(tmp_path))
-    assert first_step(bare, GivenFiles())[1].startswith('pprs fit')
-    fitted = DriveModel.from_parameters(
-        with_reference(bare.values, [ReferenceFile(tmp_path / 'run.csv', 'x')]),
-                         bare.source)
-    assert first_step(fitted, GivenFiles())[1].startswith('pprs info')

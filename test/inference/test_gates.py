@@ -5,28 +5,14 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 import pytest
 import scipy.signal
 
-from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.regression.joint_fit import JointFit
-from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.residuals import Residuals, rms, rms_by_drive
-from pprs_dynamics.inference.search.candidates import Component, EffectCandidate
-from pprs_dynamics.inference.search.decisions import Decisions
-from pprs_dynamics.inference.search.form_error import SHAPES, FormErrors
 from pprs_dynamics.inference.search.held_out import BLOCKS, PredictiveGain, predictive_gain
-from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-
-PLAIN = DriveModel.load()
-FRICTION = DriveModel.from_parameters({**PLAIN.values, 'effects.active': ['coulomb_friction'],
-                        'effects.coulomb_friction.lift_2.force': -1.0})
 
 
 def gain(*in_errors: float) -> PredictiveGain:
@@ -159,99 +145,3 @@ def test_a_drive_counts_from_a_hundred_samples_on(samples: int) -> None:
 
 
 # --- lack of fit ----------------------------------------------------------------------------------
-
-
-class Rows:
-    """A regression of one drive with unit noise, whose columns are given: whitened, and known."""
-
-    def __init__(self, parts: dict[str, np.ndarray]) -> None:
-        self.residuals = SimpleNamespace(parts=parts)
-        self.drives = (0,)
-        self.series = {0: SimpleNamespace(transform=lambda force: force,
-                                          sums=lambda values: values.sum(keepdims=True))}
-
-    @staticmethod
-    def weights(_: Any, __: int) -> np.ndarray:
-        return np.ones(1)
-
-    @staticmethod
-    def products(first: Any, others: Any, d: int) -> list[np.ndarray]:
-        return [(first.rows[d] @ one.rows[d].T)[None] for one in others]
-
-
-
-def set_of(**columns: tuple[str, float, float]) -> Any:
-    """Return a set: every column is 10 long, (effect, size of its force, of it its own)."""
-    candidates, blocks, places, coefficients = [], [], {}, []
-    for number, (effect, size, _) in enumerate(columns.values()):
-        block = Block({0: np.array([[10.0]])}, np.zeros((1, 1)))
-        component = Component.of(CATALOGUE[effect], 0, {}, ('size',))
-        candidates.append(EffectCandidate(CATALOGUE[effect], (component,)))
-        blocks.append(block)
-        places[block] = slice(number, number + 1)
-        coefficients.append(size / 10)
-    own = [one for *_, one in columns.values()]
-    # The covariance of a coefficient is 1 over the square of what is the column's own.
-    covariance = np.diag([1 / (10 * share) ** 2 for share in own])
-    nothing = np.zeros((1, 1))
-    fitted = JointFit(tuple(blocks), np.array(coefficients), covariance, nothing, nothing, 0.0,
-                      nothing, places)
-    return SimpleNamespace(
-        effects=tuple(candidates), candidates=tuple(candidates), fit=fitted,
-        blocks_of=lambda one: [block for candidate, block in zip(candidates, blocks, strict=True)
-                               if candidate is one])
-
-
-DECIDED = Decisions(form_share=0.1 * SHAPES ** 0.5, exact_share=0.02)
-
-
-def share(found: Any, which: int, parts: dict[str, np.ndarray] | None = None,
-          model: Any = PLAIN) -> tuple[float, tuple[str, ...]]:
-    """Return the force of a candidate over the form errors beside it, and whose they are."""
-    design: Any = SimpleNamespace(given=model, carried=None)
-    regression: Any = Rows(parts or {})
-    errors, candidate = FormErrors(design, regression, DECIDED), found.candidates[which]
-    allowed, names = errors.beside(found, candidate, set(found.blocks_of(candidate)[0].rows))
-    own = errors._beyond_others(found, candidate)
-    return float(np.sqrt(own / max(allowed, 1e-300))), names
-
-
-def test_an_idealised_effect_may_leave_a_tenth_in_another_and_a_fiftieth_in_an_exact_one() -> None:
-    # 20 of friction beside 100 of a spring: twice a tenth of it.
-    found = set_of(a=('drive_spring', 100.0, 1.0), b=('coulomb_friction', 20.0, 1.0))
-    assert CATALOGUE['drive_spring'].idealised
-    assert share(found, 1) == (pytest.approx(2.0), ('drive_spring',))
-    # Half of what it is, if half its column is its own.
-    found = set_of(a=('drive_spring', 100.0, 1.0), b=('coulomb_friction', 20.0, 0.5))
-    assert share(found, 1)[0] == pytest.approx(1.0)
-    # A mass is exact: ten times a fiftieth.
-    for exact in ('drive_inertia', 'payload_mass'):
-        assert not CATALOGUE[exact].idealised
-        found = set_of(a=('drive_spring', 100.0, 1.0), b=(exact, 20.0, 1.0))
-        assert share(found, 1) == (pytest.approx(10.0), ('drive_spring',))
-    # And leaves nothing itself.
-    found = set_of(a=('drive_inertia', 100.0, 1.0), b=('coulomb_friction', 20.0, 1.0))
-    assert share(found, 1)[0] > 1e100
-
-
-def test_lack_of_fit_stays_on_its_drives() -> None:
-    found = set_of(a=('drive_spring', 100.0, 1.0), b=('coulomb_friction', 20.0, 1.0))
-    (block,) = found.blocks_of(found.candidates[0])
-    block.rows[1] = block.rows.pop(0)
-    size, names = share(found, 1)
-    assert size > 1e100
-    assert names == ()
-
-
-def test_lack_of_fit_adds_up_in_squares_and_counts_that_of_the_model() -> None:
-    found = set_of(a=('drive_spring', 30.0, 1.0), b=('coulomb_friction', 40.0, 1.0),
-                   c=('viscous_friction', 10.0, 1.0))
-    size, names = share(found, 2)
-    assert (size, names) == (pytest.approx(10 / 5), ('drive_spring', 'coulomb_friction'))
-
-
-def test_an_adopted_effect_leaves_as_much_as_one_that_is_found() -> None:
-    found = set_of(a=('viscous_friction', 10.0, 1.0))
-    size, names = share(found, 0, {'coulomb_friction': np.full((4, 6), 25.0)}, FRICTION)
-    # 25 in four samples are 50 in all.
-    assert (size, names) == (pytest.approx(2.0), ('coulomb_friction',))

@@ -69,6 +69,7 @@ def test_what_is_hidden_is_reported_and_nothing_where_nothing_is(name: str) -> N
     found = diagnosed(name, 1)
     possible = {one.name for one in found.effects}.union(*found.indistinguishable)
     assert name in possible if name in EFFECTS else not possible
+    assert all(one.course is None for one in found.effects)
 
 
 @pytest.mark.parametrize('name', EFFECTS)

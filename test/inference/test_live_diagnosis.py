@@ -79,22 +79,6 @@ def test_a_change_is_claimed_on_the_second_window_that_shows_it_and_withdrawn_af
     assert [effect.found.name for effect in live.withdrawn] == ['drive_spring']
 
 
-def test_what_numbers_within_their_tolerance_explain_keeps_no_effect_alive() -> None:
-    """The fit moves a mass that is known to 5 % only, which helps in every window."""
-    mass = axis().values['links.mass'][0]
-    model, robot = axis(**{'tolerances.links.mass': 0.05}), axis(**{'links.mass': [1.04 * mass]})
-    pushed = axis(**{'links.mass': [1.04 * mass], 'effects.active': ['drive_spring'],
-                     'effects.drive_spring.axis.stiffness': SPRING,
-                     'effects.drive_spring.axis.position': 0.01})
-    live = LiveDiagnosis(model)
-    live = live.with_window(window(robot, pushed, 2), 0.0)
-    assert [effect.found.name for effect in live.effects] == ['drive_spring']
-    live = replace(live, effects=tuple(replace(one, confirmed=True) for one in live.effects))
-    live = live.with_window(window(robot, robot, 3), LENGTH)
-    assert live.claimed == ()
-    assert [effect.found.name for effect in live.withdrawn] == ['drive_spring']
-
-
 def test_a_robot_that_stands_is_not_diagnosed() -> None:
     model = axis()
     moving = window(model, axis(**WORN), 1)

@@ -88,10 +88,3 @@ def test_a_load_that_varies_tells_them_apart() -> None:
     assert not any('another load' in warning for warning in found.warnings)
     value = found.effects[0].parameters['axis.coefficient']
     assert abs(value.value - 0.08) < 3 * value.std
-
-
-@pytest.mark.parametrize(('acceleration', 'is_asked'), [(0.3, True), (3.0, False)])
-def test_at_one_load_a_gear_asks_for_another_one(acceleration: float, is_asked: bool) -> None:
-    found = lifting(acceleration, (0.25, 0.10))
-    assert [effect.name for effect in found.effects] == ['gear_efficiency']
-    assert any('another load' in warning for warning in found.warnings) is is_asked

@@ -86,14 +86,6 @@ def test_segments_are_never_bridged() -> None:
         assert any(one.start <= part.start and part.stop <= one.stop for one in gapped.segments)
 
 
-def test_many_recordings_share_what_there_is() -> None:
-    recordings = [record(axis(), duration) for duration in (600.0, 1200.0)]
-    used = [sum(part.stop - part.start for part in one.segments)
-            for one in excerpts_within_memory(axis(), recordings)]
-    assert sum(used) == pytest.approx(MOST_BLOCKS, rel=0.15)
-    assert used[1] == pytest.approx(2 * used[0], rel=0.1)
-
-
 def test_an_hour_is_diagnosed_from_excerpts_and_compared_as_a_whole() -> None:
     given = DriveModel.load('config/single_axis.yaml')
     whole = record(axis(friction__viscous=[given.values['friction.viscous'][0] + 20.0]), 3600.0)

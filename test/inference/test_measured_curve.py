@@ -14,12 +14,12 @@ from scipy.interpolate import BSpline
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import ModelError, PprsError
+from pprs_dynamics.errors import ModelError
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.fit_curve import without_curve
 from pprs_dynamics.inference.adoption.request import requested
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.physics.effects.laws.measured_curve import Curve, spline_basis
+from pprs_dynamics.physics.effects.laws.measured_curve import spline_basis
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.physics.model.model_writer import write_model
@@ -71,13 +71,6 @@ def test_the_basis_is_that_of_de_boor(periodic: bool) -> None:
     np.testing.assert_allclose(mine, full, atol=1e-12)
 
 
-def test_beyond_its_range_it_goes_on_with_its_last_value() -> None:
-    curve = Curve('position', 0.0, 1.0, (0.0, 1.0, 4.0, 9.0, 16.0))
-    assert curve.force(np.array([1.0, 1.5, 99.0])).tolist() == pytest.approx(
-        [curve.force(np.array([1.0]))[0]] * 3)
-    assert curve.outside(np.array([-0.1, 0.5, 1.1])).tolist() == [True, False, True]
-
-
 @pytest.mark.parametrize(('hidden', 'variable'), [
     (bump, 'position'), (cable, 'position of slide_1')])
 def test_the_error_falls_to_the_noise_along_another_motion(
@@ -127,11 +120,3 @@ def test_what_is_no_curve_is_refused_in_a_sentence(
     values = {f'effects.measured_curve.lift_1.{key}': value for key, value in curve.items()}
     with pytest.raises(ModelError, match=said):
         DriveModel.from_parameters({**model.values, 'effects.active': ['measured_curve'], **values})
-
-
-@pytest.mark.parametrize('text', [
-    'measured_curve', 'measured_curve:lift_1', 'measured_curve:lift_9@position',
-    'measured_curve:lift_1@colour', 'measured_curve:lift_1@position of lift_9'])
-def test_what_is_no_request_is_refused_in_a_sentence(model: DriveModel, text: str) -> None:
-    with pytest.raises(PprsError):
-        requested(text, model)

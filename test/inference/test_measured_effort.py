@@ -127,7 +127,7 @@ def test_a_model_that_is_off_makes_no_measurement_a_command(run: Run) -> None:
                      + 0.1 * np.abs(run.total).max(axis=0)) is None
 
 
-@pytest.mark.parametrize('gain', [0.05, 0.4, -1.0, 3.0])
+@pytest.mark.parametrize('gain', [0.05, -1.0])
 def test_a_gain_and_a_sign_are_no_command(run: Run, gain: float) -> None:
     assert run.kinds(gain * run.total) is None
 
@@ -194,13 +194,6 @@ def test_effort_kind_says_that_gravity_was_taken_out(tmp_path: Path) -> None:
     motion = arm.motion(DURATION, RATE)
     np.testing.assert_allclose(model.drive_forces(motion).total, run.total - run.gravity,
                                atol=1e-9)
-
-
-def test_effort_kind_says_that_efforts_are_commands(tmp_path: Path) -> None:
-    run = mechanism_run(tmp_path)
-    model = DriveModel.from_parameters(
-        {**run.model.values, 'effort_kind': 'commanded'}, run.model.source)
-    assert kinds_of(looks_like(model, [run.of(run.total)])) == every(run, 'command')
 
 
 def test_effort_kind_says_that_efforts_are_currents(tmp_path: Path) -> None:

@@ -93,35 +93,6 @@ def test_evidence_is_a_difference_of_two_rows(found: Diagnosis) -> None:
         assert effect.evidence > 0
 
 
-def test_the_verdict_is_a_function_of_the_table_and_the_residual(found: Diagnosis) -> None:
-    open_ends = found.depends_on or found.above_noise or found.unconfirmed or found.little
-    near = table_of(found).rivals(found.decisions.rival_margin)
-    expected = ('unknown' if open_ends else 'ambiguous' if near else
-                'effect' if found.effects else 'adequate')
-    assert found.verdict == expected
-    for rival in near:
-        assert rival.row.cost <= table_of(found).best.cost + found.decisions.rival_margin
-
-
-def test_costs_near_the_least_are_exact_and_their_terms_add_up(found: Diagnosis) -> None:
-    table = table_of(found)
-    for row in table.rows:
-        assert row.terms.total == pytest.approx(row.cost)
-        assert row.is_exact or row.cost > table.best.cost + found.decisions.rival_margin
-    assert [row.cost for row in table.rows] == sorted(row.cost for row in table.rows)
-
-
-def test_an_effect_lowers_the_error_and_its_own_force_does(found: Diagnosis) -> None:
-    for effect in found.effects:
-        assert effect.error_after < effect.error_before
-        assert effect.held_out_after < effect.held_out_before
-        assert effect.certainty > 2
-        force = np.sqrt(np.nanmean(np.square(effect.force)))
-        assert effect.error_before <= effect.error_after + force + 1e-9
-    assert [effect.share for effect in found.effects] == sorted(
-        (effect.share for effect in found.effects), reverse=True)
-
-
 def test_costs_do_not_depend_on_the_order_of_recordings_or_of_fits() -> None:
     runs = [record(HIDDEN['two'], seed) for seed in (1, 2)]
     design = [Design.of(axis({}), order) for order in (runs, runs[::-1])]

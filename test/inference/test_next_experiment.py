@@ -36,10 +36,9 @@ from pprs_dynamics.inference.experiments.motion_design import (
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import (
     PurposeError,
-    experiment_of,
     next_experiment,
 )
-from pprs_dynamics.inference.experiments.question import commissioning, question_after
+from pprs_dynamics.inference.experiments.question import commissioning
 from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
     PresentCoefficient,
@@ -49,14 +48,6 @@ from pprs_dynamics.inference.regression.base_columns import (
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
-from pprs_dynamics.inference.search.candidates import (
-    CandidateSet,
-    Component,
-    EffectCandidate,
-)
-from pprs_dynamics.inference.search.decisions import DECISIONS
-from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.table import ModelTable, Rival, Row
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -168,40 +159,6 @@ def test_what_a_motion_would_tell_is_what_its_recording_tells(
         ModelNumber, ReversalShape, PresentCoefficient, PresentShape}
 
 
-def test_a_drive_that_stood_may_turn_over_in_a_motion(
-    design: Design, parameters: np.ndarray,
-) -> None:
-    """A recording of a drive that stands has no columns of its reversals; a motion has them."""
-    stood = replace(design, base=tuple(
-        one for one in design.base if not (isinstance(one, ReversalShape) and one.drive == 2)))
-    time = np.arange(120) * DURATION / 120
-    found = []
-    for one in (design, stood):
-        plan = ColumnPlan.of_design(one, ())
-        forces = plan.model.drive_forces(FAMILY.with_parameters(parameters).motion(time))
-        index, rows = plan.on_motion(forces, time)[2]
-        mine = [k for k, at in enumerate(index) if isinstance(plan.base[at], ReversalShape)
-                and plan.base[at].drive == 2]
-        found.append(rows[mine])
-        assert np.all(np.abs(rows[mine]).max(axis=1) > 0.01)
-    assert np.array_equal(*found)
-
-
-def test_few_samples_tell_nearly_the_same(model: DriveModel, parameters: np.ndarray) -> None:
-    path = FAMILY.with_parameters(parameters)
-    noise = NoiseSpectrum(np.array([1.7]), np.array([7e-4, 0.25]), 0.01)
-    question = commissioning(model, [], 0.05)
-    plan = replace(question.plan, terms=(TERMS[1], TERMS[4]))
-    information = Information(plan, dict.fromkeys(range(6), noise))
-    fine, coarse = np.arange(0, DURATION, 0.002), np.arange(120) * DURATION / 120
-    full = information.of_motion(
-        plan.on_motion(model.drive_forces(path.motion(fine)), fine, 5), DURATION)
-    few = information.of_motion(
-        plan.on_motion(model.drive_forces(path.motion(coarse)), coarse), DURATION)
-    for k in [*plan.numbers, *range(len(plan.base), plan.size)]:
-        assert few[k, k] == pytest.approx(full[k, k], rel=0.3)
-
-
 def test_white_noise_counts_samples() -> None:
     noise = NoiseSpectrum(np.zeros(0), np.array([0.5 ** 2]), 0.01)
     wave = np.cos(2 * np.pi * 3 * np.arange(40) / 40)
@@ -225,26 +182,6 @@ def test_misfit_is_what_least_squares_leaves() -> None:
     assert contest.misfit(columns.T @ columns) == pytest.approx(rest @ rest, rel=1e-6)
 
 
-def test_a_rival_that_can_do_the_same_is_never_told() -> None:
-    rng = np.random.default_rng(1)
-    columns = rng.normal(size=(50, 2))
-    columns = np.column_stack((columns, columns @ (1.0, 2.0)))
-    contest = Contest(_explained('a', (2,), [3.0]), _explained('b', (0, 1), [1.0, 1.0]), (0, 1))
-    assert contest.misfit(columns.T @ columns) < 1e-4
-
-
-def test_a_rival_that_its_shape_says_all_of_is_not_scaled() -> None:
-    rng = np.random.default_rng(4)
-    columns = rng.normal(size=(60, 3))
-    # A delay of the wrong length does not become right by a factor.
-    rival = Explanation(('time_delay',), (), (), (1,), np.ones(1))
-    force, base = 3.0 * columns[:, 1] + columns[:, 0], columns[:, [2]]
-    left = force - columns[:, 1]
-    rest = left - base @ np.linalg.lstsq(base, left)[0]
-    contest = Contest(_explained('a', (0, 1), [1.0, 3.0]), rival, (2,))
-    assert contest.misfit(columns.T @ columns) == pytest.approx(rest @ rest, rel=1e-6)
-
-
 def test_precision_is_the_scatter_of_estimates() -> None:
     rng = np.random.default_rng(2)
     columns = rng.normal(size=(40, 3)) @ np.array([[1, 0.5, 0], [0, 1, 0.3], [0, 0, 1]])
@@ -254,23 +191,6 @@ def test_precision_is_the_scatter_of_estimates() -> None:
 
 
 # Limits and search.
-
-def test_use_of_limits_is_measured_against_what_the_margin_leaves(
-    model: DriveModel, parameters: np.ndarray,
-) -> None:
-    time = np.linspace(0, DURATION, 500)
-    forces = model.drive_forces(FAMILY.with_parameters(parameters).motion(time))
-    limits = MotionLimits(velocity=0.4, margin=0.2, effort_reserve=1.0)
-    uses = limits.uses(model, forces)
-    state = forces.mechanism
-    assert uses['velocity of lift_2'] == pytest.approx(
-        np.abs(state.velocity[:, 4]).max() / (0.4 * 0.8))
-    assert uses['effort of slide_1'] == pytest.approx(
-        (np.abs(forces.total[:, 0]).max() + 1.0) / (model.limits.efforts[0] * 0.8))
-    lower, upper = model.values['limits.lift_stroke']
-    room = 0.8 * (upper - lower) / 2
-    assert uses['stroke of lift_1'] == pytest.approx(
-        np.abs(state.position[:, 3] - (lower + upper) / 2).max() / room)
 
 
 def test_a_design_keeps_tight_limits_and_repeats_with_its_seed(model: DriveModel) -> None:
@@ -315,76 +235,7 @@ def test_a_recording_is_needed_to_know_what_to_tell_apart(model: DriveModel) -> 
         next_experiment(model)
 
 
-def test_a_design_that_cannot_separate_says_so(model: DriveModel) -> None:
-    """Coulomb and load friction on a drive whose load hardly changes, by a hair's breadth."""
-    terms = (FittedTerm(CATALOGUE['coulomb_friction'], 0, {}, ('force',), np.array([1e-3])),
-             FittedTerm(CATALOGUE['load_friction'], 0, {}, ('coefficient',), np.array([1e-4])))
-    question = commissioning(model, [], 0.05)
-    plan = replace(question.plan, terms=terms)
-    base = tuple(range(len(plan.base)))
-    gram = np.zeros((plan.size, plan.size))
-    gram[base, base] = 1.0
-    both = [_explained(term.effect.name, (plan.places()[term].start,), list(term.values))
-            for term in terms]
-    contests = [Contest(a, b, (*base, *b.index)) for a, b in (both, both[::-1])]
-    question = replace(question, kind='separate', plan=plan, known=gram,
-                       subjects=()).with_contests(contests)
-    motions = PlatformMotions(question.model, MotionLimits(), DURATION)
-    (found,) = random_motions(motions, 0, 1)
-    told = experiment_of(question, found, limits_of(motions, found))
-    assert told.separates == ()
-    assert told.to_dict()['does_not_separate'] == [['coulomb_friction', 'load_friction']]
-    # Friction by load grows with a mass, a tenth of the platform's with its load: no motion needed.
-    moved = model.values['masses.platform'] + model.values['masses.payload']
-    assert told.load == pytest.approx(0.1 * moved, rel=0.35)
-    assert f'the same motion once more with {told.load:g} kg more' in told.text
-    assert told.to_dict()['told_by_load'] == [['coulomb_friction', 'load_friction']]
-    assert 'hardly separate coulomb_friction from load_friction' in told.text
-    # Thirty thousand times the effect is told from its rival.
-    strong = [replace(one, truth=3e4 * one.truth) for one in both]
-    question = question.with_contests(
-        [Contest(a, b, (*base, *b.index)) for a, b in (strong, strong[::-1])])
-    assert experiment_of(question, found, {}).separates == (('coulomb_friction', 'load_friction'),)
-
-
 # From recordings to the question.
-
-def test_rivals_of_a_diagnosis_become_contests(model: DriveModel, parameters: np.ndarray) -> None:
-    """Coulomb friction on a drive, and friction by load."""
-    robot = DriveModel.from_parameters({
-        **model.values, 'effects.active': ['coulomb_friction'],
-        'effects.coulomb_friction.lift_1.force': 0.6})
-    time = np.arange(0.0, DURATION, 0.004)
-    path = FAMILY.with_parameters(parameters)
-    old = recorded(robot, path.motion(time), 1, 0.1)
-    fits = FittedSets(Design.of(model, [old]), DECISIONS)
-    fits.evaluate(())
-
-    def fitted(name: str, *coefficients: str) -> CandidateSet:
-        component = Component(CATALOGUE[name], 3, coefficients)
-        return fits.evaluate((EffectCandidate.of([component]),))
-
-    adopted = fitted('coulomb_friction', 'force')
-    table = ModelTable(fits, fits)
-    assert table.reported is adopted
-    assert question_after(table, []).kind == 'estimate'
-    other = fitted('load_friction', 'coefficient')
-    question = question_after(ModelTable(fits, fits), [
-        Rival(Row(fits, other), ('coulomb_friction',), ('load_friction',))])
-    assert question.kind == 'separate'
-    pairs = {(one.truth.name, one.rival.name) for one in question.contests}
-    assert ('coulomb_friction', 'load_friction') in pairs
-    assert ('load_friction', 'coulomb_friction') in pairs
-    costs = {one.effects[0].name: one.cost for one in (adopted, other)}
-    for contest in question.contests:
-        assert contest.now == costs[contest.rival.name] - costs[contest.truth.name]
-    # What the same motion tells again doubles the misfit and leaves the priors as they are.
-    again = question.known + question.gram(path)
-    for contest in question.contests:
-        once = contest.misfit(question.known)
-        assert once < contest.misfit(again) < 2.6 * once + 1.0
-        assert contest.evidence(question.known, again) == pytest.approx(
-            contest.now + contest.misfit(again) - once)
 
 
 # The command.

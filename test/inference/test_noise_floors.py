@@ -18,10 +18,9 @@ from scipy.signal import lfilter
 from pprs_dynamics import compare
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.residuals import long_recordings
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.noise_floors import measure_columns, noise_floors
+from pprs_dynamics.inference.search.noise_floors import noise_floors
 
 NOISE = 0.2  # [N m] of a sample
 LOAD = {'effects.active': ('payload_mass',), 'effects.payload_mass.mass': 2.0}
@@ -78,22 +77,3 @@ def test_a_noise_that_cannot_be_told_is_not_printed(tmp_path: Path) -> None:
     assert found.drives
     assert all(one.noise_floor is None for one in found.drives.values())
     assert 'the noise is not known' in found.verdict
-
-
-def test_the_noise_of_a_long_recording_is_that_of_stretches(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    model = real_arm(tmp_path)
-    made = record(model, motion(), NOISE)
-    whole, residuals, _ = measure_columns(model, [made])
-    monkeypatch.setattr(long_recordings, 'MOST_WHOLE', 200)
-    monkeypatch.setattr(long_recordings, 'MOST_BLOCKS', 150)
-    monkeypatch.setattr(long_recordings, 'SHORTEST_STRETCH', 1.0)
-    piece, same, _ = measure_columns(model, [made])
-    assert whole is not None
-    assert piece is not None
-    assert len(piece.design.residuals) < 0.6 * len(whole.design.residuals)
-    assert len(same) == len(residuals)
-    found = noise_floors(piece, period=residuals.period)
-    assert found
-    assert found == pytest.approx({name: noise_floors(whole)[name] for name in found}, rel=0.2)

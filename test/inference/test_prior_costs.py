@@ -5,25 +5,17 @@
 
 from __future__ import annotations
 
-import ast
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-import pprs_dynamics.inference as inference
-from pprs_dynamics import DriveModel
-from pprs_dynamics.inference.search import candidates as candidates_module
-from pprs_dynamics.inference.search.candidates import Component, PriorCosts, names_of
+from pprs_dynamics.inference.search.candidates import Component, PriorCosts
 from pprs_dynamics.inference.search.decisions import DECISIONS
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
 
-MODEL = DriveModel.load()
 COSTS = PriorCosts(25, 6, 4000, DECISIONS)
 SIGNED = [effect for effect in CATALOGUE.values() if effect.unphysical_below]
-SIZE = (Parameter('size', 's', 'N', 'size', -1e3, 1e3),)
 
 
 def test_the_penalty_of_a_sign_is_the_integral_over_its_prior() -> None:
@@ -55,31 +47,3 @@ def test_signed_parameters_are_coefficients(effect: type[CatalogueEffect]) -> No
     names = tuple(c.name for c in effect.coefficients)
     component = Component(effect, 0 if issubclass(effect, DriveEffect) else None, names)
     assert set(component.signed) == set(effect.unphysical_below)
-
-
-def test_names_are_those_that_the_robot_can_have(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert 15 < names_of(MODEL) < len(CATALOGUE)  # links and joints are an arm's
-    before = names_of(MODEL)
-    elsewhere, here = (type(name, (DriveEffect,), {
-        'name': name.lower(), 'linear': SIZE, 'acts_in': acts_in})
-        for name, acts_in in (('Elsewhere', ('mechanism',)), ('Here', (MODEL.kind,))))
-    for more, count in (({'elsewhere': elsewhere}, 0), ({'here': here}, 1)):
-        monkeypatch.setattr(candidates_module, 'catalogue', lambda more=more: {**CATALOGUE, **more})
-        assert names_of(MODEL) == before + count
-
-
-def test_decisions_are_those_of_the_caller() -> None:
-    """Outside their table the default ones are defaults of arguments, and nothing else."""
-    root = Path(inference.__file__).parent
-    # Neither takes any: what is compared is told by the same numbers everywhere.
-    without = {'comparison.py', 'localisation.py', 'base_fit.py', 'decisions.py'}
-    for file in sorted(root.rglob('*.py')):
-        tree = ast.parse(file.read_text())
-        defaults = {id(node) for one in ast.walk(tree) if isinstance(one, ast.FunctionDef)
-                    for default in (*one.args.defaults, *one.args.kw_defaults) if default
-                    for node in ast.walk(default)}
-        defaults |= {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.AnnAssign)}
-        used = [node.lineno for node in ast.walk(tree) if isinstance(node, ast.Name)
-                and node.id == 'DECISIONS' and id(node) not in defaults]
-        expected = 1 if file.name == 'loop.py' else 0  # where there is no diagnosis to take them of
-        assert file.name in without or len(used) <= expected, f'{file.name}: {used}'

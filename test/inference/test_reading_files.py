@@ -41,10 +41,10 @@ def outcome(folder: Path, seed: int) -> str:
 
 
 @pytest.mark.parametrize(('first', 'count'), [
-    (0, 20), *(pytest.param(20 + 70 * part, 70, marks=pytest.mark.slow) for part in range(4))])
+    (0, 10), pytest.param(10, 140, marks=pytest.mark.slow)])
 def test_random_files_are_read_rightly_or_asked_about(first: int, count: int, tmp_path: Path,
                                                       ) -> None:
     found = {seed: outcome(tmp_path, seed) for seed in range(first, first + count)}
     assert {seed: what for seed, what in found.items()
             if what not in ('right', 'asked', 'asked in vain')} == {}
-    assert sum(what == 'asked in vain' for what in found.values()) <= 0.05 * count
+    assert sum(what == 'asked in vain' for what in found.values()) <= max(1, 0.05 * count)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -16,29 +16,21 @@ from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ConvergenceError, MotionError
-from pprs_dynamics.inference.residuals import reconstruction
-from pprs_dynamics.inference.residuals.reconstruction import read_by, reconstruct, treated_forces
+from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.motion.differentiation import (
     SHORTEST_WINDOW,
     LocalPolynomial,
     Stretch,
     choose_smoothing,
-    position_noise,
-    representative,
 )
 from pprs_dynamics.measurement.motion.drive_motion import smooth_drives
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction
-from pprs_dynamics.measurement.motion.sampling_grid import find_grid
-from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
+from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs import forward_motion
 from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.physics.three_pprs.forward_motion import (
     find_pose_jumps,
-    follow_branch,
-    platform_rates,
     solve_forward_motion,
 )
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import solve_inverse_kinematics
@@ -147,52 +139,6 @@ def test_platform_rates_are_differences_of_forward_kinematics(elbow):
     assert np.abs(found.angular_velocity).max() > 0.1
 
 
-@pytest.mark.parametrize('elbow', ELBOWS)
-def test_forward_motion_undoes_inverse_kinematics(elbow):
-    geometry = random_robot(np.random.default_rng(5), elbow).geometry
-    motion = smooth_motion(np.linspace(0, 6, 3000), elbow)
-    chains = solve_inverse_kinematics(geometry, motion)
-    found = solve_forward_motion(geometry, chains.position, chains.velocity, chains.acceleration)
-    assert_allclose(found.motion.position, motion.position, rtol=0, atol=1e-11)
-    assert_allclose(found.motion.rotation, motion.rotation, rtol=0, atol=1e-11)
-    for name in ('linear_velocity', 'angular_velocity', 'linear_acceleration',
-                 'angular_acceleration'):
-        assert_allclose(getattr(found.motion, name), getattr(motion, name), rtol=0, atol=1e-9)
-    assert not found.near_branch.any()
-
-
-@pytest.mark.parametrize('fault', ['batch fails', 'one pose on another branch'])
-def test_the_branch_is_followed_where_solving_at_once_goes_wrong(monkeypatch, fault):
-    geometry = MODEL.robot.geometry
-    q = truth().drives.position[:800]
-    expected = follow_branch(geometry, q)
-    calls = []
-
-    def spoilt(geometry, q, seed=None):
-        calls.append(len(q))
-        found = solve_forward_kinematics(geometry, q, seed)
-        if len(q) > 1 and (seed is None or len(seed) == 1):
-            if fault == 'batch fails':
-                raise ConvergenceError(3, 'no pose', 'be one')
-            found.position[4] += 0.05
-        return found
-
-    monkeypatch.setattr(forward_motion, 'solve_forward_kinematics', spoilt)
-    followed = follow_branch(geometry, q)
-    assert 1 in calls  # some were followed one by one
-    assert_allclose(followed.position, expected.position, rtol=0, atol=1e-11)
-    assert_allclose(followed.rotation, expected.rotation, rtol=0, atol=1e-11)
-
-
-@pytest.mark.parametrize('far', [1e9, 1e300])
-def test_a_position_that_none_can_be_is_refused_whatever_its_size(far):
-    q = truth().drives.position[:200].copy()
-    q[100, 0] = far
-    still = np.zeros_like(q)
-    with pytest.raises(ConvergenceError, match='no pose'):
-        solve_forward_motion(MODEL.robot.geometry, q, still, still)
-
-
 def test_drives_that_cannot_close_are_named_with_sample_and_time():
     real = truth()
     q = real.drives.position.copy()
@@ -216,27 +162,6 @@ def test_a_jump_of_the_pose_is_found_where_it_is_and_nowhere_else():
     assert np.flatnonzero(find_pose_jumps(jumping)).tolist() == [400, 700]
 
 
-def test_a_jump_between_two_chunks_is_told(monkeypatch):
-    geometry, real = MODEL.robot.geometry, truth()
-    count = 0
-
-    def hopping(*args):
-        nonlocal count
-        found, count = solve_forward_motion(*args), count + 1
-        if count == 1:
-            return found
-        motion = found.motion
-        return replace(found, motion=PlatformMotion(
-            motion.position + np.array([0.01, 0, 0]), motion.orientation, motion.linear_velocity,
-            motion.angular_velocity, motion.linear_acceleration, motion.angular_acceleration))
-
-    monkeypatch.setattr(reconstruction, 'solve_forward_motion', hopping)
-    monkeypatch.setattr(reconstruction, 'CHUNK', 3000)
-    found = reconstruct(geometry, recording_of(real))
-    assert found.jumps.tolist() == [3000]
-    assert any(f'first at {found.time[3000]:.6g} s' in note for note in found.notes)
-
-
 # Differentiation -----------------------------------------------------------------------------
 
 @pytest.mark.parametrize('window', [17, 61, 401])
@@ -250,29 +175,6 @@ def test_local_polynomials_are_exact_for_polynomials_of_their_order(window):
         expected = polynomial.deriv(derivative)(t)[inner] if derivative else polynomial(t)[inner]
         assert_allclose(found[derivative], np.stack((expected, 2 * expected), axis=1), rtol=0,
                         atol=tolerance * max(1.0, np.abs(expected).max()))
-
-
-def test_smoothing_has_no_delay_and_halves_power_at_its_cut_off():
-    filter_ = LocalPolynomial(61, STEP)
-    t = np.arange(2000) * STEP
-    wave = np.sin(2 * np.pi * filter_.cut_off * t)[:, None]
-    smooth, rate, _ = filter_.differentiated(wave)
-    inner = wave[filter_.half:-filter_.half]
-    gain = float(np.sum(smooth * inner) / np.sum(inner * inner))
-    assert gain == pytest.approx(np.sqrt(0.5), abs=0.01)
-    assert_allclose(smooth, gain * inner, rtol=0, atol=1e-9)  # no phase
-    assert abs(np.mean(rate * inner)) < 1e-2 * np.std(rate)
-
-
-def test_noise_comes_out_as_its_gain_says_and_is_known_from_the_data():
-    noise = np.random.default_rng(7).normal(scale=1e-6, size=(40_000, 3))
-    filter_ = LocalPolynomial(41, STEP)
-    for derivative, values in enumerate(filter_.differentiated(noise)):
-        # 40 000 samples, correlated over some ten: 2 %.
-        assert_allclose(values.std(axis=0), 1e-6 * filter_.noise_gain(derivative), rtol=0.1)
-    real = truth(3.0, 0.03, 0.08).drives.position
-    found = position_noise([Stretch(encoder(real), STEP)])
-    assert_allclose(found, RESOLUTION / np.sqrt(12), rtol=0.05)
 
 
 @pytest.mark.parametrize(('motion', 'resolution'), [
@@ -293,19 +195,6 @@ def test_window_from_the_data_is_nearly_the_best(motion, resolution):
     # What it says to remain is what remains, but for quantisation that is no white noise.
     assert rms(chosen.acceleration_error, axis=None) == pytest.approx(found, rel=0.5)
     assert f'{chosen.polynomial(STEP).window} samples' in chosen.text
-
-
-def test_a_window_that_is_asked_for_is_taken():
-    found = reconstruct(MODEL, recording_of(truth()), window=0.122)
-    assert found.smoothing.polynomial(STEP).window == 61
-    assert any('as asked for' in note for note in found.notes)
-
-
-def test_choice_looks_at_parts_of_a_long_recording_only():
-    long = Stretch(np.zeros((1_000_000, 1)), STEP)
-    parts = representative([long])
-    assert sum(len(part.position) for part in parts) <= 80_000
-    assert representative(parts[:3]) == parts[:3]
 
 
 # The figure that counts ----------------------------------------------------------------------
@@ -329,23 +218,6 @@ def test_smoothed_motion_is_the_true_one():
     assert not len(found.jumps)
 
 
-def test_zeros_elsewhere_are_those_of_a_whole_new_reconstruction():
-    recording = recording_of(truth())
-    shift = np.array([0.004, 0.0, -0.002, 0.001, 0.0, 0.003])
-    names = ['slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3']
-    moved = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['homing_error'], **{
-        f'effects.homing_error.{name}.zero': float(by)
-        for name, by in zip(names, shift, strict=True)}})
-    assert_allclose(moved.position_error(np.zeros((1, 6)))[0], shift)
-    whole, quick = reconstruct(moved, recording), read_by(reconstruct(MODEL, recording), moved)
-    assert_allclose(quick.position, whole.position, rtol=0, atol=1e-15)
-    for name in ('position', 'linear_velocity', 'angular_velocity', 'linear_acceleration'):
-        assert_allclose(getattr(quick.motion, name), getattr(whole.motion, name), rtol=0,
-                        atol=1e-10)
-    assert_allclose(treated_forces(moved, quick)['total'], treated_forces(moved, whole)['total'],
-                    rtol=0, atol=1e-9)
-
-
 # Treatment -----------------------------------------------------------------------------------
 
 def test_model_and_effort_get_the_same_operation():
@@ -362,18 +234,6 @@ def test_model_and_effort_get_the_same_operation():
         assert_array_equal(np.concatenate(pieces), found.treat(values))
     assert_allclose(found.treat(3 * found.velocity + 2), 3 * found.treat(found.velocity) + 2,
                     rtol=0, atol=1e-14)
-
-
-def test_treating_only_one_side_makes_false_friction_at_reversals():
-    real = truth(2.0, 0.03, 0.08)
-    found = reconstruct(MODEL, recording_of(real))
-    middles = found.treat.starts + found.block // 2
-    both = force_error(None, found)
-    one = MODEL.drive_forces(found.motion[middles]).total - found.treat(found.effort)
-    slow = np.abs(found.velocity[middles]) < 0.005
-    assert np.abs(one[slow]).max() > 0.1
-    assert rms(one[slow], None) > 5 * rms(one[~slow], None)
-    assert rms(one, None) > 10 * rms(both, None)
 
 
 def test_missing_efforts_take_their_blocks_out_and_nothing_else():
@@ -402,15 +262,6 @@ def test_efforts_that_come_less_often_than_positions_are_compared_sample_by_samp
     assert np.isfinite(error).sum() == np.isfinite(effort[found.index]).sum() > 0
     assert np.sqrt(np.nanmean(error ** 2)) < 2 * FORCE_ERROR  # single samples, not means
     assert any('less often' in note for note in found.notes)
-
-
-def test_blocks_last_a_hundredth_of_a_second_at_any_rate():
-    assert [block_length(1 / rate) for rate in (50, 100, 250, 500, 1000)] == [1, 1, 2, 5, 10]
-
-
-def test_values_of_another_length_are_refused_by_the_treatment():
-    with pytest.raises(ValueError, match='7 samples'):
-        Treatment(np.array([0, 5]), 10)(np.zeros((7, 6)))
 
 
 # Edges and segments --------------------------------------------------------------------------
@@ -473,14 +324,6 @@ def test_a_single_axis_is_smoothed_but_has_no_platform():
         reconstruct(MODEL, recording)
 
 
-def test_progress_rises_to_the_whole():
-    seen = []
-    reconstruct(MODEL, recording_of(truth()), progress=lambda done, total: seen.append(
-        done / total))
-    assert seen == sorted(seen)
-    assert seen[-1] == 1.0
-
-
 # Stamps --------------------------------------------------------------------------------------
 
 JITTER = 1e-4  # [s rms]: at 0.1 m/s ten times the resolution of the encoder
@@ -508,12 +351,6 @@ def test_samples_at_equal_steps_with_late_stamps_are_read_so():
     assert rms(force_error(None, found)).max() < FORCE_ERROR
 
 
-def test_jitter_that_cannot_matter_is_not_mentioned():
-    real = truth()
-    time = real.time + 1e-7 * np.sin(1e4 * real.time)
-    assert find_grid(time, encoder(real.drives.position))[1] == ''
-
-
 def test_lost_samples_are_bridged_in_positions_and_stay_unknown_in_efforts():
     real = truth(2.0, 0.03, 0.08)
     keep = np.ones(len(real.time), dtype=bool)
@@ -526,18 +363,6 @@ def test_lost_samples_are_bridged_in_positions_and_stay_unknown_in_efforts():
     assert rms(force_error(None, found)).max() < FORCE_ERROR
     lengths = np.diff(np.append(found.treat.starts, len(found)))
     assert set(lengths) == {found.block - 1, found.block}
-
-
-def test_segments_of_different_rates_are_each_smoothed_over_the_same_time():
-    real = truth(2.0, 0.03, 0.08)
-    keep = np.r_[0:2000, 2000:4000:2]
-    found = reconstruct(MODEL, recording_of(
-        real, real.force[keep], time=real.time[keep], position=encoder(real.drives.position[keep])))
-    assert len(found.segments) == 2
-    ends = [real.time[keep][found.index[part.start]] for part in found.segments]
-    assert ends[0] == pytest.approx(found.smoothing.duration / 2, abs=2 * STEP)
-    assert ends[1] - real.time[2000] == pytest.approx(found.smoothing.duration / 2, abs=3 * STEP)
-    assert rms(force_error(None, found)).max() < FORCE_ERROR
 
 
 # Recorded velocities -------------------------------------------------------------------------
@@ -553,11 +378,7 @@ VELOCITIES = {
     'noise of 60 um/s': (
         lambda real, rng: real.velocity + rng.normal(scale=6e-5, size=real.velocity.shape),
         (False, False)),
-    'noise of 1 mm/s': (
-        lambda real, rng: real.velocity + rng.normal(scale=1e-3, size=real.velocity.shape),
-        (False, False)),
     'one sample late': (lambda real, rng: np.roll(real.velocity, 1, axis=0), (False, False)),
-    'one per cent too large': (lambda real, rng: 1.01 * real.velocity, (False, False)),
     'differences of the encoder': (
         lambda real, rng: np.diff(encoder(real.position), axis=0, prepend=0) / STEP,
         (False, False)),
@@ -581,18 +402,6 @@ def test_recorded_velocities_are_used_only_where_they_are_better(kind):
         else:
             assert_array_equal(getattr(found, name), getattr(alone, name))
     assert rms(force_error(None, found)).max() < FORCE_ERROR
-
-
-def test_velocities_are_judged_drive_by_drive_and_a_missing_one_is_not_used():
-    real = truth()
-    velocity = real.drives.velocity.copy()
-    velocity[:, 3] *= 1.02
-    velocity[500, 5] = np.nan
-    found = reconstruct(MODEL, recording_of(real, velocity=velocity))
-    assert found.from_recorded.tolist() == [[True, True, True, False, True, False]] * 2
-    assert np.isfinite(found.velocity).all()
-    assert any('velocities of slide_1, slide_2, slide_3, lift_2 come from recorded' in note
-               for note in found.notes)
 
 
 # Live ----------------------------------------------------------------------------------------
@@ -641,24 +450,6 @@ def test_live_and_offline_agree_to_rounding_across_a_gap():
     assert np.isnan(blocks).sum() == 1
 
 
-def test_live_platform_motion_is_that_of_the_recording():
-    real = truth()
-    recording = recording_of(real)
-    found = reconstruct(MODEL, recording)
-    polynomial = found.smoothing.polynomial(STEP)
-    _, samples, _ = play(replace(recording, time=recording.time[:400],
-                                 position=recording.position[:400],
-                                 effort=recording.effort[:400]), polynomial, found.block)
-    seed = None
-    for k, sample in enumerate(samples[:50]):
-        seed = solve_forward_motion(
-            MODEL.robot.geometry, sample.position[None], sample.velocity[None],
-            sample.acceleration[None], seed).motion
-        assert_allclose(seed.position[0], found.motion.position[k], rtol=0, atol=1e-11)
-        assert_allclose(seed.linear_acceleration[0], found.motion.linear_acceleration[k], rtol=0,
-                        atol=1e-6)
-
-
 def test_live_bridges_a_position_that_is_none_and_starts_again_after_three():
     polynomial = LocalPolynomial(17, STEP)
     live = LiveReconstruction(polynomial)
@@ -672,36 +463,6 @@ def test_live_bridges_a_position_that_is_none_and_starts_again_after_three():
             assert_allclose(sample.velocity, 0.1 / STEP, rtol=1e-9)
             assert sample.time == pytest.approx((k - 8) * STEP)
     assert (live.gaps, live.bridged) == (1, 1)
-
-
-def test_live_is_as_good_with_single_samples_missing():
-    """A few lost samples must not cost more than the answers that belong to them."""
-    rng = np.random.default_rng(5)
-    polynomial = LocalPolynomial(61, STEP)
-    time = np.arange(0, 4.0, STEP)
-    position = 0.05 * np.sin(2 * np.pi * 1.5 * time)
-    acceleration = -(2 * np.pi * 1.5) ** 2 * position
-    lost = {int(k) for k in rng.choice(np.arange(100, len(time) - 1), 40, replace=False)}
-    live, found = LiveReconstruction(polynomial), {}
-    for k in range(len(time)):
-        if k not in lost:
-            sample = live.push(time[k], [position[k]], [1.0 * k])
-            if sample is not None:
-                found[int(sample.effort[0])] = sample.acceleration[0]
-    assert live.gaps == 0
-    assert live.bridged == len(lost)
-    assert len(found) >= len(time) - 60 - 2 * len(lost)
-    rows = np.array(sorted(found))
-    assert not lost & set(rows.tolist())
-    error = np.array([found[k] for k in rows]) - acceleration[rows]
-    assert rms(error) < 1e-4 * rms(acceleration)
-
-
-def test_rates_of_a_platform_at_rest_are_zero():
-    home = PlatformMotion.at_rest((0, 0, 0.5))
-    motion = platform_rates(MODEL.robot.geometry, home, np.zeros((1, 6)), np.zeros((1, 6)))
-    assert_array_equal(motion.linear_acceleration, 0)
-    assert_array_equal(motion.angular_acceleration, 0)
 
 
 @pytest.mark.parametrize('late', [False, True])

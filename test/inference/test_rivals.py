@@ -13,8 +13,6 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.diagnosis.answer import rival_effects
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.diagnosis.quantities import in_unit
-from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
 from pprs_dynamics.measurement.files.recording import Recording
 
 MASS, VISCOUS, COULOMB, WIDTH = 20.0, 40.0, 6.0, 0.001
@@ -52,15 +50,3 @@ def test_a_rival_has_the_value_that_explains_the_same(ambiguous: Diagnosis) -> N
             assert rival.error_after == pytest.approx(best.error_after, rel=0.05)
             assert rival.held_out_after == pytest.approx(best.held_out_after, rel=0.05)
             assert 0 <= rival.cost < 10
-
-
-def test_each_rival_of_the_answer_is_put_into_words(ambiguous: Diagnosis) -> None:
-    rivals = rival_effects(ambiguous)
-    words = word_diagnosis(ambiguous, rivals=rivals)
-    named = {name for names in ambiguous.indistinguishable for name in names[1:]}
-    assert {one.name for one in rivals} == named
-    assert len(words.rivals) == len(rivals)
-    for said, rival in zip(words.rivals, rivals, strict=True):
-        assert f'{in_unit(rival.held_out_after)} on held-out data' in said.why
-    assert 'the data do not separate these' in words.headline
-    assert 'next-experiment' in words.command

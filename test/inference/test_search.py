@@ -5,15 +5,11 @@
 
 from __future__ import annotations
 
-from itertools import combinations
-
 import numpy as np
 import pytest
-from single_axis import AXIS, axis_values
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.inference.regression import design as design_module
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.search.candidates import CandidateSet, Component, EffectCandidate
 from pprs_dynamics.inference.search.decisions import DECISIONS
@@ -25,85 +21,13 @@ from pprs_dynamics.inference.search.fitted_model import (
     squared,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
-from pprs_dynamics.inference.search.search import Search
 from pprs_dynamics.inference.search.table import Row, tabulate
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
-AXIS_VALUES = {**axis_values(20.0, 40.0, 6.0, -2.0)}
-SMALL = ('coulomb_friction', 'viscous_friction', 'quadratic_friction', 'effort_offset',
-         'drive_spring', 'drive_inertia', 'effort_gain')
 MODEL = DriveModel.load()
 TIME = np.arange(6000) * 0.002
-
-
-def axis_recording(hidden: dict[str, dict[str, float]], seed: int, noise: float = 0.3,
-                   ) -> Recording:
-    """Return a recording of an axis that has some effects which its model has not."""
-    values = {f'effects.{name}.{AXIS}.{key}': value for name, block in hidden.items()
-              for key, value in block.items()}
-    model = DriveModel.from_parameters({**AXIS_VALUES, 'effects.active': list(hidden), **values})
-    rng = np.random.default_rng(seed)
-    time = np.arange(0, 20, 0.002)
-    omega = 2 * np.pi * np.array([0.21, 0.37, 0.83])[:, None]
-    phase = omega * time + rng.uniform(0, 2 * np.pi, (3, 1))
-    size = np.array([0.08, 0.04, 0.015])[:, None]
-    q = (size * np.sin(phase)).sum(0)[:, None]
-    from pprs_dynamics import JointMotion
-    motion = JointMotion(q, (size * omega * np.cos(phase)).sum(0)[:, None],
-                         -(size * omega ** 2 * np.sin(phase)).sum(0)[:, None], time=time)
-    force = model.measured(model.drive_forces(motion)).total
-    return Recording.from_arrays('axis', time, q, None,
-                                 force + noise * rng.normal(size=force.shape), (AXIS,))
-
-
-@pytest.fixture
-def small_catalogue(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(design_module, 'catalogue', lambda: {
-        name: CATALOGUE[name] for name in SMALL})
-
-
-@pytest.mark.usefixtures('small_catalogue')
-@pytest.mark.parametrize(('hidden', 'seed'), [
-    ({}, 0), ({'drive_spring': {'stiffness': 30.0, 'position': 0.02}}, 1),
-    ({'coulomb_friction': {'force': 0.6}, 'drive_inertia': {'mass': 1.0}}, 2),
-    ({'viscous_friction': {'coefficient': 6.0}, 'effort_offset': {'force': 0.5},
-      'effort_gain': {'gain': 0.05}}, 3),
-    ({'quadratic_friction': {'coefficient': 30.0}, 'drive_spring': {
-        'stiffness': 20.0, 'position': -0.05}}, 4)])
-def test_the_search_ends_at_the_best_of_all_sets(hidden: dict, seed: int) -> None:
-    design = Design.of(DriveModel.from_parameters(AXIS_VALUES), [axis_recording(hidden, seed)])
-    search = Search(FittedSets(design, DECISIONS))
-    found = search.run()
-    exhaustive = FittedSets(design, DECISIONS)
-    best = exhaustive.evaluate(())
-    every: list[EffectCandidate] = []
-    for name in SMALL:
-        effect = CATALOGUE[name]
-        assert issubclass(effect, DriveEffect)
-        if design.acts_on(effect, 0):
-            every += [EffectCandidate.of([Component.of(effect, 0, {}, names)])
-                      for names in effect.variants]
-    for size in (1, 2, 3, 4):
-        for chosen in combinations(every, size):
-            if len({one.name for one in chosen}) == size:
-                best = min(best, exhaustive.evaluate(chosen), key=lambda one: one.cost)
-    assert found.cost < best.cost + 0.2
-    assert {one.name for one in found.effects} == {one.name for one in best.effects}
-    assert {one.name for one in found.effects} == set(hidden)
-
-
-@pytest.mark.usefixtures('small_catalogue')
-def test_what_does_not_pay_in_a_set_is_pruned() -> None:
-    recording = axis_recording({'drive_spring': {'stiffness': 30.0, 'position': 0.02}}, 1)
-    fits = FittedSets(Design.of(DriveModel.from_parameters(AXIS_VALUES), [recording]), DECISIONS)
-    spring, drag, gain = (EffectCandidate.of([Component.of(
-        CATALOGUE[name], 0, {}, CATALOGUE[name].variants[0])])
-        for name in ('drive_spring', 'quadratic_friction', 'effort_gain'))
-    assert names(fits.pruned(fits.evaluate((spring, drag, gain)))) == ['drive_spring']
-    assert fits.pruned(fits.evaluate(())).candidates == ()
 
 
 def recording_of(effects: dict[str, dict], noise: float = 0.08, seed: int = 0) -> Recording:
@@ -186,18 +110,6 @@ def test_a_small_effect_beside_a_large_one_is_the_form_error_of_that() -> None:
     assert names(table.best.fitted) == ['tool_drag']
     assert any('joint_friction may be the form error of tool_drag' in found.barred
                for found in table.barred(DECISIONS.rival_margin))
-
-
-def test_a_wrench_on_guides_that_feel_it_hides_no_effect_and_makes_none() -> None:
-    wrench = {'force_x': 6.0, 'force_y': -4.0, 'force_z': 5.0, 'moment_x': 0.1, 'moment_y': 0.1,
-              'moment_z': 0.0}
-    model = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['external_wrench'],
-                         **{f'effects.external_wrench.{k}': v for k, v in wrench.items()}})
-    forces = model.drive_forces(Excitation().motion(TIME).with_time(TIME))
-    total = forces.total
-    noise = 0.05 * np.random.default_rng(3).normal(size=total.shape)
-    recording = Recording.from_arrays('made', TIME, forces.mechanism.position, effort=total + noise)
-    assert names(tabulate(MODEL, [recording], DECISIONS).best.fitted) == ['external_wrench']
 
 
 def test_coulomb_and_viscous_friction_are_two_and_not_one_that_is_asymmetric() -> None:

@@ -82,13 +82,6 @@ def test_a_mat_file_with_a_false_size_is_one_sentence(tmp_path: Path) -> None:
         read_recording(path, NAMED)
 
 
-def test_a_column_that_stands_twice_is_a_question(tmp_path: Path) -> None:
-    path = tmp_path / 'run.csv'
-    path.write_text('t,q,tau,q\n' + '\n'.join(f'{k / 100},0,1,{k}' for k in range(300)) + '\n')
-    with pytest.raises(UnreadableFileError, match=r"2 columns have the name 'q'.*2 or 4"):
-        read_recording(path, NAMED)
-
-
 def test_no_pipe_and_no_device_has_a_fingerprint(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / 'pipe')
     for path in (tmp_path / 'pipe', Path('/dev/zero')):

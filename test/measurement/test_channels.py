@@ -14,7 +14,6 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from pprs_dynamics.drives import RecordedDrives
-from pprs_dynamics.errors import MotionError, UnreadableFileError
 from pprs_dynamics.inference.readings.columns import guess_columns
 from pprs_dynamics.measurement.files.contents import Series
 from pprs_dynamics.measurement.files.recording import (
@@ -68,11 +67,6 @@ def test_columns_of_a_model_file_and_of_the_whole_machine(tmp_path):
     np.testing.assert_allclose(found['pressure'], 1e5)
 
 
-def test_a_column_that_is_not_there_is_told(tmp_path):
-    with pytest.raises(UnreadableFileError, match="no column 'T3'; it holds T2"):
-        read(table(tmp_path / 'a.csv', T2=WARM), j2__temperature='T3')
-
-
 @pytest.mark.parametrize('name', ['run.csv', 'run.mcap', 'bag'])
 def test_what_is_written_is_read_again(tmp_path, name):
     channels = {'temperature': np.column_stack([np.full(200, np.nan), SELDOM]),
@@ -84,26 +78,12 @@ def test_what_is_written_is_read_again(tmp_path, name):
         np.testing.assert_allclose(found[channel], values)
 
 
-def test_positions_of_links_are_in_the_unit_of_positions(tmp_path):
-    turned = np.degrees(POSITION[:, 0])
-    file = table(tmp_path / 'a.csv', motor=turned, link=turned - 1.0)
-    found = read(file, j1__position='motor', j1__link_position='link',
-                 j1__position_scale=np.pi / 180).channels['link_position']
-    np.testing.assert_allclose(found[:, 0], POSITION[:, 0] - np.radians(1.0))
-
-
 def test_dropped_samples_take_their_temperature_with_them():
     broken = POSITION.copy()
     broken[3] = np.nan
     recording = Recording.from_arrays('x', TIME, broken, None, EFFORT, JOINTS,
                                       {'temperature': np.column_stack([WARM, WARM])})
     np.testing.assert_array_equal(recording.channels['temperature'][:, 0], np.delete(WARM, 3))
-
-
-def test_channels_of_other_shapes_are_told():
-    with pytest.raises(MotionError, match=r'temperature: its shape is \(200,\)'):
-        Recording.from_arrays('x', TIME, POSITION, None, EFFORT, JOINTS,
-                              {'temperature': WARM.tolist()})
 
 
 def bag(path: Path, topic: str, kind: str, messages: list[tuple[float, dict[str, Any]]]) -> Path:

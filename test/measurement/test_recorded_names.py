@@ -10,17 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from scipy.io import savemat
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
+from pprs_dynamics.errors import ModelError, UnreadableFileError
 from pprs_dynamics.measurement.files.merged_states import CONTROLLER, DYNAMIC, JOINT_STATE
-from pprs_dynamics.measurement.files.recording import Recording, read_recording
+from pprs_dynamics.measurement.files.recording import read_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.recorded_names import joint_names, recorded_columns
 
@@ -176,51 +174,6 @@ def test_joints_have_the_names_of_the_machine(run: Any, tmp_path: Path) -> None:
 COLUMNS = {'columns.time': 't', **{
     f'columns.{drive}.{quantity}': f'{short}{k}' for k, drive in enumerate(DRIVES)
     for quantity, short in (('position', 'q'), ('effort', 'tau'))}}
-
-
-def written(path: Path, time: np.ndarray, position: np.ndarray, effort: np.ndarray) -> Path:
-    """Write a table by its suffix."""
-    table = {'t': time, **{f'q{k}': position[:, k] for k in range(6)},
-             **{f'tau{k}': effort[:, k] for k in range(6)}, 'other': np.ones(len(time))}
-    if path.suffix == '.mat':
-        savemat(path, table)
-    elif path.suffix == '.parquet':
-        pd.DataFrame(table).to_parquet(path)
-    else:
-        pd.DataFrame(table).to_csv(path, index=False, sep=';')
-    return path
-
-
-def read_with(model: DriveModel, path: Path) -> Recording:
-    return read_recording(path, model.recorded)
-
-
-@pytest.mark.parametrize('suffix', ['.csv', '.parquet', '.mat', '.log'])
-def test_tables_by_their_own_columns(run: Any, tmp_path: Path, suffix: str) -> None:
-    time, position, effort = run
-    path = written(tmp_path / f'run{suffix}', time, 1e3 * position, effort)
-    scales = {f'columns.{drive}.position_scale': 1e-3 for drive in DRIVES}
-    keys = {**COLUMNS, **scales, 'columns.lift_3.effort_scale': 2.0}
-    recording = read_with(with_keys(**keys), path)
-    np.testing.assert_allclose(recording.position, position, rtol=1e-12)
-    np.testing.assert_allclose(recording.effort[:, :5], effort[:, :5], rtol=1e-12)
-    np.testing.assert_allclose(recording.effort[:, 5], 2 * effort[:, 5], rtol=1e-12)
-
-
-@pytest.mark.parametrize('suffix', ['.csv', '.parquet', '.mat'])
-@pytest.mark.parametrize('damage', ['column', 'bytes'])
-def test_what_is_no_such_table_is_one_sentence(
-    run: Any, tmp_path: Path, suffix: str, damage: str,
-) -> None:
-    path = written(tmp_path / f'run{suffix}', *run)
-    model = with_keys(**{**COLUMNS, 'columns.lift_1.effort': 'missing'})
-    if damage == 'bytes':
-        path.write_bytes(b'\x00\xff' * 400)
-        model = with_keys(**COLUMNS)
-    with pytest.raises(PprsError) as caught:
-        read_recording(path, model.recorded)
-    assert '\n' not in str(caught.value)
-    assert damage == 'bytes' or 'missing' in str(caught.value)
 
 
 @pytest.mark.parametrize('keys', [

@@ -8,8 +8,6 @@ from __future__ import annotations
 import contextlib
 import random
 import re
-import sqlite3
-import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -43,11 +41,9 @@ from rosbags.rosbag2 import StoragePlugin
 from sensor_msgs.msg import JointState
 
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.errors import MissingLibraryError, MotionError, UnreadableFileError
+from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.measurement.files.joint_state_cdr import (
     JointStateBlocks,
-    Layout,
-    serialised,
 )
 from pprs_dynamics.measurement.files.recording import (
     Recording,
@@ -55,7 +51,6 @@ from pprs_dynamics.measurement.files.recording import (
     read_recording,
     write_recording,
 )
-from pprs_dynamics.measurement.files.samples import POLICY
 
 # ---------------------------------------------------------------------------------- formats
 
@@ -137,16 +132,6 @@ def test_a_csv_keeps_every_bit(tmp_path: Path, values: list[float], steps: float
                  'effort': effort})
 
 
-@settings(max_examples=30,
-          suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(order=st.permutations(range(19)))
-def test_csv_columns_may_stand_in_any_order(tmp_path: Path, order: list[int]) -> None:
-    arrays = measured(30)
-    columns = table(arrays)
-    columns.iloc[:, order].to_csv(tmp_path / 'x.csv', index=False)
-    assert_same(read_recording(tmp_path / 'x.csv'), arrays)
-
-
 @pytest.mark.parametrize('suffix', SUFFIXES)
 def test_a_single_axis_is_read_by_its_own_drive(suffix: str, tmp_path: Path) -> None:
     arrays = measured(200, ('axis',))
@@ -155,18 +140,6 @@ def test_a_single_axis_is_read_by_its_own_drive(suffix: str, tmp_path: Path) -> 
     assert_same(recording, arrays)
     with pytest.raises(UnreadableFileError, match=r'slide_1.*axis'):
         read_recording(tmp_path / f'x{suffix}')
-
-
-@pytest.mark.parametrize('suffix', SUFFIXES)
-def test_progress_rises_to_the_total(suffix: str, tmp_path: Path) -> None:
-    arrays = measured(9000)
-    write_recording(tmp_path / f'x{suffix}', judged(arrays))
-    calls: list[tuple[int, int]] = []
-    read_recording(tmp_path / f'x{suffix}', progress=lambda *call: calls.append(call))
-    done = [call[0] for call in calls]
-    assert done == sorted(done)
-    assert calls[-1][0] == calls[-1][1] > 0
-    assert len({total for _, total in calls}) == 1
 
 
 # ------------------------------------------------------------------------------------- bags
@@ -223,7 +196,7 @@ def test_reading_bytes_by_layout_agrees_with_rosbags(
 
 
 @pytest.mark.parametrize('absent', [(), ('velocity',), ('effort',), ('velocity', 'effort')])
-@pytest.mark.parametrize('frame', ['', 'a', 'base', 'world_1'])
+@pytest.mark.parametrize('frame', ['', 'base'])
 def test_bytes_of_ros_itself_are_understood(absent: tuple[str, ...], frame: str) -> None:
     # rmw_fastrtps leaves bytes behind the message where a sequence is empty.
     values = {name: [] if name in absent else [1.5, -2.5, 3.5] for name in QUANTITIES}
@@ -237,32 +210,6 @@ def test_bytes_of_ros_itself_are_understood(absent: tuple[str, ...], frame: str)
     for name, array in zip(QUANTITIES, arrays, strict=True):
         expected = [np.nan, np.nan] if name in absent else [3.5, 1.5]
         np.testing.assert_array_equal(array, [expected] * 3)
-
-
-@pytest.mark.parametrize('velocity', [True, False])
-@pytest.mark.parametrize('names', [('axis',), DRIVES, ('a', 'bb', 'ccc', 'dddd', 'eeeee')])
-def test_our_bytes_are_those_of_rosbags(names: tuple[str, ...], velocity: bool) -> None:
-    values = np.random.default_rng(3).normal(size=(3, 4, len(names)))
-    stamps = np.array([0, 1, 10**9 - 1, 2**31 * 10**9 - 1])
-    rows = serialised(names, stamps, values[0], values[1] if velocity else None, values[2])
-    for k, stamp in enumerate(stamps):
-        state = message(int(stamp), names, values[0, k], values[1, k] if velocity else [],
-                        values[2, k])
-        state.header.frame_id = ''
-        assert rows[k].tobytes() == bytes(STORE.serialize_cdr(state, STATE))
-
-
-def test_a_layout_is_told_from_another_by_every_byte_that_makes_it() -> None:
-    data = bytearray(STORE.serialize_cdr(message(7, DRIVES, *np.ones((3, 6))), STATE))
-    layout = Layout.of(bytes(data))
-    assert layout is not None
-    changeable = set(range(len(data))) - set(layout.fixed.tolist())
-    # Stamp 8, options 2, 'base' and its end 5; the rest are the values and their padding.
-    assert len(changeable) <= 8 + 2 + 5 + 3 * 6 * 8 + 6 * 3 + 3 * 7
-    for place in layout.fixed.tolist():
-        changed = data.copy()
-        changed[place] ^= 1
-        assert not layout.matches(np.frombuffer(bytes(changed), np.uint8)[None])[0]
 
 
 @settings(max_examples=200)
@@ -299,44 +246,12 @@ def test_several_topics_of_joint_states_must_be_chosen_from(tmp_path: Path) -> N
         read_recording(path, topic='/silent/joint_states')
 
 
-def test_storage_files_without_metadata_are_read_in_the_order_of_their_messages(
-    tmp_path: Path,
-) -> None:
-    arrays = measured(600)
-    path = by_own_writer('')(tmp_path, arrays)
-    (path / 'metadata.yaml').unlink()
-    recording = read_recording(path)
-    assert_same(recording, arrays)
-    assert the(recording, 'no_metadata').count == 1
-    split = tmp_path / 'split'
-    split.mkdir()
-    for name, part in (('b_0.mcap', slice(0, 200)), ('a_1.mcap', slice(200, 600))):
-        write_recording(split / name, judged({
-            key: values[part] for key, values in arrays.items()}))
-    recording = read_recording(split)
-    assert_same(recording, arrays)
-    assert the(recording, 'no_metadata').count == 2
-
-
 def test_header_stamps_of_0_are_replaced_by_times_of_recording(tmp_path: Path) -> None:
     arrays = measured(600)
     states = states_of(arrays, time=np.zeros(600))
     recording = read_recording(write_plain_bag(tmp_path / 'bag', {'/joint_states': states}))
     assert_same(recording, arrays)
     assert the(recording, 'receive_times').count == 600
-
-
-def test_without_rosbags_bags_are_refused_in_one_sentence_and_csv_still_works(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    arrays = measured(100)
-    bag, text = by_own_writer('.mcap')(tmp_path, arrays), by_own_writer('.csv')(tmp_path, arrays)
-    monkeypatch.setitem(__import__('sys').modules, 'rosbags.rosbag2', None)
-    for action in (lambda: read_recording(bag),
-                   lambda: write_recording(tmp_path / 'new.db3', judged(arrays))):
-        with pytest.raises(MissingLibraryError, match=r'rosbags.*pprs_dynamics\[bags\]'):
-            action()
-    assert_same(read_recording(text), arrays)
 
 
 def test_bags_are_not_overwritten_and_files_are_replaced(tmp_path: Path) -> None:
@@ -352,30 +267,13 @@ def test_bags_are_not_overwritten_and_files_are_replaced(tmp_path: Path) -> None
     assert sorted(file.name for file in tmp_path.iterdir()) == ['bag', 'x.csv', 'x.db3', 'x.mcap']
 
 
-@pytest.mark.parametrize('suffix', SUFFIXES)
-def test_what_cannot_be_written_is_told(suffix: str, tmp_path: Path) -> None:
-    (tmp_path / 'file').write_text('')
-    with pytest.raises(UnreadableFileError, match='cannot be written'):
-        write_recording(tmp_path / 'file' / f'x{suffix}', judged(measured(30)))
-
-
-def test_times_before_0_cannot_be_stamps_of_ros(tmp_path: Path) -> None:
-    arrays = measured(30)
-    arrays['time'] = arrays['time'] - 1
-    with pytest.raises(UnreadableFileError, match='-1 to'):
-        write_recording(tmp_path / 'x.mcap', judged(arrays))
-
-
 # -------------------------------------------------------------------------------------- CSV
 
 
 TEXTS: dict[str, Callable[[str], str]] = {
     'byte order mark': lambda text: '\ufeff' + text,
-    'CRLF': lambda text: text.replace('\n', '\r\n'),
     'semicolons': lambda text: text.replace(',', ';'),
-    'tabs': lambda text: text.replace(',', '\t'),
     'quotes': lambda text: re.sub(r'[^,\n]+', r'"\g<0>"', text),
-    'blanks': lambda text: text.replace(',', ' , '),
     'empty lines': lambda text: text.replace('\n', '\n\n') + '\n \n',
     'no last line end': lambda text: text.rstrip('\n'),
     'time of PlotJuggler': lambda text: text.replace('time', '__time'),
@@ -405,22 +303,6 @@ def test_other_columns_are_ignored_and_told_even_where_they_hold_words(tmp_path:
     assert all(name in finding.text for name in ('(no name)', 'phase', 'gripper/position'))
 
 
-def test_prefixes_of_other_tools_are_accepted_where_they_are_unambiguous(tmp_path: Path) -> None:
-    left, right = measured(40, seed=1), measured(40, seed=2)
-    one = table(left, prefix='/joint_states/')
-    one.to_csv(tmp_path / 'one.csv', index=False)
-    assert_same(read_recording(tmp_path / 'one.csv'), left)
-    pd.concat([one, table(right).drop(columns='time')], axis=1).to_csv(
-        tmp_path / 'plain.csv', index=False)
-    assert_same(read_recording(tmp_path / 'plain.csv'), right)
-    two = pd.concat([table(left, prefix='/left/joint_states/'),
-                     table(right, prefix='/right/joint_states/').drop(columns='time')], axis=1)
-    two.to_csv(tmp_path / 'two.csv', index=False)
-    with pytest.raises(UnreadableFileError, match='/left/joint_states, /right/joint_states'):
-        read_recording(tmp_path / 'two.csv')
-    assert_same(read_recording(tmp_path / 'two.csv', topic='/right/joint_states'), right)
-
-
 def test_rows_that_belong_to_other_topics_leave_the_motion_as_it_is(tmp_path: Path) -> None:
     # PlotJuggler writes all series into one table, a row per stamp of any of them.
     arrays = measured(600)
@@ -440,11 +322,8 @@ MISTAKES = {
     'a decimal comma': (
         lambda text: text.replace(',', ';').replace('\n0.01;', '\n0,01;'), 'decimal comma'),
     'a short row': (lambda text: text[:-40], 'row 41 holds 13 cells, but the header 19'),
-    'a long row': (lambda text: text.rstrip() + ',1\n', 'row 41 holds 20 cells'),
-    'no rows': (lambda text: text.split('\n')[0], 'no samples below the header'),
     'a column twice': (lambda text: text.replace('lift_1/velocity', 'lift_1/position'),
                        "'lift_1/position' stands twice"),
-    'time twice': (lambda text: text.replace('slide_1/velocity', 'time'), "'time' stands twice"),
     'no position anywhere': (lambda text: re.sub(r'(?m)^([0-9][^,]*),[^,]*', r'\1,', text),
                              'none of its 40 samples'),
 }
@@ -506,7 +385,7 @@ FOREIGN = {
     'noise after rows': content('x.csv', b'time,' + b','.join(
         f'{drive}/position'.encode() for drive in DRIVES) + b'\n0,1,2,3,4,5,6\n' + NOISE),
     **{f'{share} of {suffix}': damaged(suffix, share) for suffix in ('.mcap', '.db3')
-       for share in (0.0001, 0.1, 0.5, 0.9, 0.9999)},
+       for share in (0.0001, 0.5, 0.9999)},
     'header of a db3': content('x.db3', b'SQLite format 3\x00' + NOISE),
     'header of an mcap': content('x.mcap', b'\x89MCAP0\r\n' + NOISE),
     'mcap under another name': content('x.csv', b'\x89MCAP0\r\n' + NOISE),
@@ -553,14 +432,6 @@ def test_a_changed_byte_in_a_bag_is_an_error_of_ours_or_none(
         assert np.isfinite(recording.position).all()
 
 
-def test_a_message_that_is_a_number_is_one_sentence(tmp_path: Path) -> None:
-    path = by_own_writer('.db3')(tmp_path, measured(60))
-    with contextlib.closing(sqlite3.connect(path)) as database, database:
-        database.execute('UPDATE messages SET data = 7 WHERE id = 30')
-    with pytest.raises(UnreadableFileError, match='damaged or something else'):
-        read_recording(path)
-
-
 # ------------------------------------------------------------------------------ description
 
 
@@ -584,33 +455,6 @@ def test_a_recording_is_described_by_its_rates_ranges_and_findings() -> None:
     assert bare.drives['lift_3'].effort is None
 
 
-def test_findings_are_one_sentence_each() -> None:
-    arrays = measured()
-    arrays['effort'][:, 0], arrays['position'][4, 0] = np.nan, np.nan
-    arrays['time'][500:] -= 0.5
-    texts = [finding.text for finding in judged(arrays).findings]
-    assert len(texts) == 4
-    for text in texts:
-        assert '\n' not in text
-        assert any(text.endswith(f'; {action}') for action in POLICY.values())
-
-
-def test_arrays_that_do_not_fit_are_refused() -> None:
-    arrays = measured(30)
-    with pytest.raises(MotionError, match=r'effort: its shape is \(29, 6\)'):
-        judged({**arrays, 'effort': arrays['effort'][1:]})
-    with pytest.raises(MotionError, match='no sample is finite'):
-        judged({**arrays, 'time': np.full(30, np.nan)})
-
-
-def test_an_encapsulation_of_another_kind_has_no_layout() -> None:
-    data = bytes(STORE.serialize_cdr(message(7, DRIVES, *np.ones((3, 6))), STATE))
-    assert Layout.of(data) is not None
-    assert Layout.of(b'\x00\x07' + data[2:]) is None
-    assert Layout.of(data[:-1]) is None
-    assert Layout.of(data[:12] + struct.pack('<I', 2**31) + data[16:]) is None
-
-
 # ------------------------------------------------------------- rows that are no rows of a table
 
 
@@ -622,7 +466,7 @@ def rows_with(tmp_path: Path, change: Callable[[list[str]], None]) -> Path:
     return tmp_path / 'x.csv'
 
 
-@pytest.mark.parametrize('others', [(), (2500,), (2500, 3000)])
+@pytest.mark.parametrize('others', [(), (2500,)])
 def test_a_quote_without_its_pair_loses_no_row_in_silence(
     others: tuple[int, ...], tmp_path: Path,
 ) -> None:
@@ -634,7 +478,7 @@ def test_a_quote_without_its_pair_loses_no_row_in_silence(
         read_recording(rows_with(tmp_path, spoil))
 
 
-@pytest.mark.parametrize('word', ['5" pipe', '"5"" pipe"', 'a\u2028b', '"a b"', "'", '\x0b'])
+@pytest.mark.parametrize('word', ['5" pipe', '"5"" pipe"', 'a\u2028b'])
 def test_words_of_ignored_columns_take_no_row_away(word: str, tmp_path: Path) -> None:
     def write(lines: list[str]) -> None:
         lines[2001] = lines[2001].replace('ok', word)
@@ -642,7 +486,7 @@ def test_words_of_ignored_columns_take_no_row_away(word: str, tmp_path: Path) ->
     assert len(read_recording(rows_with(tmp_path, write)).time) == 4000
 
 
-@pytest.mark.parametrize('number', ['1_0', '\uff11\uff12', '\u0663', '0x10'])
+@pytest.mark.parametrize('number', ['1_0', '\u0663'])
 def test_what_only_python_reads_as_a_number_is_none(number: str, tmp_path: Path) -> None:
     def write(lines: list[str]) -> None:
         cells = lines[2001].split(',')
@@ -650,11 +494,3 @@ def test_what_only_python_reads_as_a_number_is_none(number: str, tmp_path: Path)
 
     with pytest.raises(UnreadableFileError, match='row 2002, column slide_1/position must hold'):
         read_recording(rows_with(tmp_path, write))
-
-
-def test_a_first_line_of_any_length_is_one_sentence(tmp_path: Path) -> None:
-    for length in (131_073, 2_000_000):
-        (tmp_path / 'x.csv').write_text('a' * length + '\n1\n')
-        with pytest.raises(UnreadableFileError) as told:
-            read_recording(tmp_path / 'x.csv')
-        assert len(str(told.value)) < 300

@@ -65,10 +65,6 @@ def test_recordings_of_a_robot_at_rest_are_alike_and_no_repeats() -> None:
 
 REFUSED = {
     ('compare', 'run.csv', 'copy.csv'): 'every recording may be given once',
-    ('compare', 'run.csv', 'other.csv', 'same.mcap'): 'every recording may be given once',
-    ('diagnose', 'run.csv', 'run.csv'): 'every recording may be given once',
-    ('next-experiment', 'run.csv', 'copy.csv', '--output', 'x.csv'): 'may be given once',
-    ('diagnose', 'run.csv', '--validate', 'copy.csv'): 'held out must be another recording',
     ('diagnose', 'run.csv', '--validate', 'run.csv'): 'held out must be another recording',
     ('adopt', 'viscous_friction', 'run.csv', '--validate', 'other.csv', '--validate', 'other.csv',
      '--output', 'x.yaml'): 'held out must be another recording'}

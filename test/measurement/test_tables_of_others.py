@@ -238,21 +238,6 @@ def test_packed_tables_are_unpacked(suffix: str, tmp_path: Path) -> None:
     assert_read(read(path, ALL))
 
 
-@pytest.mark.parametrize(('content', 'words'), [
-    ('stamp,j1/position\n0,1\n1,2\n', r'write columns: \{time: stamp\}.*pprs init'),
-    ('0.0,1.0\n0.1,2.0\n', 'pprs init ROBOT.urdf run.csv'),
-    ('time,left_j1/position,left_j2/position,left_j3/position\n0,1,2,3\n',
-     'write joint_prefix: left_'),
-    ('time,j1/position,j2/position,jo3/position\n0,1,2,3\n', r'joint_map: \{j3: jo3\}'),
-    ('time,a/position,b/position\n0,1,2\n', 'pprs init ROBOT.urdf run.csv')])
-def test_every_refusal_names_the_line_to_write(
-    content: str, words: str, tmp_path: Path,
-) -> None:
-    (tmp_path / 'run.csv').write_text(content)
-    with pytest.raises(UnreadableFileError, match=words):
-        read_recording(tmp_path / 'run.csv', JOINTS)
-
-
 @pytest.mark.parametrize('suffix', ['.npz', '.mat', '.parquet', '.csv.zst'])
 def test_what_only_ends_like_a_table_is_one_sentence(suffix: str, tmp_path: Path) -> None:
     for content in (b'PK\x03\x04' + b'x' * 90, b'\x00' * 200, b'words, words\n'):

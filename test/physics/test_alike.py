@@ -12,7 +12,6 @@ import pytest
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.physics.effects.laws.joint_friction import JointFrictionEffect
-from pprs_dynamics.physics.effects.laws.link_mass import LinkMass
 from pprs_dynamics.physics.mechanism.alike import alike_bodies, proportional_joints
 
 # A parallelogram in the vertical plane, and a pointer on its coupler: crank and follower turn
@@ -81,14 +80,6 @@ def test_a_body_on_one_of_them_is_a_body_on_the_other(parallelogram: DriveModel)
                              for link, what in (('crank', body), ('follower', same)))
     assert on_crank == pytest.approx(on_follower, abs=1e-9)
     assert np.abs(on_crank - robot.torques(q, v, a)).max() > 0.1
-
-
-def test_only_one_of_them_is_offered_with_a_free_centre(parallelogram: DriveModel) -> None:
-    effect = parallelogram.bound(LinkMass)
-    places = [{name.rpartition('.')[0] for name in names}.pop() for names in effect.variants
-              if len(names) > 1]
-    assert places == ['crank', 'coupler']
-    assert effect.places_of(['follower.mass']) == (('crank', 'follower'),)
 
 
 def test_friction_that_turns_with_a_drive_is_left_to_the_drive(

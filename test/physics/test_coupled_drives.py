@@ -12,8 +12,6 @@ from numpy.testing import assert_allclose
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.effects.drive_effect import DriveSamples
-from pprs_dynamics.physics.effects.laws.counterbalance import Counterbalance
 
 MAP = '{wrist: {turn: -0.5, swing: 2.0}}'
 
@@ -78,14 +76,6 @@ def test_a_spring_between_links_has_the_torque_of_its_energy(arm):
               for side in (-1, 1)]
     assert_allclose(force[:, 1], (energy[1] - energy[0]) / (2 * step), rtol=1e-6, atol=1e-6)
     assert not force[:, [0, 2]].any()
-
-
-def test_means_of_a_cylinders_columns_are_columns_of_means():
-    q = np.linspace(-1, 1, 50)
-    samples = DriveSamples(None, q, q, q, q, q, q)
-    shapes = [{'ratio': 0.4, 'position': 0.2}, {'ratio': 0.8, 'position': -2.0}]
-    for shape, columns in zip(shapes, Counterbalance.averaged(samples, 0.01, shapes), strict=True):
-        assert_allclose(columns, Counterbalance.columns(samples, **shape)[:2])
 
 
 def test_a_cylinder_pulls_with_the_pressure_that_was_measured(arm):

@@ -10,7 +10,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.mechanism.arithmetic import compiled_solve
 from pprs_dynamics.physics.mechanism.elimination import elimination_order
 
@@ -38,7 +37,7 @@ def in_order(A: np.ndarray, pattern: np.ndarray) -> tuple[SimpleNamespace, np.nd
             order.columns)
 
 
-@pytest.mark.parametrize('seed', range(8))
+@pytest.mark.parametrize('seed', range(3))
 def test_it_solves_what_lapack_solves_at_home_and_elsewhere(seed: int) -> None:
     random = np.random.default_rng(seed)
     home, pattern = a_platform_on_legs(random)
@@ -56,11 +55,3 @@ def test_it_solves_what_lapack_solves_at_home_and_elsewhere(seed: int) -> None:
         expected = np.linalg.solve(A, B)
         scale = np.linalg.cond(A) * np.abs(expected).max()
         assert np.abs(right - expected).max() < 1e-13 * scale
-
-
-def test_of_a_hexapod_most_is_zero_for_good() -> None:
-    """Of 18 by 18, legs fill 6 columns of the platform and their own: as counted by hand."""
-    t = DriveModel.load('config/hexapod.yaml').robot.structure.tables
-    _, below, right = np.diff(t.starts, axis=0).T
-    # Each leg: two rows from which 7 columns go, one from which 6; then 6 by 6 in full.
-    assert below @ right <= 6 * (2 * 7 + 6) + sum(k * k for k in range(6))

@@ -137,20 +137,3 @@ class Stiction(DriveEffect):
 def stiction() -> Any:
     guard(Stiction)
     return Stiction
-
-
-@pytest.mark.parametrize(('method', 'answer', 'told'), [
-    ('trials', [{'width': 0.1}, {}], 'trials returned {}, must map width'),
-    ('trials', [{'width': 0.1, 'height': 1.0}], "returned {'width': 0.1, 'height': 1.0}, must map"),
-    ('from_coefficients', {}, 'from_coefficients returned {}, must map force to finite numbers'),
-    ('from_coefficients', {'force': np.nan}, "{'force': nan}, must map force to finite numbers"),
-    ('from_coefficients', {'force': np.inf}, "{'force': inf}, must map force to finite numbers"),
-])
-def test_a_wrong_answer_is_shown_beside_what_it_must_be(
-    stiction: Any, method: str, answer: Any, told: str,
-) -> None:
-    stiction.answers = {method: answer}
-    with pytest.raises(EffectError) as raised:
-        getattr(stiction, method)(stiction)
-    assert told in str(raised.value)
-    assert str(raised.value).startswith('effect stiction: ')

@@ -14,7 +14,6 @@ from oracles.first_principles import chain_vectors, closure
 from random_states import (
     ELBOWS,
     home_position,
-    model_of,
     paper_geometry,
     paper_model,
     random_motion,
@@ -36,10 +35,9 @@ from pprs_dynamics.errors import (
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.three_pprs.forward_kinematics import home_pose, solve_forward_kinematics
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
-    chain_table,
     solve_inverse_kinematics,
 )
-from pprs_dynamics.physics.three_pprs.jacobians import condition_number, inverse_table
+from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.robot import ThreePprs
 
 POSES = 4000
@@ -141,15 +139,6 @@ def test_other_solutions_of_random_poses_are_refused():
     assert others >= 10
 
 
-def test_forward_from_home_finds_the_true_pose_among_several():
-    # The same search, the other way round: wherever there are rivals, home leads to the truth.
-    geometry = paper_geometry()
-    position, orientation = random_poses(np.random.default_rng(8), 20)
-    q = solve_inverse_kinematics(geometry, PlatformMotion.at_rest(position, orientation)).position
-    assert_allclose(solve_forward_kinematics(geometry, q).position, position, rtol=0,
-                    atol=POSE_TOLERANCE)
-
-
 def test_drives_that_cannot_close_the_mechanism_raise(geometry):
     q = solve_inverse_kinematics(geometry, home_pose()).position.repeat(3, axis=0)
     q[1, 0] += 1.0  # one slide a metre away from the others
@@ -159,9 +148,8 @@ def test_drives_that_cannot_close_the_mechanism_raise(geometry):
 
 
 @pytest.mark.parametrize('q', [
-    np.zeros(5), np.zeros((2, 7)), np.zeros((0, 6)), np.zeros((2, 3, 6)),
-    [0, 0, 0, 0.2, np.nan, 0.2], [0, 0, 0, 0.2, np.inf, 0.2], [[0, 0], [0]], [['left'] * 6]],
-    ids=['five', 'seven', 'none', 'nested', 'nan', 'infinite', 'ragged', 'words'])
+    np.zeros(5), np.zeros((0, 6)), [0, 0, 0, 0.2, np.nan, 0.2], [[0, 0], [0]], [['left'] * 6]],
+    ids=['five', 'none', 'nan', 'ragged', 'words'])
 def test_drive_positions_that_are_none_raise(q):
     with pytest.raises(MotionError, match='drive positions'):
         solve_forward_kinematics(paper_geometry(), q)
@@ -225,16 +213,6 @@ def test_velocities_and_accelerations_are_derivatives_of_positions(geometry):
 # Jacobians -----------------------------------------------------------------------------------
 
 
-def test_condition_number_takes_rotations_times_the_platform_radius():
-    robot = random_robot(np.random.default_rng(43))
-    motion = random_motion(np.random.default_rng(44), 50)
-    model = model_of(robot)
-    J = model.mechanism(motion).links.J.copy()
-    J[:, 3:] *= robot.geometry.platform_radius
-    assert_allclose(condition_number(robot.geometry, model.mechanism(motion).links.J),
-                    np.linalg.cond(J), rtol=1e-10)
-
-
 # Out of reach and singular -------------------------------------------------------------------
 
 @every_elbow
@@ -288,12 +266,3 @@ def test_condition_limit_is_where_it_says(elbow):
     assert np.all(np.isfinite(paper_model(above).drive_forces(pose).total))
     with pytest.raises(SingularityError, match='condition number'):
         paper_model(below).drive_forces(pose)
-
-
-def test_exactly_singular_B_raises_even_without_a_limit():
-    geometry = paper_geometry()
-    chains = chain_table(geometry, PlatformMotion.at_rest(home_position()), 1e-6)
-    # Joints of the platform on top of each other: no moment about any axis through them.
-    chains[:, :9] = 0.0
-    with pytest.raises(SingularityError, match=r'det \[B\]'):
-        inverse_table(geometry, chains, np.inf)

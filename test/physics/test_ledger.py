@@ -7,13 +7,11 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 from pprs_command import pprs
 
 from pprs_dynamics.errors import ModelError
@@ -27,7 +25,6 @@ from pprs_dynamics.physics.model.ledger import (
 )
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.physics.model.parameter_file import (
-    LEDGER,
     default_parameters,
     read_parameters,
 )
@@ -104,16 +101,6 @@ def test_a_damaged_ledger_is_one_sentence(stages: list[dict[str, Any]], key: str
         read_steps({**stages[2], key: value})
 
 
-def test_steps_are_read_wherever_they_stand(stages: list[dict[str, Any]]) -> None:
-    steps = read_steps(stages[2])
-    assert len(steps) == 2
-    ledger = {key: value for key, value in stages[2].items() if key.startswith('history.')}
-    rest = {key: value for key, value in stages[2].items() if key not in ledger}
-    assert rest
-    assert read_steps({'history': None, 'tool': None, **ledger, **rest}) == steps
-    assert read_steps({**rest, **dict(reversed(ledger.items())), 'history': {}}) == steps
-
-
 def test_a_step_whose_effect_was_removed_by_hand_is_not_taken_back(
     stages: list[dict[str, Any]],
 ) -> None:
@@ -142,35 +129,6 @@ def test_the_command_shows_draws_and_takes_back(
     assert done.returncode == 0, done.stderr
     assert model_values(read_parameters(new)) == stages[1]
     assert old.read_bytes() == content
-
-
-OLD = Path(__file__).parents[2] / 'config/paper.yaml'
-
-
-def test_the_ledger_has_a_section_of_its_own(
-    stages: list[dict[str, Any]], tmp_path: Path,
-) -> None:
-    file = tmp_path / 'model.yaml'
-    write_model(file, stages[2], OLD)
-    sections = yaml.safe_load(file.read_text())
-    assert list(sections) == ['/**', LEDGER]
-    assert 'history' not in sections['/**']['ros__parameters']
-    assert set(sections[LEDGER]['ros__parameters']['history']) == {'step_01', 'step_02'}
-
-
-def test_a_ledger_of_hundreds_of_steps_is_written_and_read(tmp_path: Path) -> None:
-    """Of dozens of recordings each, it outgrew what was read of a file."""
-    step = replace(STEP, recordings=tuple(f'{k}.csv' for k in range(30)), sha256=('f' * 64,) * 30,
-                   spans=(0.0,) * 60)
-    values = {**default_parameters(), **{
-        key: value for k in range(1, 401)
-        for key, value in step.as_values(f'history.step_{k:02d}').items()}}
-    file = tmp_path / 'model.yaml'
-    write_model(file, values, OLD)
-    assert file.stat().st_size > 1_000_000
-    start = time.process_time()
-    assert len(read_steps(read_parameters(file))) == 400
-    assert time.process_time() - start < 5.0
 
 
 def test_a_model_without_steps_has_none_to_take_back(tmp_path: Path) -> None:

@@ -163,9 +163,3 @@ def test_a_body_that_does_not_weigh_what_it_weighs_is_refused(tmp_path: Path) ->
                                                       '<body name="beam" gravcomp="1"')
     with pytest.raises(PprsError, match=r'beam.*gravcomp'):
         DriveModel.load(write(tmp_path, text, 'turn, reach, swing', 'tool'))
-
-
-def test_a_rotor_in_a_passive_joint_is_refused_by_name(tmp_path: Path) -> None:
-    text = LOOP.format(ref=0.0, anchor='0 0 0').replace('frictionloss="0"', 'armature="0.1"')
-    with pytest.raises(PprsError, match=r'c.*armature'):
-        DriveModel.load(write(tmp_path, text, 'a', 'rod'))

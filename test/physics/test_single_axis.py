@@ -16,14 +16,8 @@ from single_axis import AXIS, axis_values
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.errors import ModelError, MotionError
-from pprs_dynamics.inference.adoption.request import EffectRequest, EffectRequestError
-from pprs_dynamics.inference.regression.base_columns import ModelNumber
-from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct
-from pprs_dynamics.inference.search.decisions import DECISIONS
-from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
-from pprs_dynamics.physics.model.keys import set_number
 from pprs_dynamics.physics.model.model_writer import write_model
 
 MASS, VISCOUS, COULOMB, OFFSET, WIDTH = 20.0, 40.0, 6.0, -2.0, 0.001
@@ -81,22 +75,10 @@ def test_the_force_is_the_textbooks(gravity: float) -> None:
     np.testing.assert_allclose(sum(forces.parts.values()), forces.total, rtol=0, atol=EQUAL)
 
 
-def test_a_vertical_axis_at_rest_is_held_against_its_weight() -> None:
-    model = DriveModel.from_parameters({**VALUES, 'friction.offset': [0.0],
-                                        'robot.gravity': [0.0, 0.0, -9.81]})
-    rest = np.zeros((1, 1))
-    assert model.drive_forces(JointMotion(rest, rest, rest)).total[0, 0] == MASS * 9.81
-
-
 @pytest.mark.parametrize(('change', 'sentence'), [
     ({'links.mass': [0.0]}, 'move a body: no link that it moves has a mass'),
     ({'friction.coulomb': [-1.0]}, 'friction.coulomb is [-1.0]'),
-    ({'links.masss': [1.0]}, 'did you mean links.mass?'),
-    ({'masses.platform': 1.0}, 'unknown key masses.platform'),
-    ({'tolerances.links.mass': 2.0}, 'between 0 and 1'),
-    ({'tolerances.masses.payload': 0.1}, 'unknown key tolerances.masses.payload'),
     ({'effects.payload_mass.mass': 0.1}, 'be an effect that acts in a single axis'),
-    ({'effects.homing_error.axis.zero': 0.001}, 'be an effect that acts in a single axis'),
     ({'effects.viscous_friction.lift_1.coefficient': 1.0}, 'unknown drive lift_1 (known: axis)'),
 ])
 def test_a_mistake_in_a_file_is_one_sentence(change: dict[str, float], sentence: str) -> None:
@@ -110,45 +92,6 @@ def test_a_recording_of_other_drives_is_refused_by_name() -> None:
     other = Recording.from_arrays('x', time, np.sin(time)[:, None], drives=('lift_1',))
     with pytest.raises(MotionError, match='they are lift_1, must be axis'):
         reconstruct(DriveModel.from_parameters(VALUES), other)
-
-
-def test_columns_of_numbers_are_what_the_model_changes_by() -> None:
-    tolerances = {f'tolerances.{key}': 0.1 for key in (
-        'links.mass', 'friction.viscous', 'friction.coulomb', 'friction.offset',
-        'friction.reversal_velocity')}
-    model = DriveModel.from_parameters(
-        {**VALUES, 'robot.gravity': [0.0, 0.0, -9.81], 'tolerances.robot.gravity': 0.1,
-                         **tolerances})
-    design = Design.of(model, [bench(1)])
-    for column in design.base:
-        if not isinstance(column, ModelNumber):
-            continue
-        value, moved = column.number.value, 0.001
-        # Away from 0 by a share of one standard deviation.
-        after = value + np.sign(value) * moved * column.number.deviation
-        values = dict(model.values)
-        set_number(values, column.number.key, column.number.element, float(after))
-        other = Design.of(DriveModel.from_parameters(values), [bench(1)])
-        change = (other.residuals.model - design.residuals.model)[:, 0] / moved
-        np.testing.assert_allclose(column.rows[0], change, rtol=0,
-                                   atol=2e-3 * np.abs(change).max())
-
-
-def test_an_offset_that_is_known_roughly_is_found_within_its_tolerance() -> None:
-    model = DriveModel.from_parameters({**VALUES, 'tolerances.friction.offset': 1.0})
-    design = Design.of(model, [bench(3, hidden=False, offset=-0.5)])
-    found = FittedSets(design, DECISIONS).evaluate(())
-    place, number = next((k, column.number) for k, column in enumerate(design.base)
-                         if isinstance(column, ModelNumber))
-    assert OFFSET - found.fit.coefficients[place] * number.deviation == pytest.approx(
-        -2.5, abs=0.02)
-
-
-def test_effects_of_a_platform_are_not_offered_to_an_axis() -> None:
-    with pytest.raises(EffectRequestError, match='payload_mass does not act in a single axis'):
-        EffectRequest.of('payload_mass').placed(DriveModel.from_parameters(VALUES))
-    with pytest.raises(EffectRequestError, match='one of axis'):
-        EffectRequest.of('viscous_friction:lift_1', (AXIS,))
 
 
 def test_diagnose_names_the_hidden_effect_and_writes_a_model_that_has_it(folder: Path) -> None:

@@ -5,9 +5,7 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import made_up_arm as arm
 import numpy as np
@@ -15,11 +13,9 @@ import pytest
 import robots_with_loops as robots
 
 from pprs_dynamics import DriveModel, JointMotion
-from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.physics.mechanism.description import Description
 from pprs_dynamics.physics.mechanism.urdf import read_urdf
-from pprs_dynamics.physics.model.robot_block import inertial_values
 
 INERTIA = '<inertia ixx="{}" iyy="{}" izz="{}" ixy="0" ixz="0" iyz="0"/>'
 
@@ -43,20 +39,6 @@ def test_bodies_that_cannot_be_are_told_and_those_that_can_are_not(tmp_path: Pat
     assert 'upper has 8e+04 kg m^2 in 5 kg' in millimetres
     assert '126 m in a robot that reaches 0.4 m' in millimetres
     assert '0.08 kg m^2' in millimetres
-
-
-def test_info_tells_what_is_wrong_with_a_description(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str],
-) -> None:
-    text = arm.urdf().replace('ixx="0.02"', 'ixx="20000"')
-    assert main(['info', '--model', str(arm.write_arm(tmp_path, text))]) == 0
-    assert 'beam is no body' in ' '.join(capsys.readouterr().out.split())
-    model = DriveModel.load(tmp_path / 'arm.yaml')
-    assert 'beam is no body' in model.faults[0]
-    # A fit puts other numbers in their place.
-    fitted = DriveModel.from_parameters(
-        {**model.values, **inertial_values(model.robot.inertial)}, model.source)
-    assert fitted.faults == ()
 
 
 def as_constraints(text: robots.RobotText, folder: Path) -> Path:
@@ -132,31 +114,6 @@ XACRO = '''<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro">
 </link></robot>'''
 
 
-def test_xacro_is_run_where_its_package_is_and_told_where_it_is_not(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    path = tmp_path / 'robot.urdf.xacro'
-    path.write_text(XACRO)
-    monkeypatch.setitem(sys.modules, 'xacro', None)
-    with pytest.raises(PprsError, match=r'holds xacro.*xacro robot\.urdf\.xacro > robot\.urdf'):
-        read_urdf(str(path))
-    ran = '<robot name="a"><link name="x"><inertial><mass value="6"/></inertial></link></robot>'
-    monkeypatch.setitem(sys.modules, 'xacro', SimpleNamespace(
-        process_file=lambda name: SimpleNamespace(toxml=lambda: ran)))
-    assert read_urdf(str(path)).links['x'][0] == 6
-
-    def fails(name: str) -> None:
-        raise RuntimeError('No such file or directory:\nother.xacro')
-
-    monkeypatch.setitem(sys.modules, 'xacro', SimpleNamespace(process_file=fails))
-    with pytest.raises(PprsError, match=r'cannot be run: No such file or directory: other\.xacro'):
-        read_urdf(str(path))
-    # What was run once keeps the declaration of the name, and is a URDF.
-    path.write_text(XACRO.replace('${2*m}', '6').replace(
-        '<xacro:property name="m" value="3"/>', ''))
-    assert read_urdf(str(path)).links['x'][0] == 6
-
-
 def test_the_real_xacro_is_run_as_such(tmp_path: Path) -> None:
     pytest.importorskip('xacro')
     path = tmp_path / 'robot.urdf.xacro'
@@ -183,23 +140,6 @@ def test_reductions_are_gear_ratios_unless_the_model_file_has_some(
     path = arm.write_arm(tmp_path, text)
     path.write_text(path.read_text() + '      gear_ratio: [2.0, 3.0, 4.0]\n')
     assert DriveModel.load(path).gear_ratios == (2.0, 3.0, 4.0)
-
-
-def test_gears_that_are_none_are_told(tmp_path: Path) -> None:
-    with pytest.raises(PprsError, match='reduction of transmission t is "fifty"'):
-        DriveModel.load(arm.write_arm(tmp_path, arm.urdf(
-            more=gear('mechanicalReduction', 'type', 'actuator', 'fifty'))))
-    other = gear('mechanicalReduction', 'type', 'actuator', '50').replace('Simple', 'FourBarish')
-    (remark,) = one_link(tmp_path, (0.01, 0.08, 0.08), other).remarks
-    assert '<transmission> t is not used' in remark
-
-
-def test_what_has_a_shape_and_no_mass_and_dynamics_are_told(tmp_path: Path) -> None:
-    cover = ('<link name="cover"><collision/></link><joint name="lid" type="fixed">'
-             '<parent link="upper"/><child link="cover"/><dynamics damping="2"/></joint>')
-    hollow, rubbing = one_link(tmp_path, (0.01, 0.08, 0.08), cover).remarks
-    assert hollow.startswith('cover have a shape and no <inertial>')
-    assert '<dynamics> of lid is not used' in rubbing
 
 
 def test_a_description_is_found_in_its_package(

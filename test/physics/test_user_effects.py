@@ -88,14 +88,6 @@ except PprsError as error:
 """
 
 
-def test_its_parameters_are_checked_like_any_others(installed: Path, tmp_path: Path) -> None:
-    file = model_file(tmp_path, {
-        'active': ['eddy_brake'],
-        'eddy_brake': {'slide_2': {'coefficient': -3.0, 'critical_velocity': 0.05}}})
-    done = python(LOAD, installed, file)
-    assert 'effects.eddy_brake.slide_2.coefficient is -3.0, must be between' in done.stdout
-
-
 def test_without_the_package_the_effect_is_unknown(tmp_path: Path) -> None:
     file = model_file(tmp_path, {'active': ['eddy_brake']})
     done = python(LOAD, tmp_path, file)
@@ -122,24 +114,12 @@ class Mine(DriveEffect):
 """
 BROKEN = {
     'no_module': ('', 'gone:Mine', 'cannot be imported (ModuleNotFoundError: No module named'),
-    'no_class': (GOOD, '{module}:Thine', 'cannot be imported (AttributeError'),
     'fails': ('raise OSError("no licence\\nserver")', '{module}:Mine',
               'cannot be imported (OSError: no licence server)'),
-    'paints': ('raise OSError("\x1b[2J\x1b]0;mine\x07")', '{module}:Mine',
-               r'cannot be imported (OSError: \x1b[2J\x1b]0;mine\x07'),
     'quits': ('raise SystemExit(3)', '{module}:Mine', 'cannot be imported (SystemExit: 3)'),
-    'no_effect': ('class Mine: pass', '{module}:Mine', 'a class derived from CatalogueEffect'),
     'no_card': (GOOD.replace('card = ', 'chart = '), '{module}:Mine', 'Mine must have card'),
-    'no_columns': (GOOD.replace('columns', 'rows'), '{module}:Mine', 'not define columns'),
-    'no_name': (GOOD.replace("name = 'mine'", ''), '{module}:Mine', 'Mine must have name'),
-    'no_linear': (GOOD.replace('linear = ', 'straight = '), '{module}:Mine',
-                  'Mine must have linear'),
-    'words': (GOOD.replace('card = ', "shape = ('width',); card = "), '{module}:Mine',
-              'Mine must have shape, a tuple of Parameter'),
-    'dotted': (GOOD.replace("'mine'", "'my.force'"), '{module}:Mine', "'my.force' must be one"),
     'taken': (GOOD.replace("'mine'", "'payload_mass'"), '{module}:Mine',
               'the name payload_mass is taken'),
-    'key': (GOOD.replace("'mine'", "'active'"), '{module}:Mine', 'the name active is taken'),
 }
 
 

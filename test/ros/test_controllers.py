@@ -74,7 +74,7 @@ def test_a_stream_is_taken_where_it_ends_after_its_arrival(
     assert objection(forwarded(points, ahead), settings(), NOW + WAY) == ''
 
 
-@pytest.mark.parametrize('rate', [50.0, 100.0, 500.0, 1000.0])
+@pytest.mark.parametrize('rate', [50.0, 1000.0])
 def test_a_stream_is_taken_with_reserve_by_the_defaults(rate: float) -> None:
     given = {one.name: one.default for one in play_trajectory.PARAMETERS}
     for allows, stop_time in ((False, STOP), (True, 0.0)):
@@ -95,22 +95,6 @@ def test_efforts_need_the_effort_interface() -> None:
     positions = ControllerSettings(DRIVES, ('position',),
                                    allow_nonzero_velocity_at_trajectory_end=True)
     assert 'effort' in objection(forwarded(10, 0.02), positions, NOW + WAY)
-
-
-@pytest.mark.parametrize('name', ['forward_command_controller', 'joint_trajectory_controller'])
-def test_the_files_name_the_drives_in_the_order_of_commands(name: str) -> None:
-    content = yaml.safe_load((CONFIG / f'{name}.yaml').read_text())
-    given = content[name]['ros__parameters']
-    assert given['joints'] == list(DRIVES)
-    types = content['controller_manager']['ros__parameters']
-    assert name in types
-    assert types[name]['type'].startswith(f'{name}/')
-    if name == 'forward_command_controller':
-        assert given['interface_name'] == 'effort'
-    else:
-        assert set(given['state_interfaces']) == {'position', 'velocity'}
-        assert set(given['gains']) == set(DRIVES)
-        assert given['cmd_timeout'] == 0.0  # any other ends feedforward's hold, too
 
 
 ALONG = np.linspace(0.0, HelicalPath.duration, 48)  # [s] of a path from rest to rest

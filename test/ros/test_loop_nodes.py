@@ -16,7 +16,6 @@ from node_bench import bench, overrides
 from rclpy.parameter import Parameter
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import (
     JointTrajectory,
     JointTrajectoryPoint,
@@ -28,7 +27,6 @@ from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.monitor import MonitorNode
-from pprs_dynamics.ros.simulated_robot import SimulatedRobotNode
 
 pytestmark = pytest.mark.nodes
 
@@ -113,43 +111,6 @@ def test_poses_of_the_tool_are_answered_or_refused_as_those_of_a_platform() -> N
         node.bench.spin_for(0.02)  # margins are computed 100 times a second
         node.send(message_of(PlatformMotion.at_rest(at_home, near)))
         assert node.wait_for_status(code='NEAR_SINGULAR')['singularity_margin'] < 0.99
-
-
-def given(**own: Any) -> list[Parameter]:
-    """Return the file's parameters, and a node's own, as a node takes them."""
-    return overrides(**{**parameters(), **own})
-
-
-def test_the_simulated_robot_holds_moves_and_refuses() -> None:
-    """How it follows a whole path is tested in simulated time."""
-    model = DriveModel.load(FILE)
-    home, _ = model.robot.structure.room(np.pi)
-    with bench() as running:
-        states = running.listen(JointState, '/joint_states', 1000)
-        errors = running.listen(Float64MultiArray, '/monitor/error', 1000)
-        running.follow_status('/simulated_robot/status')
-        running.add(SimulatedRobotNode, parameter_overrides=given(
-            rate=100.0, command_timeout=0.0, effort_noise=0.001))
-        running.add(MonitorNode, parameter_overrides=given())
-        setpoint = running.probe.create_publisher(
-            JointState, '/simulated_robot/joint_command', 10)
-        assert running.spin_until(lambda: len(states) > 5 and setpoint.get_subscription_count())
-        np.testing.assert_allclose(states[-1].position, home, rtol=0, atol=1e-5)
-        assert tuple(states[-1].name) == model.drives
-        goal = home + 0.004
-        rest = np.zeros((1, 6))
-        weight = model.drive_forces(JointMotion(goal[None], rest, rest)).total[0]
-        order = model.drives[::-1]
-        setpoint.publish(JointState(name=order, position=goal[::-1].tolist(),
-                                    velocity=[0.0] * 6, effort=weight[::-1].tolist()))
-        # Dry friction of 3 N, more with load, holds the PD loop of 4 N/mm off by up to 1 mm.
-        assert running.spin_until(
-            lambda: np.allclose(states[-1].position, goal, rtol=0, atol=1.2e-3), 20)
-        assert running.spin_until(lambda: errors, 30)
-        setpoint.publish(JointState(name=order[1:], position=[0.4] * 5, velocity=[0.0] * 5,
-                                    effort=[0.0] * 5))
-        assert running.spin_until(lambda: running.status[-1]['code'] == 'REFUSED')
-        assert 'leg_1' in running.status[-1]['message']
 
 
 def test_the_platform_is_on_tf_while_somebody_draws_the_robot() -> None:

@@ -121,29 +121,6 @@ def test_messages_that_are_no_joint_states_of_this_robot_are_counted_and_survive
     assert monitor.bench.status[-1]['code'] == 'OK'
 
 
-def test_drives_spread_over_messages_are_compared_as_those_in_one(monitor: MonitorBench) -> None:
-    """Three broadcasters: slides, lifts a quarter of a period later, and a gripper."""
-    monitor.effort[:, 4] += OFFSET
-    for row in range(500):
-        stamp = START + row * 1_000_000_000 // RATE
-        for names, columns, late in ((DRIVES[:3], slice(0, 3), 0),
-                                     (DRIVES[3:], slice(3, 6), 500_000)):
-            message = JointState(name=names, position=monitor.position[row, columns],
-                                 effort=monitor.effort[row, columns])
-            message.header.stamp = conversions.time(stamp + late)
-            monitor.publisher.publish(message)
-        monitor.publisher.publish(JointState(name=['gripper'], position=[0.01]))
-        if row % 20 == 0:
-            assert monitor.arrived(3 * row + 3)
-    assert monitor.arrived(1500)
-    monitor.bench.spin_for(0.2)
-    # The first message, before the others were there, is all that is refused.
-    assert monitor.node._counters['NAMES'] == 1
-    assert monitor.node._counters['compared'] > 300
-    assert monitor.bench.status[-1]['code'] == 'OK'
-    np.testing.assert_allclose(monitor.error[-1].data, [0, 0, 0, 0, OFFSET, 0], atol=0.02)
-
-
 def test_without_measured_efforts_the_status_says_so_in_words(monitor: MonitorBench) -> None:
     monitor.effort[:] = np.nan
     monitor.send(300)

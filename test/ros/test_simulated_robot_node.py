@@ -100,16 +100,6 @@ def test_it_follows_setpoints_and_holds_when_they_stop(robot: RobotBench) -> Non
     np.testing.assert_allclose(robot.position, held, atol=5e-4)
 
 
-def test_efforts_alone_move_it_without_a_loop(robot: RobotBench) -> None:
-    push = Float64MultiArray(data=(WEIGHT * 1.1).tolist())
-
-    def has_risen() -> bool:
-        robot.efforts.publish(push)
-        return bool(np.all(robot.position[3:] > REST[3:] + 1e-3))
-
-    assert robot.bench.spin_until(has_risen)
-
-
 @pytest.mark.parametrize(('change', 'words'), [
     ({'position': [float('nan')] * 6}, 'must be finite'),
     ({'name': ['a', 'b', 'c', 'd', 'e', 'f']}, 'must hold slide_1'),
@@ -128,26 +118,6 @@ def test_impossible_setpoints_are_refused_and_the_robot_stays(
     assert words in refused[0]['message']
     robot.bench.spin_for(0.2)
     np.testing.assert_allclose(robot.position, REST, atol=1e-4)
-
-
-def test_efforts_beyond_the_limits_saturate_and_are_told(robot: RobotBench) -> None:
-    robot.keep_sending(Float64MultiArray(data=[0.0, 0, 0, 1e4, 1e4, 1e4]), robot.efforts, 0.1)
-    assert robot.bench.spin_until(robot.says('SATURATED'))
-    assert np.abs([state.effort for state in robot.states]).max() < 101.0
-
-
-def test_a_hidden_effect_acts() -> None:
-    with bench() as running:
-        robot = RobotBench(running, hidden_effects=['effort_offset'], seed=4, effort_noise=0.0,
-                           rate=100.0)
-        # Friction creeps until the PD loop alone carries the offset.
-        assert running.spin_until(lambda: len(robot.states) > 500, 60)
-        # Encoder steps keep the loop busy: a mean over two seconds.
-        change = np.mean([state.effort for state in robot.states[-200:]], axis=0) - WEIGHT
-        (truth,) = robot.node._robot.plant.injected
-        for k, drive in enumerate(DRIVES):
-            expected = truth['parameters'].get(drive, {}).get('force', 0.0)
-            assert change[k] == pytest.approx(expected, abs=0.05), drive
 
 
 def test_what_is_hidden_changes_while_it_runs(robot: RobotBench) -> None:

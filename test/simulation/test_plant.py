@@ -12,7 +12,6 @@ from pathlib import Path
 import made_up_arm
 import numpy as np
 import pytest
-import robots_with_loops as robots
 
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.physics.effects.laws.base_tilt import BaseTilt
@@ -108,16 +107,6 @@ def test_it_holds_at_home_saturates_and_refuses(tmp_path: Path) -> None:
     assert ' N, limits' in robot.notes[-1].message or 'URDF' in robot.notes[-1].message
 
 
-def test_an_injected_payload_is_moved_by_the_drive_that_carries_it(tmp_path: Path) -> None:
-    model = DriveModel.load(robots.five_bar().write(tmp_path))
-    plain, loaded = Plant(model), Plant(model, ['payload_mass'], seed=2)
-    mass, masses = loaded.injected[0]['parameters']['mass'], model.robot.masses.sum()
-    assert 0.05 * masses <= mass <= 0.12 * masses
-    # The tool's origin is an elbow: one drive moves it.
-    moved = loaded.inertia / plain.inertia
-    assert moved.max() > 1.05
-
-
 @pytest.fixture(scope='module')
 def platform() -> DriveModel:
     return DriveModel.load('config/paper.yaml')
@@ -157,12 +146,6 @@ def test_effects_change_while_it_runs(platform: DriveModel) -> None:
         plant.inject(['viscous'])
     with pytest.raises(InjectedEffectError, match="not act in 'lift_1'"):
         plant.inject(['base_tilt:lift_1'])
-
-
-def test_what_cannot_be_injected_is_refused(tmp_path: Path) -> None:
-    model = DriveModel.load(robots.five_bar().write(tmp_path))
-    with pytest.raises(InjectedEffectError, match='rod_mass cannot be injected'):
-        Plant(model, ['rod_mass'])
 
 
 def test_hidden_friction_by_load_follows_the_effort_of_the_moment(tmp_path: Path) -> None:
