@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -17,9 +16,6 @@ from feedforward_bench import random_motion
 
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import EffectError
-from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.effects.effect import Card, Parameter
-from pprs_dynamics.physics.effects.foreign_effects import guard
 
 ONE = random_motion(np.random.default_rng(11), 3)[:1]
 
@@ -113,27 +109,3 @@ def test_a_model_file_with_an_effect_that_cannot_be_built_is_refused(
     name = 'hose' if place == 'changed' else 'worn_brake'
     with pytest.raises(EffectError, match=f'effect {name}: {place} raised ZeroDivisionError'):
         DriveModel.load(model_file(tmp_path, name))
-
-
-class Stiction(DriveEffect):
-    """Methods answer what the test puts into `answers`; the class is guarded like a foreign one."""
-
-    name = 'stiction'
-    linear = (Parameter('force', 'F', 'N', 'of both directions', 0.0, 1e6),)
-    shape = (Parameter('width', 'v', 'm/s', 'of the reversal', 0.0, 1.0),)
-    card = Card('F', '', '', '', '')
-    answers: Mapping[str, Any] = {}
-
-    @classmethod
-    def trials(cls, *_: Any) -> Any:
-        return cls.answers['trials']
-
-    @classmethod
-    def from_coefficients(cls, *_: Any) -> Any:
-        return cls.answers['from_coefficients']
-
-
-@pytest.fixture(scope='module')
-def stiction() -> Any:
-    guard(Stiction)
-    return Stiction
