@@ -73,8 +73,8 @@ def effort_kind(values: Mapping[str, Any]) -> str:
     if not isinstance(kind, str) or kind not in EFFORT_KINDS:
         raise ModelError(EFFORT_KIND, kind, f'be one of {", ".join(EFFORT_KINDS)}')
     if kind == CURRENT and GAIN not in values:
-        raise ModelError(EFFORT_KIND, kind, 'be another one: only an arm and a robot with loops '
-                         'have a gain, by which currents become efforts')
+        raise ModelError(EFFORT_KIND, kind, 'be another one: a 3-PPRS has no gain by which '
+                         'currents become efforts')
     return kind
 
 
