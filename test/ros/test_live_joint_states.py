@@ -51,8 +51,8 @@ def test_what_is_no_message_of_the_monitor_is_passed_over(running: tuple[Bench, 
     assert bench.spin_until(lambda: node.to_dict()['diagnosis'] == {'since': None, 'effects': []})
 
 
-@pytest.mark.parametrize('reliability', [
-    ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT], ids=lambda one: one.name)
+@pytest.mark.parametrize('reliability', [ReliabilityPolicy.BEST_EFFORT],
+                         ids=lambda one: one.name)
 @pytest.mark.parametrize('comes', ['before', 'after'])
 def test_joint_states_are_heard_whatever_their_publisher_offers(
     reliability: ReliabilityPolicy, comes: str,
