@@ -28,7 +28,7 @@ def screens(text: str) -> list[tuple[str, list[str]]]:
         printed = re.search(rf'<!-- {name} -->\n```text\n(.*?)\n```', text, re.S)
         if command is None or printed is None:
             raise ValueError(f'the tutorial has no command and block {name}')
-        found.append((command[0], printed[1].split('\n')))
+        found.append((command[0].partition(' --report')[0], printed[1].split('\n')))
     return found
 
 
