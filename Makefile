@@ -72,7 +72,7 @@ fuzz: $(VENV)/.test
 lint: $(VENV)/.test
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/python docs/prose.py --pages
+	$(BIN)/python docs/prose.py
 
 # -W: a warning is an error; all of them are shown first.
 docs: $(VENV)/.docs

@@ -68,7 +68,7 @@ TESTS = {
                                            'ros/test_trajectory_bytes.py'),
     'ros/node/controller_watch.py': ('ros/test_controller_watch.py',),
     'ros/node/senders.py': ('ros/test_senders.py',),
-    'ros/setpoints.py': ('ros/test_setpoints.py',),
+    'ros/setpoints.py': ('ros/test_simulated_robot_node.py',),
     'app/workbench/server/change_log.py': ('app/test_change_log.py',),
     'app/workbench/server/access.py': ('app/test_workbench_safety.py',),
 }

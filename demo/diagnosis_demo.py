@@ -100,6 +100,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else '')
     parser.add_argument('output', nargs='?', default='output', help='folder (default output)')
     parser.add_argument('--seed', type=int, default=None, help='draws the effect; repeats a run')
+    parser.add_argument('--effect', default='random', help='what is hidden (default: drawn)')
     parser.add_argument('--duration', type=float, default=20.0, help='of a recording [s]')
     options = parser.parse_args()
     seed = secrets.randbelow(SEEDS) if options.seed is None else options.seed
@@ -112,7 +113,7 @@ def main() -> int:
     for name in ('run.mcap', 'other.mcap', 'adopted.yaml', 'demo.png'):
         with suppress(FileNotFoundError):
             (folder / name).unlink()
-    record(story, seed, options.duration)
+    record(story, options.effect, seed, options.duration)
     compare(story)
     diagnosis = diagnose(story)
     added = adopt(story, diagnosis)
@@ -134,7 +135,7 @@ def workbench_command(story: Story) -> str:
                        story.file('other.mcap')))
 
 
-def record(story: Story, seed: int, duration: float) -> None:
+def record(story: Story, effect: str, seed: int, duration: float) -> None:
     """Record two motions of a robot with a hidden effect; what it is, nobody here knows."""
     story.chapter('A robot with a secret')
     story.say(f'A physics engine plays the robot. One effect out of {len(CATALOGUE)} that the '
@@ -143,7 +144,7 @@ def record(story: Story, seed: int, duration: float) -> None:
     # The folder is the demonstration's own, which may run again.
     for name in ('run.mcap', 'other.mcap'):
         (story.folder / name).unlink(missing_ok=True)
-    common = ('--effect', 'random', '--seed', str(seed), '--duration', f'{duration:g}')
+    common = ('--effect', effect, '--seed', str(seed), '--duration', f'{duration:g}')
     first = story.start('simulate', '--output', story.file('run.mcap'), *common,
                         '--json', story.file('truth.json'))
     # Beside the first, as there are two cores; its bar would write over the first one's.

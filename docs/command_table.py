@@ -41,9 +41,9 @@ def table() -> str:
     """Return a section for each command, in Markdown."""
     sections = []
     for command in COMMANDS:
-        first = (parser_of(command).description or '').partition('\n')[0]
+        first = (parser_of(command).description or '').partition('\n')[0].partition(': ')[2]
         sections.append('\n'.join([f'### pprs {command}', '',
-                                   first.partition(': ')[2].capitalize(), '',
+                                   first[:1].upper() + first[1:], '',
                                    '| argument | meaning |', '|---|---|', *rows(command)]))
     return '\n\n'.join(sections)
 

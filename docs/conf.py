@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import sys
 from pathlib import Path
 
@@ -63,6 +64,12 @@ def write_generated_pages(app: Sphinx) -> None:
     folder = DOCS / 'generated'
     api_pages.write(folder / 'api')
     effect_pages.write(folder / 'effects')
+    shutil.copytree(PROJECT / 'benchmarks' / 'results', folder / 'results', dirs_exist_ok=True)
+
+
+def link_results(app: Sphinx, name: str, source: list[str]) -> None:
+    """Let links to the results of benchmarks lead to their copies on the site."""
+    source[0] = source[0].replace('../benchmarks/results/', 'generated/results/')
 
 
 def escape_marks(app: Sphinx, what: str, name: str, thing: object, options: object,
@@ -74,5 +81,6 @@ def escape_marks(app: Sphinx, what: str, name: str, thing: object, options: obje
 def setup(app: Sphinx) -> None:
     """Let Sphinx write the generated pages before it looks for sources."""
     app.connect('builder-inited', write_generated_pages)
+    app.connect('source-read', link_results)
     # Before napoleon, which makes marks of its own.
     app.connect('autodoc-process-docstring', escape_marks, priority=400)

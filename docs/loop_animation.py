@@ -15,21 +15,21 @@ from html import escape
 from pathlib import Path
 
 HERE = Path(__file__).parent
-SHOWN = ('pprs compare', 'pprs diagnose', 'pprs adopt', 'pprs history')
+SHOWN = ('compare', 'diagnose', 'adopt', 'history')
 SECONDS = 3.75  # of each
 WIDTH, LINE, MOST = 84, 17, 13  # characters, pixels, lines
-BLOCK = re.compile(r'```sh\n(.*?)```\n\n```text\n(.*?)```', re.DOTALL)
 
 
 def screens(text: str) -> list[tuple[str, list[str]]]:
     """Return the first command of each kind, and what it prints."""
-    found: dict[str, tuple[str, list[str]]] = {}
-    for commands, printed in BLOCK.findall(text):
-        last = commands.strip().split('\n')[-1]
-        kind = next((one for one in SHOWN if last.startswith(one)), None)
-        if kind is not None:
-            found.setdefault(kind, (last.partition('#')[0].strip(), printed.rstrip().split('\n')))
-    return [found[kind] for kind in SHOWN]
+    found = []
+    for name in SHOWN:
+        command = re.search(rf'^pprs {name} .*', text, re.M)
+        printed = re.search(rf'<!-- {name} -->\n```text\n(.*?)\n```', text, re.S)
+        if command is None or printed is None:
+            raise ValueError(f'the tutorial has no command and block {name}')
+        found.append((command[0], printed[1].split('\n')))
+    return found
 
 
 def animation(frames: list[tuple[str, list[str]]]) -> str:

@@ -3,8 +3,7 @@
 
 """Check pages and docstrings for long sentences and for words that readers do not know.
 
-    python docs/prose.py --pages    # what `make lint` runs; exit status 1 if anything is wrong
-    python docs/prose.py            # docstrings as well
+    python docs/prose.py            # what `make lint` runs; exit status 1 if anything is wrong
     python docs/prose.py --counts   # words, sentences and mean length of every page
 """
 
@@ -125,7 +124,6 @@ def main() -> int:
     """Print what is wrong, and return whether anything is."""
     parser = argparse.ArgumentParser(description=__doc__, allow_abbrev=False)
     parser.add_argument('--counts', action='store_true')
-    parser.add_argument('--pages', action='store_true', help='pages alone, without docstrings')
     options = parser.parse_args()
     wrong, words, lengths = [], 0, []
     for page in pages():
@@ -149,7 +147,7 @@ def main() -> int:
         wrong.append(f'all pages: {words} words, at most {TOTAL}')
     if mean > MEAN:
         wrong.append(f'all pages: {mean:.1f} words a sentence, at most {MEAN:g}')
-    wrong += [f'{place}: {fault}' for place, text in (() if options.pages else docstrings())
+    wrong += [f'{place}: {fault}' for place, text in docstrings()
               for fault in faults(prose_of(text), ON_PAGES_ONLY)]
     print('\n'.join(wrong))
     print(f'{words} words, {len(lengths)} sentences of {mean:.1f} words, {len(wrong)} faults')

@@ -1,11 +1,11 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Update the outputs and pictures of docs/tutorial.md: python docs/tutorial.py [FOLDER].
+"""Update the outputs and pictures of docs/tutorial.md and README: python docs/tutorial.py [FOLDER].
 
 The recordings are those of the simulated robot with a hidden effect. What the commands write goes
-to the folder (by default output/tutorial). Parts of it replace the blocks of the page that follow a
-comment with their name.
+to the folder (by default output/tutorial). Parts of it replace the blocks of the pages that follow
+a comment with their name.
 """
 
 from __future__ import annotations
@@ -38,22 +38,25 @@ HIDDEN, ON = 'stribeck_friction', 'slide_1'
 BINS = 40  # of equal numbers of samples
 MOST_CANDIDATES = 8
 COMMANDS = {
-    'run': f'simulate --output run.mcap --effect {HIDDEN} --seed 2 --duration 30',
-    'other': f'simulate --output other.mcap --effect {HIDDEN} --seed 2 --duration 30 --path-seed 1',
-    'info': 'info run.mcap',
-    'compare': 'compare run.mcap --report before.html --json before.json',
-    'diagnose': 'diagnose run.mcap --validate other.mcap --report why.html --json why.json',
-    'adopt': f'adopt {HIDDEN} run.mcap --validate other.mcap --output adopted.yaml '
+    'run': f'simulate --demo --output run.mcap --effect {HIDDEN} --seed 2 --duration 30',
+    'other': f'simulate --demo --output other.mcap --effect {HIDDEN} --seed 2 --duration 30 '
+             '--path-seed 1',
+    'info': 'info run.mcap --demo',
+    'compare': 'compare run.mcap --demo --report before.html --json before.json',
+    'diagnose': 'diagnose run.mcap --validate other.mcap --demo --report why.html '
+                '--json why.json',
+    'adopt': f'adopt {HIDDEN} run.mcap --validate other.mcap --demo --output adopted.yaml '
              '--report adopt.html --json adopt.json',
     'again': 'compare run.mcap --model adopted.yaml --report after.html --json after.json',
-    'wrong': 'adopt drive_spring run.mcap --validate other.mcap --output wrong.yaml',
+    'wrong': 'adopt drive_spring run.mcap --validate other.mcap --demo --output wrong.yaml',
     'history': 'history adopted.yaml --report history.html',
 }
 
 # Of what a command says: from the first line that begins so to the next that begins so.
 EXCERPTS = {
     'COMPARE': ('compare', ' ', '1. '), 'WHERE': ('compare', '1. ', 'Next'),
-    'DIAGNOSE': ('diagnose', '╭', 'Why'), 'ADOPT': ('adopt', '╭', 'page'),
+    'DIAGNOSE': ('diagnose', '╭', 'Evidence'), 'ADOPT': ('adopt', '╭', 'page'),
+    'VERDICT': ('diagnose', '╭', ' effect'),
     'WRONG': ('wrong', '╭', '  error'), 'AGAIN': ('again', ' ', 'page'),
     'HISTORY': ('history', 'Error', 'page'),
 }
@@ -81,9 +84,8 @@ def main() -> None:
         IMAGES / 'tutorial_after.png', *residuals, answer['noise_floor'],
         f'On a motion that was not fitted, {HIDDEN} takes the error from {fall[0]:.3f} to '
         f'{fall[1]:.3f} N; noise alone is {answer["noise_floor"]:.3f} N')
-    for page, picture in (('before', 'compare'), ('why', 'diagnose')):
-        photograph(folder / f'{page}.html', IMAGES / f'{picture}.png')
-    write_page(folder)
+    photograph(folder / 'why.html', IMAGES / 'diagnose.png')
+    write_pages(folder)
 
 
 def photograph(page: Path, picture: Path) -> None:
@@ -101,21 +103,22 @@ def photograph(page: Path, picture: Path) -> None:
         browser.close()
 
 
-def write_page(folder: Path) -> None:
-    """Replace the blocks of the page by what the commands printed."""
-    page = DOCS / 'tutorial.md'
-    text = page.read_text(encoding='utf-8')
+def write_pages(folder: Path) -> None:
+    """Replace the blocks of the tutorial and of README by what the commands printed."""
+    pages = (DOCS / 'tutorial.md', DOCS.parent / 'README.md')
+    texts = [page.read_text(encoding='utf-8') for page in pages]
     for name, (command, first, last) in EXCERPTS.items():
         lines = (folder / f'{command}.txt').read_text().splitlines()[1:]
         start = next(k for k, line in enumerate(lines) if line.strip() and line.startswith(first))
         end = next(k for k in range(start + 1, len(lines)) if lines[k].startswith(last))
         shown = '\n'.join(line.rstrip() for line in lines[start:end]).rstrip()
-        text, count = re.subn(rf'(<!-- {name.lower()} -->\n```text\n).*?(\n```)',
-                              lambda found, shown=shown: found[1] + shown + found[2], text,
-                              flags=re.S)
-        if count != 1:
-            raise ValueError(f'{page} has no block {name.lower()}')
-    page.write_text(text, encoding='utf-8')
+        block = re.compile(rf'(<!-- {name.lower()} -->\n```text\n).*?(\n```)', re.S)
+        if sum(len(block.findall(text)) for text in texts) != 1:
+            raise ValueError(f'{name.lower()} must be the name of one block')
+        texts = [block.sub(lambda found, shown=shown: found[1] + shown + found[2], text)
+                 for text in texts]
+    for page, text in zip(pages, texts, strict=True):
+        page.write_text(text, encoding='utf-8')
 
 
 def draw_where(residuals: Residuals) -> None:

@@ -19,6 +19,8 @@ def generate_launch_description() -> LaunchDescription:
     arguments = {
         'model': (None, 'model file of the robot that is connected, with a path'),
         'namespace': ('/', 'of the topic, monitor and feedforward'),
+        'prefix': ('', 'of the joints: joint_states says PREFIXslide_1; empty: joint_prefix of '
+                   'the model file'),
         'joint_states': ('joint_states', 'topic of the measurements'),
         'port': ('8080', 'of the workbench'),
         'use_sim_time': ('false', 'the clock is that of /clock'),
@@ -37,6 +39,8 @@ def generate_launch_description() -> LaunchDescription:
             '--live-topic', given['joint_states'], '--namespace', given['namespace'],
             '--port', given['port'], '--ros-args',
             '-p', ['use_sim_time:=', given['use_sim_time']],
+            *(('-p', ['joint_prefix:=', given['prefix']])
+              if given['prefix'].perform(context) else ()),
             *(word for file in files for word in ('--params-file', file))], output='screen')]
 
     return LaunchDescription([

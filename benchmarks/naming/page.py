@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from benchmarks import ROOT
 from benchmarks.naming.entrants import CONTROL, ENTRANTS, OURS, PART, PEER, PEERS
 from benchmarks.naming.problems import Answer, Named, Truth
 from benchmarks.naming.scoring import (
@@ -24,7 +23,7 @@ from benchmarks.naming.scoring import (
     seconds,
     set_size,
 )
-from benchmarks.results import RESULTS, write_results
+from benchmarks.results import write_results
 
 LIBRARIES = ('pprs_dynamics', 'numpy', 'scipy', 'scikit-learn', 'skglm', 'pysindy', 'mujoco')
 MAIN = ('right', 'first', 'named', 'exact', 'wrong alone', 'false alarms', 'unknown',
@@ -42,8 +41,8 @@ SHORT = {'pprs diagnose': 'pprs', 'adaptive group LASSO': 'group LASSO', 'Bayesi
 
 
 def write_page(scored: Mapping[str, Scored], real: Mapping[str, Scored], page: Path) -> None:
-    """Write a page with all tables, and the picture for `docs` or next to the page."""
-    picture = (ROOT / 'docs' if page.parent == RESULTS else page.parent) / 'images' / 'naming.png'
+    """Write a page with all tables, and the picture next to it."""
+    picture = page.parent / 'images' / 'naming.png'
     picture.parent.mkdir(parents=True, exist_ok=True)
     draw(scored, picture)
     write_results(page, 'The naming benchmark', 'make naming',

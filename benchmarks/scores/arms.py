@@ -83,7 +83,7 @@ def run_case(case: tuple[str, int], model: Path, duration: float, beside: Sequen
 
 
 def judge(outcome: Outcome) -> dict[str, bool]:
-    """Return what is right about an outcome, as `score_table.judge` has it for the 3-PPRS."""
+    """Return what is right about an outcome, as `diagnosis_table.judge` has it for the 3-PPRS."""
     named = [one['name'] for one in outcome['effects']]
     name = outcome['effect']
     if not name:

@@ -9,9 +9,12 @@ import argparse
 import gc
 import importlib
 import importlib.util
+import itertools
 import signal
 import sys
 
+from pprs_dynamics.errors import PprsError
+from pprs_dynamics.system.bounded_yaml import parse, read_text
 from pprs_dynamics.system.threads import use_one_thread
 
 # [s] A message asks for the interpreter some five times: with Python's 5 ms each, messages at
@@ -87,6 +90,12 @@ def _check_arguments(name: str, arguments: list[str]) -> None:
     _, stray = parser.parse_known_args(_outside_ros_args(arguments))
     if stray:
         parser.error(f'{stray[0]} is outside of --ros-args, where it has no effect')
+    for option, file in itertools.pairwise(arguments):
+        if option == '--params-file':
+            try:
+                parse(read_text(file), file)
+            except PprsError as error:  # where ROS 2 would name lines of its own source
+                parser.exit(2, f'{name}: {error}\n')
 
 
 def _outside_ros_args(arguments: list[str]) -> list[str]:

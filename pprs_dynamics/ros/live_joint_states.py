@@ -32,13 +32,14 @@ from pprs_dynamics.errors import PprsError, UnreadableFileError
 from pprs_dynamics.inference.residuals.live import ERROR_SPAN
 from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.recorded_names import PREFIX
 from pprs_dynamics.ros.live_stream import LiveStream
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.node.clocks import steady_timer
 from pprs_dynamics.ros.node.model_owner import ACTIVE, ModelOwner
-from pprs_dynamics.ros.node.parameters import plain_value
+from pprs_dynamics.ros.node.parameters import overrides, plain_value
 from pprs_dynamics.ros.node.qos import LATCHED, MEASURED
 from pprs_dynamics.system.numbers import finite
 
@@ -77,7 +78,8 @@ class LiveJointStates(Node):
         self._residuals: deque[tuple[float, Any]] = deque()
         self._arrived = 0.0
         self._rejected = 0
-        self.stream = LiveStream(self, model, self._take, self._reject, topic=topic)
+        self.stream = LiveStream(self, self.with_prefix(model), self._take, self._reject,
+                                 topic=topic)
         self.stream.listen()
         self._monitor: list[float] | None = None
         self._diagnosis: dict[str, Any] | None = None
@@ -106,6 +108,12 @@ class LiveJointStates(Node):
         if takers := self._takers(full_name):
             said.append(f'commands go to {", ".join(takers)}')
         return '; '.join(said)
+
+    def with_prefix(self, model: DriveModel) -> DriveModel:
+        """Return a model with the parameter `joint_prefix` of this node, if it is given."""
+        prefix = overrides(self).get(PREFIX)
+        return model if prefix is None else DriveModel.from_parameters(
+            {**model.values, PREFIX: prefix}, model.source)
 
     def _follow(self, parameters: Sequence[Parameter]) -> None:
         with suppress(PprsError):  # then the fingerprints differ, and nothing can be set
@@ -212,7 +220,7 @@ class LiveNodes:
     namespace : str
         In which relative names are resolved.
     arguments : sequence of str
-        Of ROS 2, with --ros-args: remappings, use_sim_time, QoS overrides.
+        Of ROS 2, with --ros-args: remappings, joint_prefix, use_sim_time, QoS overrides.
     """
 
     def __init__(self, model: DriveModel, topic: str = 'joint_states', monitor: str = 'monitor',
@@ -270,7 +278,7 @@ class LiveNodes:
         self._check(confirmed)
         answer = self._answer(self._node.owner.set_model(model.values))
         if answer is not None and answer.result.successful:
-            self._node.stream.use_model(model)
+            self._node.stream.use_model(self._node.with_prefix(model))
         return self._said(answer and answer.result.successful, answer and answer.result.reason)
 
     def restore(self, confirmed: str) -> dict[str, Any]:

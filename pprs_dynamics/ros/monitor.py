@@ -22,7 +22,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_effort
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.residuals.live import ARM_WINDOW, ERROR_SPAN, WINDOW, Compared
-from pprs_dynamics.physics.model.keys import is_mechanism
+from pprs_dynamics.physics.model.keys import is_described
 from pprs_dynamics.ros.diagnosis_worker import ADOPTED, DiagnosisWorker, StreamWindows
 from pprs_dynamics.ros.force_command import FRAME
 from pprs_dynamics.ros.live_stream import LiveStream
@@ -86,7 +86,7 @@ class MonitorNode(ExplainsRefusals, ManagedNode):
         self._publishers_made: list[Any] = []
         self._clocks: list[Timer] = []
         parameters: tuple[NodeParameter, ...] = PARAMETERS
-        if is_mechanism(overrides(self)):
+        if is_described(overrides(self)):
             parameters = tuple(
                 replace(parameter, default=ARM_WINDOW) if parameter.name == 'window' else parameter
                 for parameter in PARAMETERS)

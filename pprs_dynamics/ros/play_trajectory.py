@@ -21,7 +21,7 @@ from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.keys import is_mechanism
+from pprs_dynamics.physics.model.keys import is_described
 from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.trajectory_request import Motion
@@ -82,7 +82,7 @@ class PlayTrajectoryNode(Node):
     def __init__(self, **options: Any) -> None:
         super().__init__('play_trajectory', **options)
         self._log = ThrottledLog(self)
-        joints = is_mechanism(overrides(self))
+        joints = is_described(overrides(self))
         values = declare_node_parameters(self, OF_JOINTS if joints else PARAMETERS)
         self._rate, self._points, self._repeat = values['rate'], values['points'], values['repeat']
         self._ahead = round(values['ahead'] * conversions.NANOSECONDS)

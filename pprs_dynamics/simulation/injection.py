@@ -580,7 +580,7 @@ def _tool_drag(run: Injection) -> Injected:
 
 def _require_tool(model: DriveModel, name: str) -> None:
     """Raise InjectedEffectError for an axis, which a force across it does not move."""
-    if not model.is_described:
+    if not model.is_mechanism:
         raise InjectedEffectError(f'{name} does not act along a single axis: choose effort_offset')
 
 
@@ -666,7 +666,7 @@ def _lost_motion(run: Injection) -> Injected:
         joint = run.joint(1)
         span, load = run.size(0.01, 0.03) * run.shift_unit(joint), run.bodies[:, joint]
         # The link falls behind in its position alone, on which no force of an axis depends.
-        by_load = bool(run.model.is_described and load.min() < -CROSSED * load.max() < 0
+        by_load = bool(run.model.is_mechanism and load.min() < -CROSSED * load.max() < 0
                        and run.random.integers(2))
         driver = load if by_load else run.motion.velocity[:, joint]
         return {'joint': joint, 'span': span, 'by_load': by_load,

@@ -15,8 +15,8 @@ import pytest
 from node_bench import bench
 from pprs_command import pprs
 from ros_processes import environment, executable, node_process
-from short_recordings import hidden_friction
 
+from benchmarks.scores import adoption
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.inference.adoption.adopt import adopt
 from pprs_dynamics.inference.adoption.adoption import Adoption
@@ -55,8 +55,10 @@ class Files:
 @pytest.fixture(scope='module')
 def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
     folder = tmp_path_factory.mktemp('adopt')
-    robot = hidden_friction()
-    recordings = robot.recordings
+    robot = adoption.Robot(adoption.Case(
+        'effects', (HIDDEN,), 7, 3.0, width=1.0, duration=DURATION))
+    recordings = robot.recordings()
+    robot.effects = []
     for recording in recordings:
         write_recording(folder / f'{recording.name}.csv', recording)
     model, new = folder / 'model.yaml', folder / 'new.yaml'
@@ -65,7 +67,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
                 '--model', model, '--output', new, '--json', folder / 'answer.json',
                 '--report', folder / 'page.html')
     assert done.returncode == 0, done.stdout + done.stderr
-    return Files(folder, model, folder / 'first.csv', folder / 'second.csv', robot.healthy[1],
+    return Files(folder, model, folder / 'first.csv', folder / 'second.csv', robot.recordings()[1],
                  new, json.loads((folder / 'answer.json').read_text()),
                  done.stdout, recordings, diagnose(robot.model, recordings[:1]))
 

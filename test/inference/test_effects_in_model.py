@@ -33,7 +33,8 @@ MODEL = DriveModel.load()
 NOISE = 0.06  # [N]
 Effects = dict[str, dict[str, float]]
 STRIBECK: Effects = {'stribeck_friction': {'lift_1.force': 0.6, 'lift_1.velocity': 0.02}}
-RIPPLE = {'slide_1.force': 0.4, 'slide_1.phase': 0.3}
+
+
 # What the model has, and what is true: of another size, of another shape, or not there at all.
 WRONG: dict[str, tuple[Effects, Effects]] = {
     'a payload that is not there': ({'payload_mass': {'mass': 0.3}}, {}),

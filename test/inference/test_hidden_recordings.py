@@ -10,11 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.hidden import motions, recordings, strength
+from benchmarks.hidden import motions, recordings
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.simulation.injection import Choice
-from pprs_dynamics.simulation.sensors import EffortNoise
 
 pytestmark = pytest.mark.slow
 
@@ -84,42 +82,3 @@ def test_a_play_is_as_strong_as_a_comparison_sees_it() -> None:
     expected = np.hypot(1.0, effect['snr_by_drive'][strongest])
     # Noise that is correlated hides less of bursts than of what is as slow as itself.
     assert 0.5 * expected < over_noise[strongest] < 2 * expected
-
-
-@pytest.mark.parametrize('name', ['viscous_friction', 'force_ripple'])
-def test_a_form_that_is_off_is_off_by_5_to_15_percent(name: str) -> None:
-    noise = np.zeros((4000, 6))
-    place, quiet = recordings.scene(3, 1.0, 8.0), recordings.noise_settings(0.9, 0.0)
-    effect = Choice(name, np.random.default_rng(1))
-    plain, exact, off = (place.recording('run', effects, quiet, noise, rng).effort
-                         for effects, rng in (((), ()), ([effect], ()),
-                                              ([effect], [np.random.default_rng(3)])))
-    there = np.abs(exact - plain) > 1e-9
-    share = (off - plain)[there] / (exact - plain)[there] - 1
-    assert 0.04 < share.std() < 0.2
-    assert np.abs(share).max() < 0.31
-
-
-@pytest.mark.parametrize('noise', [0.0, 0.9, 0.997, '1/f'])
-def test_whitened_noise_is_white(noise: float | str) -> None:
-    settings = recordings.noise_settings(noise, 0.08)
-    whitening = strength.Whitening(settings, 5)
-    samples = EffortNoise(settings, np.random.default_rng(6)).samples(100_000)
-    white = whitening(samples.reshape(-1, 5, 6).mean(axis=1))
-    assert np.sqrt(np.mean(white ** 2)) == pytest.approx(1.0, abs=0.01)
-    for lag in (1, 2, 5, 20):
-        assert abs(np.mean(white[lag:] * white[:-lag])) < 0.02
-
-
-def test_what_the_tolerances_allow_is_no_effect() -> None:
-    rng = np.random.default_rng(7)
-    settings = recordings.noise_settings(0.0, 0.1)
-    columns = rng.normal(size=(3, 300, 6))
-    refit = strength.Refit(columns, np.array([0.5, 0.0, -1.0]), strength.Whitening(settings, 1))
-    # In tolerances: up to 1.5 and 1, and 0, are left upwards to take off.
-    assert refit.beyond(1.4 * columns[0] - 0.9 * columns[1]).strength() < 1e-3
-    size = np.sqrt(np.mean(columns[0, strength.WHITENING_ORDER:] ** 2)) / 0.1
-    assert refit.beyond(3.5 * columns[0]).strength() == pytest.approx(2 * size, rel=0.05)
-    free = rng.normal(size=(300, 6))
-    ray = refit.beyond(free)
-    assert ray.strength(ray.factor(2.0)) == pytest.approx(2.0, rel=1e-2)

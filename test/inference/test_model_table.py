@@ -79,6 +79,11 @@ def test_the_reported_set_is_the_row_of_least_cost(found: Diagnosis) -> None:
         candidate.name for candidate in table.best.fitted.candidates}
 
 
+def test_two_effects_that_a_gain_imitates_are_the_reported_ones() -> None:
+    found = diagnose(axis({}), [record(HIDDEN['two'])])
+    assert {effect.name for effect in found.effects} == set(HIDDEN['two'])
+
+
 def test_evidence_is_a_difference_of_two_rows(found: Diagnosis) -> None:
     table = table_of(found)
     for effect in found.effects:

@@ -235,23 +235,19 @@ def test_a_recording_is_needed_to_know_what_to_tell_apart(model: DriveModel) -> 
         next_experiment(model)
 
 
-# From recordings to the question.
-
-
 # The command.
 
 @pytest.mark.slow
 def test_commission_writes_poses_json_and_page(tmp_path: Path) -> None:
     done = pprs('next-experiment', '--purpose', 'commission', '--output', 'first.csv',
-                '--duration', '5', '--json', 'first.json', '--report', 'first.html',
-                '--velocity', '0.2', cwd=tmp_path)
+                '--json', 'first.json', '--report', 'first.html', cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     motion = read_poses(tmp_path / 'first.csv', 100.0)
     assert motion.time is not None
-    assert motion.time[-1] == pytest.approx(5.0)
+    assert motion.time[-1] == pytest.approx(20.0)
     assert motion.is_closed()
     forces = DriveModel.load().drive_forces(motion)
-    assert np.abs(forces.mechanism.velocity).max() <= 0.18 + 1e-6
+    assert np.abs(forces.mechanism.velocity).max() <= 0.45 + 1e-6
     result = json.loads((tmp_path / 'first.json').read_text())
     assert result['separates'] == []
     assert result['question'] == 'commission'

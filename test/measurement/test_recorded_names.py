@@ -17,7 +17,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError, UnreadableFileError
-from pprs_dynamics.measurement.files.merged_states import CONTROLLER, DYNAMIC, JOINT_STATE
+from pprs_dynamics.measurement.files.merged_states import CONTROLLER, JOINT_STATE
 from pprs_dynamics.measurement.files.recording import read_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.model.recorded_names import joint_names, recorded_columns
@@ -32,13 +32,6 @@ builtin_interfaces/Duration time_from_start
 BREAK = '=' * 80 + '\n'
 # The interface definitions as a bag carries them.
 DEFINITIONS = {
-    DYNAMIC: f"""std_msgs/Header header
-string[] joint_names
-control_msgs/InterfaceValue[] interface_values
-{BREAK}MSG: control_msgs/InterfaceValue
-string[] interface_names
-float64[] values
-""",
     CONTROLLER: f"""std_msgs/Header header
 string[] joint_names
 trajectory_msgs/JointTrajectoryPoint reference
@@ -105,25 +98,13 @@ def spread(bag: Bag, time: float, q: np.ndarray, tau: np.ndarray) -> None:
         bag.state('/joint_states', time, DRIVES[part], q[part], tau[part])
 
 
-def efforts_apart(bag: Bag, time: float, q: np.ndarray, tau: np.ndarray) -> None:
-    bag.state('/joint_states', time, DRIVES, q)
-    bag.state('/forces', time, DRIVES, (), tau)
-
-
-def dynamic(bag: Bag, time: float, q: np.ndarray, tau: np.ndarray) -> None:
-    value = bag.type('control_msgs/msg/InterfaceValue')
-    bag.write('/dynamic_joint_states', DYNAMIC, time, bag.type(DYNAMIC)(
-        bag.header(time), list(DRIVES), [
-            value(['effort', 'position'], np.array([tau[k], q[k]])) for k in range(6)]))
-
-
 def controller(bag: Bag, time: float, q: np.ndarray, tau: np.ndarray) -> None:
     bag.write('/arm_controller/controller_state', CONTROLLER, time, bag.type(CONTROLLER)(
         bag.header(time), list(DRIVES), bag.point(), bag.point(q), bag.point(),
         bag.point((), tau)))
 
 
-@pytest.mark.parametrize('write', [spread, efforts_apart, dynamic, controller])
+@pytest.mark.parametrize('write', [spread, controller])
 def test_states_of_other_messages_are_read(
     run: Any, tmp_path: Path, write: Callable[..., None],
 ) -> None:

@@ -80,7 +80,7 @@ def test_what_is_given_twice_is_refused(folder: Path, arguments: tuple[str, ...]
 
 
 def test_info_says_what_repeats(folder: Path) -> None:
-    done = pprs('info', 'run.csv', 'other.csv', 'same.db3', cwd=folder)
+    done = pprs('info', 'run.csv', 'same.db3', cwd=folder)
     assert done.returncode == 0
     assert ('! same.db3: all of its 1000 samples are those of run.csv, too'
             in ' '.join(done.stdout.split()))

@@ -18,7 +18,6 @@ from feedforward_bench import (
     message_of,
     random_motion,
 )
-from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
@@ -96,10 +95,6 @@ def wrong_name(m: MultiDOFJointTrajectory) -> None:
     m.joint_names = ['gripper']
 
 
-def two_names(m: MultiDOFJointTrajectory) -> None:
-    m.joint_names = ['platform', 'platform']
-
-
 def foreign_frame(m: MultiDOFJointTrajectory) -> None:
     m.header.frame_id = 'world'
 
@@ -108,20 +103,8 @@ def no_velocity(m: MultiDOFJointTrajectory) -> None:
     m.points[1].velocities = []
 
 
-def no_acceleration(m: MultiDOFJointTrajectory) -> None:
-    m.points[0].accelerations = []
-
-
-def two_transforms(m: MultiDOFJointTrajectory) -> None:
-    m.points[0].transforms = [m.points[0].transforms[0], m.points[0].transforms[0]]
-
-
 def nan_position(m: MultiDOFJointTrajectory) -> None:
     m.points[1].transforms[0].translation.y = float('nan')
-
-
-def infinite_acceleration(m: MultiDOFJointTrajectory) -> None:
-    m.points[0].accelerations[0].angular.z = float('-inf')
 
 
 def zero_quaternion(m: MultiDOFJointTrajectory) -> None:
@@ -129,24 +112,12 @@ def zero_quaternion(m: MultiDOFJointTrajectory) -> None:
     rotation.x = rotation.y = rotation.z = rotation.w = 0.0
 
 
-def long_quaternion(m: MultiDOFJointTrajectory) -> None:
-    m.points[1].transforms[0].rotation.w = 1e200
-
-
 def times_stand_still(m: MultiDOFJointTrajectory) -> None:
     m.points[1].time_from_start = m.points[0].time_from_start
 
 
-def times_run_back(m: MultiDOFJointTrajectory) -> None:
-    m.points[0].time_from_start.sec = 5
-
-
 def out_of_reach(m: MultiDOFJointTrajectory) -> None:
     m.points[1].transforms[0].translation.x = 0.6
-
-
-def beyond_the_stroke(m: MultiDOFJointTrajectory) -> None:
-    m.points[0].transforms[0].translation.z = 3.0
 
 
 def absurdly_far(m: MultiDOFJointTrajectory) -> None:
@@ -171,12 +142,9 @@ def overflow_in_the_model(m: MultiDOFJointTrajectory) -> None:
 
 
 DAMAGES: list[tuple[str, Callable[[MultiDOFJointTrajectory], None]]] = [
-    ('EMPTY', empty), ('NAMES', wrong_name), ('NAMES', two_names), ('FRAME', foreign_frame),
-    ('SIZE', no_velocity), ('SIZE', no_acceleration), ('SIZE', two_transforms),
-    ('NON_FINITE', nan_position), ('NON_FINITE', infinite_acceleration),
-    ('QUATERNION', zero_quaternion), ('QUATERNION', long_quaternion),
-    ('TIME', times_stand_still), ('TIME', times_run_back), ('WORKSPACE', out_of_reach),
-    ('WORKSPACE', beyond_the_stroke), ('WORKSPACE', absurdly_far), ('SINGULAR', rod_lies_flat),
+    ('EMPTY', empty), ('NAMES', wrong_name), ('FRAME', foreign_frame), ('SIZE', no_velocity),
+    ('NON_FINITE', nan_position), ('QUATERNION', zero_quaternion), ('TIME', times_stand_still),
+    ('WORKSPACE', out_of_reach), ('WORKSPACE', absurdly_far), ('SINGULAR', rod_lies_flat),
     ('LIMIT', force_over_limit), ('OUTPUT', overflow_in_the_model)]
 
 
@@ -202,28 +170,6 @@ def test_damaged_messages_are_counted_explained_silent_and_survived(
     assert all(np.isfinite(command.data).all() for command in feedforward.commands)
     # EFFECT is no message's fault: test_failing_effects.py
     assert {code for code in REJECTIONS if not feedforward.counters[code]} == {'EFFECT'}
-
-
-def test_a_parameter_change_acts_on_the_next_message_and_a_bad_one_on_none(
-    feedforward: FeedforwardBench,
-) -> None:
-    motion = random_motion(np.random.default_rng(6), 1)
-    before = feedforward.answer(message_of(motion))
-    bad, = feedforward.node.set_parameters([Parameter('masses.payload', value=-1.0)])
-    assert not bad.successful
-    assert 'masses.payload is -1.0' in bad.reason
-    unknown, = feedforward.node.set_parameters([Parameter('masses.paylod', value=1.0)])
-    assert not unknown.successful
-    assert 'did you mean masses.payload' in unknown.reason
-    assert feedforward.answer(message_of(motion)) == before
-    good, = feedforward.node.set_parameters([Parameter('masses.payload', value=3.0)])
-    assert good.successful
-    after = np.array(feedforward.answer(message_of(motion)))
-    heavier = DriveModel.load().values | {'masses.payload': 3.0}
-    np.testing.assert_allclose(
-        after, DriveModel.from_parameters(
-            heavier).drive_forces(motion).total[0], rtol=0, atol=EQUAL)
-    assert np.abs(after - before).max() > 1.0
 
 
 def test_memory_advances_with_first_points_only() -> None:

@@ -21,7 +21,6 @@ from rcl_interfaces.srv import (
     SetParametersAtomically,
 )
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
@@ -146,19 +145,6 @@ def test_whole_numbers_and_empty_lists_keep_the_declared_type(caller: Caller) ->
     empty = caller.set('effort_limits', [])
     assert empty.successful, empty.reason
     assert types(caller, *names) == wanted
-
-
-def test_topics_have_the_qos_that_is_asked_for() -> None:
-    overrides = {'qos_overrides./feedforward/commands.publisher.reliability': 'best_effort',
-                 'qos_overrides./feedforward/trajectory.subscription.depth': 7}
-    with feedforward_bench(**overrides) as node:
-        info, = node.bench.probe.get_publishers_info_by_topic('/feedforward/commands')
-        assert info.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
-        assert node.node._subscriptions[0].qos_profile.depth == 7
-        status, = node.bench.probe.get_publishers_info_by_topic('/feedforward/status')
-        assert status.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-        others, = node.bench.probe.get_publishers_info_by_topic('/feedforward/joint_command')
-        assert others.qos_profile.reliability == ReliabilityPolicy.RELIABLE
 
 
 def test_a_qos_that_does_not_fit_is_told_with_the_resolved_topic(

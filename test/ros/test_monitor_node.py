@@ -121,14 +121,6 @@ def test_messages_that_are_no_joint_states_of_this_robot_are_counted_and_survive
     assert monitor.bench.status[-1]['code'] == 'OK'
 
 
-def test_without_measured_efforts_the_status_says_so_in_words(monitor: MonitorBench) -> None:
-    monitor.effort[:] = np.nan
-    monitor.send(300)
-    assert monitor.bench.spin_until(
-        lambda: 'efforts are not measured' in monitor.bench.status[-1]['message'])
-    assert np.isnan(monitor.error[-1].data).all()
-
-
 def test_all_joints_are_published_while_somebody_draws_them(monitor: MonitorBench) -> None:
     monitor.send(100)
     joints = monitor.bench.listen(JointState, '/monitor/joint_states_full', 1000)

@@ -68,10 +68,6 @@ def on_the_path(first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
     return forces.mechanism.position, forces.total
 
 
-def distance(position: np.ndarray, places: np.ndarray) -> float:
-    return float(np.abs(places - position).max(axis=1).min())
-
-
 def stop(cell: Cell, ros_domain: int, log: Path, last: float) -> None:
     """Stop the process in the middle of a path that ends at a time [s]."""
     command = [executable('feedforward'), '--ros-args', '-p', 'demo:=true']

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import subprocess
-from pathlib import Path
 
 import pytest
 from node_bench import bench
@@ -18,8 +17,6 @@ from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.monitor import MonitorNode
 
 pytestmark = pytest.mark.nodes
-
-PAPER = Path(__file__).parents[2] / 'config' / 'paper.yaml'
 
 
 @pytest.mark.parametrize('node', ['feedforward', 'monitor'])

@@ -59,6 +59,7 @@ def test_a_node_without_compiled_kernels_answers_messages_and_services(
 
 
 @pytest.mark.nodes
+@pytest.mark.slow
 def test_a_robot_with_loops_is_answered_at_once_and_compiled_beside(
     ros_domain: int, tmp_path: Path,
 ) -> None:

@@ -16,10 +16,8 @@ from xml.etree import ElementTree
 import pytest
 from node_bench import Bench, bench, overrides
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.physics.model.parameter_file import read_parameters
 from pprs_dynamics.ros.feedforward import FeedforwardNode
 from pprs_dynamics.ros.live_joint_states import LiveJointStates
 from pprs_dynamics.ros.monitor import MonitorNode
@@ -61,13 +59,6 @@ def present(running: Bench, node: Node) -> Names:
                for kind in ('service', 'client')}
     found = {kind: {name for name in names if ACTION not in name} for kind, names in found.items()}
     return {**found, 'execute': actions['service'], 'call': actions['client']}
-
-
-def hexapod() -> list[Parameter]:
-    values = read_parameters(CONFIG / 'hexapod.yaml')
-    values['robot.urdf'] = str(CONFIG / 'hexapod.urdf')
-    return overrides(demo=False, **{name.replace('.', '__'): value
-                                    for name, value in values.items()})
 
 
 def started(running: Bench) -> Iterator[Node]:

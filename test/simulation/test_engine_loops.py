@@ -16,8 +16,7 @@ from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.simulation.engine import MechanismEngine
 from pprs_dynamics.simulation.injection import draw_motion
 
-ROBOTS = {'hexapod': robots.hexapod, 'delta': robots.delta, 'five_bar': robots.five_bar,
-          'three_rrr': robots.three_rrr}
+ROBOTS = {'hexapod': robots.hexapod, 'delta': robots.delta, 'five_bar': robots.five_bar}
 
 
 def rubbing(name: str, folder: Path) -> DriveModel:

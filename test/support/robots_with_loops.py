@@ -218,44 +218,6 @@ def five_bar() -> RobotText:
     return robot
 
 
-def three_rrr() -> RobotText:
-    """Return a planar 3-RRR with closures of two, three and five rows."""
-    robot = RobotText('three_rrr')
-    robot.link('base')
-    base_radius, radius, first, second = 0.35, 0.1, 0.2, 0.2
-    names = ('a', 'b', 'c')
-    for k, name in enumerate(names):
-        angle = np.pi / 2 + 2 * np.pi * k / 3
-        foot = base_radius * np.array([np.cos(angle), np.sin(angle)])
-        pin = radius * np.array([np.cos(angle), np.sin(angle)])
-        to = pin - foot
-        distance = np.linalg.norm(to)
-        heading = np.arctan2(to[1], to[0])
-        open_ = np.arccos((first ** 2 + distance ** 2 - second ** 2) / (2 * first * distance))
-        inner = np.arccos((first ** 2 + second ** 2 - distance ** 2) / (2 * first * second))
-        robot.link(f'crank_{name}', 0.5, (first / 2, 0.01, 0), (0.0002, 0.002, 0.0021))
-        robot.link(f'rod_{name}', 0.3, (second / 2, 0, 0), (0.0001, 0.001, 0.0011))
-        robot.joint(f'motor_{name}', 'revolute', 'base', f'crank_{name}', (*foot, 0))
-        robot.joint(f'elbow_{name}', 'continuous', f'crank_{name}', f'rod_{name}', (first, 0, 0))
-        robot.drives.append(f'motor_{name}')
-        robot.home[f'motor_{name}'] = round(float(np.angle(np.exp(1j * (heading + open_)))), 4)
-        robot.home[f'elbow_{name}'] = round(float(inner - np.pi), 4)
-        if k == 0:
-            robot.link('platform', 1.0, (0.01, 0.02, 0), (0.003, 0.003, 0.006))
-            robot.joint('wrist_a', 'continuous', 'rod_a', 'platform', (second, 0, 0),
-                        R=np.eye(3))
-            robot.home['wrist_a'] = round(float(angle - (heading + open_ + inner - np.pi)), 4)
-            # The platform's x axis points from its centre to this pin; its origin is the pin.
-            centre_angle = angle
-        else:
-            place = pin - radius * np.array([np.cos(centre_angle), np.sin(centre_angle)])
-            c, s = np.cos(centre_angle), np.sin(centre_angle)
-            robot.loop(f'pin_{name}', 'revolute' if k == 1 else 'spherical', f'rod_{name}',
-                       (second, 0, 0), 'platform',
-                       (c * place[0] + s * place[1], -s * place[0] + c * place[1], 0))
-    return robot
-
-
 def three_pprs(model: Any, home: Any) -> RobotText:
     """Return a 3-PPRS of a `DriveModel` as a tree with loops; `home` is its state at one pose."""
     geometry, masses = model.robot.geometry, model.robot.masses

@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     screen = console()
     model = DriveModel.load(options.model)
     content: dict[str, Any] = {}
-    if model.is_described:
+    if model.is_mechanism:
         content['robot'] = describe_mechanism(model)
         for line in mechanism_lines(model):
             screen.print(shown(line))

@@ -55,7 +55,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help=f'to listen on (default {HOST}: nobody else on the network sees it)')
     parser.add_argument('--no-browser', action='store_true', help='open no browser')
     parser.add_argument('--ros-args', nargs=argparse.REMAINDER, default=[], metavar='ARGUMENT',
-                        help='of --live, last: remappings, use_sim_time and QoS, as of a node')
+                        help='of --live, last: remappings, joint_prefix, use_sim_time and QoS, as '
+                        'of a node')
 
 
 def run(options: argparse.Namespace) -> int:

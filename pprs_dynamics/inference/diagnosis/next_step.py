@@ -96,7 +96,7 @@ def first_step(model: DriveModel, files: GivenFiles) -> tuple[str, str]:
     """
     is_fitted = bool(reference_files(model.values, model.source))
     check = 'Check units, signs and zeros, and that the file describes this machine'
-    if not model.is_described or is_fitted:
+    if not model.is_mechanism or is_fitted:
         return check, files.command('info')
     words = ('The model has no friction yet. Fit inertia and friction first'
              if _has_no_friction(model) else f'{check}. Then fit the model')
@@ -104,7 +104,7 @@ def first_step(model: DriveModel, files: GivenFiles) -> tuple[str, str]:
 
 
 def _has_no_friction(model: DriveModel) -> bool:
-    return model.is_described and not reference_files(model.values, model.source) and not any(
+    return model.is_mechanism and not reference_files(model.values, model.source) and not any(
         np.any(model.values[key]) for key in OWN_FRICTION)
 
 
@@ -153,7 +153,7 @@ def next_step(diagnosis: Diagnosis, files: GivenFiles) -> tuple[str, str]:
         return ('Record a motion that separates the candidates; this command designs it',
                 files.command('next-experiment', '--output', 'next.csv'))
     if diagnosis.unconfirmed and not effects:
-        if not is_change and diagnosis.model.is_described and any(
+        if not is_change and diagnosis.model.is_mechanism and any(
                 effect.objection and not effect.is_only_refuted
                 for effect in diagnosis.unconfirmed):
             # An impossible effect means that the model is of another machine.

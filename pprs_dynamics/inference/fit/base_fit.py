@@ -152,7 +152,7 @@ def require_open_numbers(model: DriveModel) -> None:
 
 def _is_fitted_whole(model: DriveModel) -> bool:
     """Return whether all numbers are fitted, and not those alone that tolerances leave open."""
-    return model.is_described
+    return model.is_mechanism
 
 
 def halves(recording: Recording) -> list[Recording]:

@@ -145,7 +145,7 @@ class Reference:
         """
         found, residuals = _measured(model, recordings)
         numbers = (np.concatenate([_numbers(model, one) for one in found])
-                   if model.is_described else None)
+                   if model.is_mechanism else None)
         return cls._fitted(model, residuals, numbers, kept, tuple(one.name for one in recordings),
                            tuple(recordings))
 

@@ -137,10 +137,12 @@ class FormErrors:
         if any(block.mean is not None for block in blocks):
             return sum(self._squares(fitted, candidate).values())
         index = fitted.fit.index_of(blocks)
-        c = fitted.fit.coefficients[index]
-        # Constraints hold some coefficients, of which the variance is 0.
-        inverse = np.linalg.pinv(fitted.fit.covariance[np.ix_(index, index)], hermitian=True)
-        return float(c @ inverse @ c)
+        std = np.sqrt(np.maximum(fitted.fit.covariance[index, index], 0))
+        # Constraints hold some coefficients, of which the variance is 0; units must not count.
+        index, std = index[std > 0], std[std > 0]
+        scaled = fitted.fit.coefficients[index] / std
+        correlation = fitted.fit.covariance[np.ix_(index, index)] / np.outer(std, std)
+        return float(scaled @ np.linalg.pinv(correlation, hermitian=True) @ scaled)
 
     def _squares(self, fitted: CandidateSet, candidate: Candidate) -> Squares:
         """Return the whitened squares of a candidate's force."""

@@ -104,10 +104,17 @@ class Search:
             self._fit(self._additions(with_patterns))
             if not self.best.cost < before - LEAST_IMPROVEMENT:
                 self._fit(self._replacements(self.best))
-            simplified(self.fits, self.best)
+            for fitted in (self.best, *self._inadmissible()):
+                simplified(self.fits, fitted)
             if (not self.best.cost < before - LEAST_IMPROVEMENT
                     or (until_nonlinear and self.best.is_nonlinear)):
                 return
+
+    def _inadmissible(self) -> list[CandidateSet]:
+        """Return inadmissible sets that would be the best: a part of one may be the best."""
+        found = [fitted for fitted in self.fits.sets
+                 if fitted.barred and fitted.total < self.best.cost - LEAST_IMPROVEMENT]
+        return sorted(found, key=lambda fitted: fitted.total)[:REPLACEMENTS]
 
     # Moves
 

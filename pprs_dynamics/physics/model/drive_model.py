@@ -45,7 +45,7 @@ from pprs_dynamics.physics.model.keys import (
     GAIN,
     ROBOT,
     Key,
-    is_mechanism,
+    is_described,
     keys_of,
     title_of,
 )
@@ -133,7 +133,7 @@ class DriveModel:
             values = checked_values(parameters)
             robot: Any
             robot, own, reversal, limits = (
-                read_mechanism(values, Path(source).parent) if is_mechanism(parameters)
+                read_mechanism(values, Path(source).parent) if is_described(parameters)
                 else read_platform(values))
             effects = (*own, *added_effects(parameters, robot))
             loaded = robot
@@ -174,11 +174,11 @@ class DriveModel:
     @property
     def block(self) -> str:
         """Block of its file that describes the robot; '' for that of the paper."""
-        return ROBOT if is_mechanism(self.values) else ''
+        return ROBOT if is_described(self.values) else ''
 
     @property
-    def is_described(self) -> bool:
-        """Whether all that it is follows from a description: no 3-PPRS, and no slide alone."""
+    def is_mechanism(self) -> bool:
+        """Whether it is neither a 3-PPRS nor a single slide."""
         return self.kind == MECHANISM
 
     @property
@@ -244,12 +244,12 @@ class DriveModel:
         A described joint has a gear that holds any torque at rest. The speed is the file's own, not
         that of a fit: which samples count must not change with the widths that are fitted to them.
         """
-        return float(self.values['friction.reversal_velocity']) if self.is_described else 0.0
+        return float(self.values['friction.reversal_velocity']) if self.is_mechanism else 0.0
 
     @property
     def blocks_per_period(self) -> float:
         """Means of efforts that are compared in a period of the motion; 0 for means of 10 ms."""
-        return BLOCKS_PER_PERIOD if self.is_described else 0.0
+        return BLOCKS_PER_PERIOD if self.is_mechanism else 0.0
 
     @property
     def friction(self) -> AxisFriction:

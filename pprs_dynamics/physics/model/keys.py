@@ -287,7 +287,7 @@ ADDED = ('effects.', 'uncertainties.', 'tolerances.', 'history.', 'joint_map.', 
          'columns.', 'effort_kind', 'reference')
 
 
-def is_mechanism(names: Iterable[str]) -> bool:
+def is_described(names: Iterable[str]) -> bool:
     """Return whether keys are those of a robot that a description file describes."""
     return any(name.startswith('robot.') for name in names)
 
@@ -297,14 +297,14 @@ def title_of(parameters: Mapping[str, Any]) -> str:
     if any(name.startswith('robot.loops.') or (name == 'robot.mjcf' and value)
            for name, value in parameters.items()):
         return 'a robot with loops'
-    if not is_mechanism(parameters):
+    if not is_described(parameters):
         return 'a 3-PPRS'
     return 'a single axis' if len(parameters.get(DRIVES_KEY, ())) == 1 else 'a serial arm'
 
 
 def keys_of(parameters: Mapping[str, Any]) -> dict[str, Key]:
     """Return the keys of the kind of model that some keys and values belong to."""
-    if is_mechanism(parameters):
+    if is_described(parameters):
         drives = parameters.get(DRIVES_KEY, ())
         count = len(drives) if isinstance(drives, (list, tuple)) and drives else 1
         return {**mechanism_keys(count), **named_keys(parameters)}

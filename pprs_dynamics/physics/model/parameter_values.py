@@ -17,7 +17,7 @@ from pprs_dynamics.physics.model.keys import (
     NAMES,
     NODE_KEYS,
     NODE_PREFIXES,
-    is_mechanism,
+    is_described,
     keys_of,
 )
 from pprs_dynamics.physics.model.reference_keys import check_reference
@@ -55,7 +55,7 @@ def checked_values(parameters: Mapping[str, Any]) -> dict[str, Any]:
 
 def _require_known(parameters: Mapping[str, Any]) -> None:
     keys = keys_of(parameters)
-    named: Iterable[str] = NAMED_BLOCKS if is_mechanism(parameters) else ()
+    named: Iterable[str] = NAMED_BLOCKS if is_described(parameters) else ()
     blocks = {prefix for key in (*keys, *ADDED, *named) for prefix in _prefixes(key)}
     for name, value in parameters.items():
         if name in keys or _is_for_others(name):

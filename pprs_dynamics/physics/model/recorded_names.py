@@ -72,8 +72,8 @@ def effort_kind(values: Mapping[str, Any]) -> str:
     kind: str = Key(EFFORT_KIND, 'what the efforts of recordings are',
                     choices=EFFORT_KINDS).check(values.get(EFFORT_KIND, MEASURED))
     if kind == CURRENT and GAIN not in values:
-        raise ModelError(EFFORT_KIND, kind, 'be another one: only an arm and a robot with loops '
-                         'have a gain, by which currents become efforts')
+        raise ModelError(EFFORT_KIND, kind, 'be another one: a 3-PPRS has no gain by which '
+                         'currents become efforts')
     return kind
 
 

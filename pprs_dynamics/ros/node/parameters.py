@@ -27,7 +27,7 @@ from pprs_dynamics.physics.model.keys import (
     LARGEST,
     Key,
     as_list,
-    is_mechanism,
+    is_described,
     keys_of,
 )
 from pprs_dynamics.physics.model.parameter_file import default_parameters
@@ -137,7 +137,7 @@ def drive_count(node: Node) -> int:
 
 def has_model(given: Mapping[str, Any]) -> bool:
     """Return whether a robot is among the parameters given, and not only changes of the paper's."""
-    return is_mechanism(given) or any(
+    return is_described(given) or any(
         name.startswith('geometry.') for name in given)
 
 

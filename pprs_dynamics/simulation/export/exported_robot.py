@@ -3,51 +3,37 @@
 
 """Any model as a mechanism: a tree of bodies with closures, for files of simulators.
 
-The 3-PPRS becomes three chains and a platform. In MJCF the platform is free and held by three
-balls; in URDF it hangs on the first chain by three hinges in a row, so that programs that know no
-free joints draw it, and two balls are cut.
+In MJCF the platform of a 3-PPRS is free and held by three balls. In URDF it hangs on the first
+chain by three hinges in a row, and two balls are cut: programs without free joints draw it, too.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.errors import ModelError, SingularityError
+from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.effects.structure_effect import with_bodies
 from pprs_dynamics.physics.mechanism.description import (
-    FIXED,
     FLOATING,
-    PARAMETERS,
-    PRISMATIC,
-    REVOLUTE,
-    Description,
     Frame,
-    Joint,
-    Loop,
-    body_at,
     principal_inertia,
-    rotation_of,
 )
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
-from pprs_dynamics.physics.mechanism.structure import build_structure
 from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.robot import ThreePprs
+from pprs_dynamics.physics.three_pprs.tree import mechanism_of
 from pprs_dynamics.simulation.export.expressed import (
     URDF,
     Expressed,
     express,
 )
 
-HOME_HEIGHT = 0.5  # [m], of the 3-PPRS' platform
 FREE, HINGE, SLIDE = 'free', 'hinge', 'slide'
 # Simulators want some mass of everything that moves [kg, kg m^2]; ten decimals below real ones.
 LEAST = 1e-12
@@ -142,7 +128,8 @@ def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
     robot = with_bodies(model.robot, model.effects)
     if model.moves_joints:
         return described(model.block, robot, expressed.joints)
-    return described('three_pprs', platform_mechanism(robot, model, kind), expressed.joints)
+    mechanism = mechanism_of(robot, model.strokes, model.effort_limits, is_free=kind != URDF)
+    return described('three_pprs', mechanism, expressed.joints)
 
 
 def described(name: str, mechanism: Mechanism, joints: Mapping[str, Mapping[str, float]] = {},
@@ -191,74 +178,6 @@ def _inertia(name: str, parameters: Array) -> tuple[float, Array, Array, Array]:
     # What rounding left of the triangle's rule, which simulators take to the letter.
     moments[2] = min(moments[2], moments[0] + moments[1])
     return max(mass, LEAST), centre, moments, axes
-
-
-def platform_mechanism(robot: ThreePprs, model: DriveModel, kind: str) -> Mechanism:
-    """Return the 3-PPRS."""
-    geometry, masses = robot.geometry, robot.masses
-    R, r, l = geometry.base_radius, geometry.platform_radius, geometry.rod_length  # noqa: E741
-    platform = body_at(masses.total, masses.centre, masses.inertia_tensor)
-    links = {'base': np.zeros(PARAMETERS)}
-    joints: dict[str, Joint] = {}
-    loops: list[Loop] = []
-    home: dict[str, float] = {}
-    turned = {}
-    e_x, e_y, e_z = np.eye(3)
-
-    def hang(joint: str, joint_kind: str, parent: str, child: str, frame: Frame, axis: Array,
-             ) -> None:
-        joints[joint] = Joint(joint, joint_kind, parent, child, frame, axis)
-
-    for i in range(3):
-        delta, beta = geometry.chain_angles[i], geometry.platform_angles[i]
-        n = i + 1
-        mass = masses.rods[i]
-        across = mass * l ** 2 / 12
-        links[f'slide_{n}'] = body_at(masses.slides[i], (0.0,) * 3, np.zeros((3, 3)))
-        links[f'lift_{n}'] = body_at(masses.lifts[i], (0.0,) * 3, np.zeros((3, 3)))
-        links[f'rod_{n}'] = body_at(mass, (-l / 2, 0.0, 0.0), np.diag([0.0, across, across]))
-        foot = Frame.of((R * math.cos(delta), R * math.sin(delta), 0.0), (0.0, 0.0, delta))
-        hang(f'slide_{n}', PRISMATIC, 'base', f'slide_{n}', foot, e_y)
-        hang(f'lift_{n}', PRISMATIC, f'slide_{n}', f'lift_{n}', Frame(), e_z)
-        hang(f'hinge_{n}', REVOLUTE, f'lift_{n}', f'rod_{n}', Frame(), e_y)
-        cos_u = (R - r * math.cos(beta - delta)) / l
-        if abs(cos_u) >= 1:
-            raise SingularityError(0, f'the rod of chain {n} does not reach at home',
-                                   'the unturned platform must close above the base')
-        u = geometry.elbow_sign * math.acos(cos_u)
-        home |= {f'slide_{n}': r * math.sin(beta - delta),
-                 f'lift_{n}': HOME_HEIGHT - l * math.sin(u), f'hinge_{n}': u}
-        turned[n] = rotation_of((0.0, 0.0, delta)) @ rotation_of((0.0, u, 0.0))
-        end = Frame(p=np.array([r * math.cos(beta), r * math.sin(beta), 0.0]))
-        loops.append(Loop(f'ball_{n}', 'spherical', f'rod_{n}', Frame(p=np.array([-l, 0.0, 0.0])),
-                          'platform', end))
-    links['platform'] = platform
-    if kind == URDF:
-        ball, *loops = loops
-        at = Frame(turned[1].T, ball.frame_a.p)
-        for letter, parent, child, axis in (
-                ('x', 'rod_1', 'ball_1_x', e_x), ('y', 'ball_1_x', 'ball_1_y', e_y),
-                ('z', 'ball_1_y', 'ball_1_z', e_z)):
-            links[child] = np.zeros(PARAMETERS)
-            hang(f'ball_1_{letter}', REVOLUTE, parent, child, at, axis)
-            at = Frame()
-            home[f'ball_1_{letter}'] = 0.0
-        hang('platform_mount', FIXED, 'ball_1_z', 'platform', ball.frame_b.inverse, e_x)
-        poses = {}
-    else:
-        hang('platform', FLOATING, 'base', 'platform', Frame(), e_x)
-        poses = {'platform': Frame(p=np.array([0.0, 0.0, HOME_HEIGHT]))}
-    strokes = dict(zip(DRIVES, zip(*model.strokes, strict=True),
-                       strict=True))
-    efforts = dict(zip(DRIVES, model.effort_limits.tolist(), strict=True))
-    joints = {name: replace(joint, lower=strokes[name][0], upper=strokes[name][1],
-                            effort=efforts[name]) if name in strokes else joint
-              for name, joint in joints.items()}
-    description = Description('', links, joints, '')
-    structure = build_structure(description, 'base', 'platform', DRIVES, tuple(loops), home, poses)
-    bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
-    return Mechanism(structure, bodies, structure.inertial[bodies], np.zeros(len(DRIVES)),
-                     robot.gravity)
 
 
 class TreePose(NamedTuple):

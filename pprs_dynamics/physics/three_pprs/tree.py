@@ -1,0 +1,116 @@
+# SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
+# SPDX-License-Identifier: Apache-2.0
+
+"""The 3-PPRS as a tree of bodies with closures: three chains and a platform."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from pprs_dynamics.arrays import Array
+from pprs_dynamics.drives import DRIVES
+from pprs_dynamics.errors import SingularityError
+from pprs_dynamics.physics.mechanism.description import (
+    FIXED,
+    FLOATING,
+    PARAMETERS,
+    PRISMATIC,
+    REVOLUTE,
+    Description,
+    Frame,
+    Joint,
+    Loop,
+    body_at,
+    rotation_of,
+)
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
+from pprs_dynamics.physics.mechanism.structure import build_structure
+from pprs_dynamics.physics.three_pprs.robot import ThreePprs
+
+HOME_HEIGHT = 0.5  # of the platform [m]
+
+
+def mechanism_of(robot: ThreePprs, strokes: tuple[Array, Array], efforts: Array, *,
+                 is_free: bool = True) -> Mechanism:
+    """Return a 3-PPRS as a mechanism.
+
+    Parameters
+    ----------
+    robot : ThreePprs
+    strokes : tuple of two (6,) arrays
+        Lowest and highest position of each drive [m].
+    efforts : (6,) array
+        Largest force of each drive [N].
+    is_free : bool, optional
+        Whether the platform is a free body that three spherical closures hold. Otherwise it hangs
+        on the first rod by three revolute joints, and two closures remain.
+
+    Raises
+    ------
+    SingularityError
+        If a rod does not reach the platform at home.
+    """
+    geometry, masses = robot.geometry, robot.masses
+    R, r, l = geometry.base_radius, geometry.platform_radius, geometry.rod_length  # noqa: E741
+    platform = body_at(masses.total, masses.centre, masses.inertia_tensor)
+    links = {'base': np.zeros(PARAMETERS)}
+    joints: dict[str, Joint] = {}
+    loops: list[Loop] = []
+    home: dict[str, float] = {}
+    turned = {}
+    e_x, e_y, e_z = np.eye(3)
+
+    def hang(joint: str, joint_kind: str, parent: str, child: str, frame: Frame, axis: Array,
+             ) -> None:
+        joints[joint] = Joint(joint, joint_kind, parent, child, frame, axis)
+
+    for i in range(3):
+        delta, beta = geometry.chain_angles[i], geometry.platform_angles[i]
+        n = i + 1
+        mass = masses.rods[i]
+        across = mass * l ** 2 / 12
+        links[f'slide_{n}'] = body_at(masses.slides[i], (0.0,) * 3, np.zeros((3, 3)))
+        links[f'lift_{n}'] = body_at(masses.lifts[i], (0.0,) * 3, np.zeros((3, 3)))
+        links[f'rod_{n}'] = body_at(mass, (-l / 2, 0.0, 0.0), np.diag([0.0, across, across]))
+        foot = Frame.of((R * math.cos(delta), R * math.sin(delta), 0.0), (0.0, 0.0, delta))
+        hang(f'slide_{n}', PRISMATIC, 'base', f'slide_{n}', foot, e_y)
+        hang(f'lift_{n}', PRISMATIC, f'slide_{n}', f'lift_{n}', Frame(), e_z)
+        hang(f'hinge_{n}', REVOLUTE, f'lift_{n}', f'rod_{n}', Frame(), e_y)
+        cos_u = (R - r * math.cos(beta - delta)) / l
+        if abs(cos_u) >= 1:
+            raise SingularityError(0, f'the rod of chain {n} does not reach at home',
+                                   'the unturned platform must close above the base')
+        u = geometry.elbow_sign * math.acos(cos_u)
+        home |= {f'slide_{n}': r * math.sin(beta - delta),
+                 f'lift_{n}': HOME_HEIGHT - l * math.sin(u), f'hinge_{n}': u}
+        turned[n] = rotation_of((0.0, 0.0, delta)) @ rotation_of((0.0, u, 0.0))
+        end = Frame(p=np.array([r * math.cos(beta), r * math.sin(beta), 0.0]))
+        loops.append(Loop(f'ball_{n}', 'spherical', f'rod_{n}', Frame(p=np.array([-l, 0.0, 0.0])),
+                          'platform', end))
+    links['platform'] = platform
+    poses: dict[str, Frame] = {}
+    if is_free:
+        hang('platform', FLOATING, 'base', 'platform', Frame(), e_x)
+        poses['platform'] = Frame(p=np.array([0.0, 0.0, HOME_HEIGHT]))
+    else:
+        ball, *loops = loops
+        at = Frame(turned[1].T, ball.frame_a.p)
+        for letter, parent, child, axis in (
+                ('x', 'rod_1', 'ball_1_x', e_x), ('y', 'ball_1_x', 'ball_1_y', e_y),
+                ('z', 'ball_1_y', 'ball_1_z', e_z)):
+            links[child] = np.zeros(PARAMETERS)
+            hang(f'ball_1_{letter}', REVOLUTE, parent, child, at, axis)
+            at = Frame()
+            home[f'ball_1_{letter}'] = 0.0
+        hang('platform_mount', FIXED, 'ball_1_z', 'platform', ball.frame_b.inverse, e_x)
+    for d, drive in enumerate(DRIVES):
+        joints[drive] = replace(joints[drive], lower=float(strokes[0][d]),
+                                upper=float(strokes[1][d]), effort=float(efforts[d]))
+    description = Description('', links, joints, '')
+    structure = build_structure(description, 'base', 'platform', DRIVES, tuple(loops), home, poses)
+    bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
+    return Mechanism(structure, bodies, structure.inertial[bodies], np.zeros(len(DRIVES)),
+                     robot.gravity)
