@@ -32,7 +32,7 @@ AXIS = DriveModel.load('config/single_axis.yaml')
 RATE, DURATION = 125.0, 8.0
 NOISE = 0.05  # [N]
 # Effects most like another unit or sign; the others are slow tests.
-OFTEN = 'effort_gain', 'homing_error', 'time_delay', 'vibration'
+OFTEN = 'effort_gain', 'time_delay'
 Arrays = tuple[Array, Array, Array, Array]
 
 
@@ -110,7 +110,8 @@ def test_a_mistake_is_recognised_where_the_model_lacks_an_effect(mistake: str) -
     expect(told(change(robot(lacking, 3))), patterns)
 
 
-@pytest.mark.parametrize('path', ['excitation', 'helix'])
+@pytest.mark.parametrize('path', [
+    'excitation', pytest.param('helix', marks=pytest.mark.slow)])
 def test_nothing_is_said_of_what_is_right(path: str) -> None:
     time, position, velocity, effort = robot(path=path)
     assert told((time + 1.7e9, position, velocity, effort)) == []
@@ -131,11 +132,10 @@ def test_no_hidden_effect_is_called_a_mistake(name: str) -> None:
     assert found == ()
 
 
-@pytest.mark.parametrize('gain', [0.5, 8.0])
+@pytest.mark.parametrize('gain', [0.5])
 def test_a_gain_that_the_catalogue_knows_is_no_unit(gain: float) -> None:
     time, position, velocity, effort = robot()
-    if 1 / 3 < gain < 3:
-        assert told((time, position, velocity, effort * gain)) == []
+    assert told((time, position, velocity, effort * gain)) == []
     assert told((time, position, velocity, effort * [1, 1, gain, 1, gain, 1])) == []
 
 

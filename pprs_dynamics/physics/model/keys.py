@@ -112,7 +112,8 @@ class Key:
         return tuple(self._number(element, list(value)) for element in value)
 
     def _name(self, element: Any, value: Any) -> str:
-        if not isinstance(element, str) or not (element or self.may_be_empty):
+        if not isinstance(element, str) or not (
+                element.strip() or (self.may_be_empty and not element)):
             raise ModelError(self.name, value, self.rule)
         return element
 

@@ -13,22 +13,21 @@ there, and `effort_kind`: what efforts are.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from pprs_dynamics.drives import CHANNELS, Column, DriveColumns, RecordedColumns
 from pprs_dynamics.errors import ModelError, UnknownNameError
-from pprs_dynamics.physics.model.keys import GAIN
+from pprs_dynamics.physics.model.keys import GAIN, Key
 
 PREFIX, MAP, COLUMNS = 'joint_prefix', 'joint_map.', 'columns.'
 TIME, FILES = 'time', 'files.'
 LARGEST_BIT = 31
 QUANTITIES = ('position', 'velocity', 'effort', 'current', *CHANNELS)
 SCALES = ('effort_scale', 'position_scale', 'velocity_scale')
+Check = Callable[[str, Any], Any]  # from a key and its value to the value, checked
 OFFSET, SIGN_BIT = 'position_offset', 'effort_sign_bit'
-OF_TABLE = (TIME, 'time_scale', 'rate', 'decimal', *CHANNELS)
-OF_FILES = (TIME, *QUANTITIES)
 EFFORT_KIND = 'effort_kind'
 MEASURED, CURRENT, COMMANDED, WITHOUT_GRAVITY, EXTERNAL = EFFORT_KINDS = (
     'measured', 'current', 'commanded', 'without_gravity', 'external')
@@ -48,12 +47,13 @@ def joint_names(values: Mapping[str, Any], drives: Sequence[str]) -> tuple[str, 
     ModelError
         For a prefix or name that is no word, a drive that is not there, two drives of one name.
     """
-    prefix = _word(PREFIX, values.get(PREFIX, ''), may_be_empty=True)
+    prefix = Key(PREFIX, 'what joints have before the names of drives', is_text=True,
+                 may_be_empty=True).check(values.get(PREFIX, ''))
     for key in values:
         if key.startswith(MAP) and key.removeprefix(MAP) not in drives:
             raise UnknownNameError('drive', key.removeprefix(MAP), drives, key)
-    names = tuple(_word(f'{MAP}{drive}', values[f'{MAP}{drive}']) if f'{MAP}{drive}' in values
-                  else f'{prefix}{drive}' for drive in drives)
+    names = tuple(_name(f'{MAP}{drive}', values.get(f'{MAP}{drive}', f'{prefix}{drive}'))
+                  for drive in drives)
     for number, name in enumerate(names):
         if name in names[:number]:
             raise ModelError(f'{MAP}{drives[number]}', name, 'be another name than that of '
@@ -69,9 +69,8 @@ def effort_kind(values: Mapping[str, Any]) -> str:
     ModelError
         For another word, and for currents of a model without a gain.
     """
-    kind = values.get(EFFORT_KIND, MEASURED)
-    if not isinstance(kind, str) or kind not in EFFORT_KINDS:
-        raise ModelError(EFFORT_KIND, kind, f'be one of {", ".join(EFFORT_KINDS)}')
+    kind: str = Key(EFFORT_KIND, 'what the efforts of recordings are',
+                    choices=EFFORT_KINDS).check(values.get(EFFORT_KIND, MEASURED))
     if kind == CURRENT and GAIN not in values:
         raise ModelError(EFFORT_KIND, kind, 'be another one: a 3-PPRS has no gain by which '
                          'currents become efforts')
@@ -103,52 +102,46 @@ def recorded_columns(values: Mapping[str, Any], drives: Sequence[str]) -> Record
         For keys that are none, columns that are neither names nor numbers, scales and rates that
         are no numbers.
     """
-    given = {key.removeprefix(COLUMNS): value
+    given = {(name := key.removeprefix(COLUMNS)): _check_of(name, drives)(key, value)
              for key, value in values.items() if key.startswith(COLUMNS)}
     if not given:
         return None
-    for key in given:
-        _require_known(key, drives)
     found = {}
     for drive in drives:
-        names = {quantity: _column(f'{drive}.{quantity}', given[f'{drive}.{quantity}'])
-                 for quantity in QUANTITIES if f'{drive}.{quantity}' in given}
-        effort, position, velocity = (
-            _factor(f'{drive}.{scale}', given[f'{drive}.{scale}'])
-            if f'{drive}.{scale}' in given else None for scale in SCALES)
-        offset, bit = (given.get(f'{drive}.{key}') for key in (OFFSET, SIGN_BIT))
+        own = _below(given, f'{drive}.')
+        position = own.get('position_scale', 1.0)
         # Degrees of a position are those of its velocity, but where that says otherwise.
         found[drive] = DriveColumns(
-            names, effort or 1.0, position or 1.0, velocity or position or 1.0,
-            0.0 if offset is None else _factor(f'{drive}.{OFFSET}', offset, may_be_zero=True),
-            None if bit is None else _bit(f'{drive}.{SIGN_BIT}', bit))
-    if given.get('decimal', '.') not in ('.', ','):
-        raise ModelError(f'{COLUMNS}decimal', given['decimal'], 'be "." or ","')
-    rate = _factor('rate', given['rate']) if 'rate' in given else None
-    if rate is not None and rate < 0:
-        raise ModelError(f'{COLUMNS}rate', rate, 'be greater than 0 (samples per second [Hz])')
-    files = {quantity: _word(f'{COLUMNS}{FILES}{quantity}', given[f'{FILES}{quantity}'])
-             for quantity in OF_FILES if f'{FILES}{quantity}' in given}
+            {quantity: own[quantity] for quantity in QUANTITIES if quantity in own},
+            own.get('effort_scale', 1.0), position, own.get('velocity_scale', position),
+            own.get(OFFSET, 0.0), own.get(SIGN_BIT))
+    files = _below(given, FILES)
     if files and 'position' not in files:
         raise ModelError(f'{COLUMNS}{FILES}position', '', 'name the file of positions')
     return RecordedColumns(
-        _column(TIME, given[TIME]) if TIME in given else None, found,
-        _factor('time_scale', given['time_scale']) if 'time_scale' in given else None, rate,
+        given.get(TIME), found, given.get('time_scale'), given.get('rate'),
         given.get('decimal', '.'), files,
-        {name: _column(name, given[name]) for name in CHANNELS if name in given})
+        {name: given[name] for name in CHANNELS if name in given})
 
 
-def _require_known(key: str, drives: Sequence[str]) -> None:
-    """Raise UnknownNameError for a key of the block that is none."""
-    if key in OF_TABLE or key.removeprefix(FILES) in (OF_FILES if FILES in key else ()):
-        return
+def _below(given: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    return {key.removeprefix(prefix): value for key, value in given.items()
+            if key.startswith(prefix)}
+
+
+def _check_of(key: str, drives: Sequence[str]) -> Check:
+    """Return the check of a key of the block, or raise UnknownNameError."""
+    if key in OF_TABLE:
+        return OF_TABLE[key]
     drive, _, quantity = key.partition('.')
+    if f'{drive}.' == FILES and quantity in (TIME, *QUANTITIES):
+        return _name
     if drive not in drives:
         raise UnknownNameError('drive', drive, (*drives, *OF_TABLE, 'files'), f'{COLUMNS}{key}')
-    known = (*QUANTITIES, *SCALES, OFFSET, SIGN_BIT)
-    if quantity not in known:
+    if quantity not in OF_DRIVE:
         raise UnknownNameError('key', f'{COLUMNS}{key}', [
-            f'{COLUMNS}{drive}.{name}' for name in known])
+            f'{COLUMNS}{drive}.{name}' for name in OF_DRIVE])
+    return OF_DRIVE[quantity]
 
 
 def _column(key: str, value: Any) -> Column:
@@ -157,28 +150,36 @@ def _column(key: str, value: Any) -> Column:
         value = int(value)
     if isinstance(value, int) and not isinstance(value, bool):
         if value < 1:
-            raise ModelError(f'{COLUMNS}{key}', value, 'be a name, or a number from 1')
+            raise ModelError(key, value, 'be a name, or a number from 1')
         return value
     if not isinstance(value, str) or not value.strip():
-        raise ModelError(f'{COLUMNS}{key}', value, 'be the name of a column, or its number')
+        raise ModelError(key, value, 'be the name of a column, or its number')
     return value
 
 
-def _word(key: str, value: Any, may_be_empty: bool = False) -> str:
-    if not isinstance(value, str) or not (value.strip() or (may_be_empty and not value)):
-        raise ModelError(key, value, 'be a name')
-    return value
-
-
-def _factor(key: str, value: Any, may_be_zero: bool = False) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or (
-            not math.isfinite(value) or (value == 0 and not may_be_zero)):
-        raise ModelError(f'{COLUMNS}{key}', value, 'be a finite number'
-                         + ('' if may_be_zero else ' other than 0'))
-    return float(value)
+def _factor(key: str, value: Any) -> float:
+    factor: float = Key(key, 'what values are multiplied by').check(value)
+    if factor == 0:
+        raise ModelError(key, value, 'be a finite number other than 0')
+    return factor
 
 
 def _bit(key: str, value: Any) -> int:
     if isinstance(value, bool) or value not in range(1, LARGEST_BIT + 1):
-        raise ModelError(f'{COLUMNS}{key}', value, f'be the number of a bit, 1 to {LARGEST_BIT}')
+        raise ModelError(key, value, f'be the number of a bit, 1 to {LARGEST_BIT}')
     return int(value)
+
+
+def _as(declared: Key) -> Check:
+    return lambda key, value: replace(declared, name=key).check(value)
+
+
+_name = _as(Key('', 'of a joint, or a file', is_text=True))
+OF_TABLE: dict[str, Check] = {
+    TIME: _column, 'time_scale': _factor,
+    'rate': _as(Key('', 'samples per second', 'Hz', positive=True)),
+    'decimal': _as(Key('', 'mark of decimals', choices=('.', ','))),
+    **dict.fromkeys(CHANNELS, _column)}
+OF_DRIVE: dict[str, Check] = {
+    **dict.fromkeys(QUANTITIES, _column), **dict.fromkeys(SCALES, _factor),
+    OFFSET: _as(Key('', 'what is added to positions')), SIGN_BIT: _bit}

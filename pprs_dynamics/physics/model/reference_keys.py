@@ -11,11 +11,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pprs_dynamics.errors import ModelError, UnknownNameError
+from pprs_dynamics.physics.model.keys import ANY, Key
 
 REFERENCE = 'reference'
 HASHES = 'reference_sha256'
 DIRECTIONS = 'reference_directions'
-KEYS = (REFERENCE, HASHES, DIRECTIONS)
+KEYS = {REFERENCE: Key(REFERENCE, 'runs that pprs fit wrote', size=ANY, is_text=True),
+        HASHES: Key(HASHES, 'SHA-256 of each, that pprs fit wrote', size=ANY, is_text=True),
+        DIRECTIONS: Key(DIRECTIONS, 'text that pprs fit wrote', is_text=True, may_be_empty=True)}
 
 
 class ReferenceFile(NamedTuple):
@@ -55,13 +58,8 @@ def check_reference(parameters: Mapping[str, Any]) -> None:
         if key.partition('_')[0] != REFERENCE:
             continue
         if key not in KEYS:
-            raise UnknownNameError('key', key, KEYS)
-        if key == DIRECTIONS:
-            if not isinstance(value, str):
-                raise ModelError(key, value, 'be a text that pprs fit wrote')
-        elif isinstance(value, str) or not hasattr(value, '__len__') or not all(
-                isinstance(one, str) and one for one in value):
-            raise ModelError(key, value, 'be a list of names')
+            raise UnknownNameError('key', key, tuple(KEYS))
+        KEYS[key].check(value)
     if len(parameters.get(REFERENCE, ())) != len(parameters.get(HASHES, ())):
         raise ModelError(REFERENCE, list(parameters.get(REFERENCE, ())),
                          f'have a SHA-256 each under {HASHES}: pprs fit writes both')

@@ -10,6 +10,7 @@ from typing import Any
 
 from pprs_dynamics.errors import ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.catalogue import find_effect
+from pprs_dynamics.physics.model.keys import Key
 from pprs_dynamics.physics.model.ledger import NOT_KNOWN, read_steps
 
 UNCERTAINTIES = 'uncertainties'
@@ -51,5 +52,4 @@ def check_uncertainties(parameters: Mapping[str, Any]) -> None:
         if name in active and f'effects.{name}.{".".join(rest)}' not in parameters:
             raise ModelError(key, value, f'belong to effects.{name}.{".".join(rest)}, which is '
                              'not there: take the line out')
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not value >= 0:
-            raise ModelError(key, value, 'be a standard deviation, a number of at least 0')
+        Key(key, 'a standard deviation', lower=0).check(value)
