@@ -37,7 +37,7 @@ PATHS: dict[str, HelicalPath | Excitation] = {
 PLAYED = {'helical path': ['source:=helix'],
           'excitation': ['source:=excitation', 'duration:=15.0', 'seed:=1']}
 LEARN_FROM = 'excitation'
-HIDDEN = ('coulomb_friction', 'payload_offset')
+HIDDEN = ('coulomb_friction', 'payload_mass')
 COLOURS = ('#999999', '#56B4E9', '#0072B2', '#D55E00', '#D55E00', '#CC79A7', '#CC79A7')
 ADDED = 'added'
 LIVE, ON_TIME = 'over topics', 'in simulated time'
@@ -85,7 +85,7 @@ def run_all(
         case = Case(f'the same, with `{effect}` hidden in the robot', 'friction', (effect,))
         run(case)
         first, *_ = runs[case.name, LEARN_FROM].values()
-        run(Case(f'the same, with what was found {ADDED}: `{effect}`', 'friction', (effect,),
+        run(Case(f'diagnosed and {ADDED}: `{effect}`', 'friction', (effect,),
                  learn(first.recording('run'), folder / effect)))
     return runs
 
