@@ -235,8 +235,8 @@ CONTAINERS = (
     'physics.mechanism.joint_series', 'physics.mechanism.description', 'physics.mechanism.urdf',
     'physics.mechanism.mjcf', 'physics.mechanism.structure', 'physics.mechanism.tree_tables',
     'physics.mechanism.passive_joints', 'physics.model.drive_model', 'physics.model.limits',
-    'physics.model.robot_block', 'physics.effects.effect', 'physics.effects.laws.axis_friction',
-    'physics.effects.laws.joint_friction', 'errors', 'arrays')
+    'physics.model.robot_block', 'physics.three_pprs.tree', 'physics.effects.effect',
+    'physics.effects.laws.axis_friction', 'physics.effects.laws.joint_friction', 'errors', 'arrays')
 # Of the equations, which are compiled functions over tables, names and kinds of rows alone.
 NAMES_OF_TABLES = {'AXES', 'KIND', 'LOOP', 'TRANSLATION', 'JointFriction'}
 
