@@ -110,13 +110,16 @@ class Answer:
         self.noise: dict[str, NoiseSpectrum] = {
             self.drives[d]: spectrum
             for d, spectrum in fits.regression.noise(fitted.fit).items()}
-        known = noise_floors(table.first)
-        # The residual of the reported set is an upper bound of the noise.
-        self.floors = {self.drives[d]: noise_at_most(
-            known.get(self.drives[d], np.inf),
-            self.fits.regression.noise_floor(self.fitted.fit, d))
+        known, most = noise_floors(table.first), {
+            self.drives[d]: self.fits.regression.noise_floor(self.fitted.fit, d)
             for d in self.fits.regression.drives}
-        self.unseen = tuple(name for name in self.floors if name not in known)
+        # The residual of the reported set is an upper bound of the noise.
+        self.noise_levels = {name: noise_at_most(known.get(name, np.inf), bound)
+                             for name, bound in most.items()}
+        # Free curves take slow noise as well, so that residuals are judged without them.
+        judged = noise_floors(table.last, best=table.reported.fit)
+        self.floors = {name: judged.get(name, bound) for name, bound in most.items()}
+        self.unseen = tuple(name for name in self.floors if name not in judged)
 
     def _remaining(self) -> Array:
         """Return measured minus what the reported model predicts, (M, D) [N]."""
@@ -177,8 +180,8 @@ class Answer:
             verdict, effects, rivals, unconfirmed, self._candidates(), self._suspects(), depends,
             self._sets(), self._barred(), tuple(moved),
             find_cautions(table.last, table.reported, effects), first.notes, first.given,
-            self.adopted, self.given, self.remaining, self.noise, self.floors,
-            root_mean_square(list(self.floors.values())), refit, above, little, self.unseen,
+            self.adopted, self.given, self.remaining, self.noise, self.noise_levels,
+            root_mean_square(list(self.noise_levels.values())), refit, above, little, self.unseen,
             'validation' if self.validate else 'blocks', selection=table,
             decisions=self.decisions)
 

@@ -194,7 +194,9 @@ class Search:
                 break
             for unit in self.excerpts:
                 fit = None if reading is first and unit == 1 else self.fit(reading, unit)
-                if fit is not None:
+                # Symmetric robots fit nearly as well in another order of their drives.
+                if fit is not None and (reading.kind != 'drive_order'
+                                        or fit.left < table.OTHER_ORDER * start.left):
                     self.fits.append(fit)
                     best = self._better(best, fit)
         # Zeros that are quarter turns off, one drive after another.

@@ -77,7 +77,9 @@ def find_scales(model: DriveModel, contents: Mapping[str, Shares]) -> list[Other
             if is_share:
                 return [_unit(model, f"{of_all} looks like {name} of the drives' largest",
                               sign * share * model.effort_limits)]
-    if has_weight and np.all(np.abs(np.log(sizes)) > np.log(table.SAME_MASSES)) and np.all(
+    # A load may multiply what one drive of several needs.
+    if has_weight and len(certain) >= min(2, len(every)) and np.all(
+            np.abs(np.log(sizes)) > np.log(table.SAME_MASSES)) and np.all(
             sizes > table.LARGEST_COMPLIANCE):
         listed = ', '.join(f'{scale:.3g} ({model.drives[k]})' for k, scale in certain.items())
         return [OtherReading.of(
@@ -218,11 +220,16 @@ def find_changed_positions(recording: Recording) -> Iterator[OtherReading]:
         alike = np.abs(ratio / factor - 1) < table.NEARLY
         still = (size[1:] == 0) | (size[:-1] == 0)
         for k in np.flatnonzero(np.all(alike | still, axis=1) & np.any(alike, axis=1)).tolist():
-            # One zero crossing may have any ratio: a change of unit lasts.
-            before, after = (np.median(size[part], axis=0) for part in (
-                slice(max(k - 9, 0), k + 1), slice(k + 1, k + 11)))
-            if np.all(np.abs(after / np.maximum(before, 1e-300) / factor - 1)
-                      < 10 * table.NEARLY):
+            # One zero crossing may have any ratio: a change of unit lasts, and changes steps too.
+            if not 9 <= k < len(size) - 11:
+                continue
+            parts = slice(k - 9, k + 1), slice(k + 1, k + 11)
+            before, after = (np.median(size[part], axis=0) for part in parts)
+            slow, fast = (np.median(np.abs(np.diff(recording.position[part], axis=0)), axis=0)
+                          for part in parts)
+            steps = np.where(slow + fast > 0, fast / np.maximum(slow, 1e-300) / factor, 1.0)
+            if np.all((steps > 0.5) & (steps < 2)) and np.all(
+                    np.abs(after / np.maximum(before, 1e-300) / factor - 1) < 10 * table.NEARLY):
                 when = (f'from {recording.time[k + 1]:.4g} s on' if is_after
                         else f'until {recording.time[k]:.4g} s')
                 yield OtherReading.of(

@@ -65,6 +65,7 @@ BEYOND, FAR = 2.0, 10.0  # multiples of the ends of a stroke, or of the speed li
 STROKE_SLACK = 0.05  # share of a stroke
 SURE = 3.0  # nats by which the best hypothesis must win
 GOOD_FIT = 0.25  # residual with which a hypothesis other than the plain one is credible
+OTHER_ORDER = 0.5  # residual in another order of the drives, relative to that in the given one
 CLOSE_FIT = 2e-3  # residual that leaves nothing to look for
 WEAK = 0.01  # efforts and swings that are this much smaller than others tell nothing
 

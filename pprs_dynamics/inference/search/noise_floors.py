@@ -40,7 +40,8 @@ MOST_SHAPES = 60
 CURVE = 24  # hat functions of a free curve over a drive's position
 
 
-def noise_floors(fits: FittedSets, period: float | None = None) -> dict[str, float]:
+def noise_floors(fits: FittedSets, period: float | None = None,
+                 best: JointFit | None = None) -> dict[str, float]:
     """Return the rms of the noise of each drive [N], where the recordings determine it.
 
     Parameters
@@ -49,12 +50,18 @@ def noise_floors(fits: FittedSets, period: float | None = None) -> dict[str, flo
         Around the input model.
     period : float, optional
         Between the samples of the noise [s]; by default that of the design.
+    best : JointFit, optional
+        Of a set of effects, whose columns take the place of the curves.
     """
     regression, residuals = fits.regression, fits.design.residuals
-    curves = [regression.block({d: _curve(residuals.variables['position'][:, d])})
-              for d in regression.drives if fits.design.moves(d)]
-    fit = regression.fit((*catalogue_blocks(fits), *curves), fits.evaluate(()).fit.amplitudes)
-    seen = _shares_seen(fits, fit, fit.amplitudes) >= fits.decisions.noise_seen
+    further = best.blocks if best else [
+        regression.block({d: _curve(residuals.variables['position'][:, d])})
+        for d in regression.drives if fits.design.moves(d)]
+    fit = regression.fit(tuple(dict.fromkeys((*catalogue_blocks(fits), *further))),
+                         fits.evaluate(()).fit.amplitudes)
+    spectra = [fit.amplitudes, best.amplitudes] if best else [fit.amplitudes]
+    seen = np.all([_shares_seen(fits, fit, amplitudes) >= fits.decisions.noise_seen
+                   for amplitudes in spectra], axis=0)
     # Means over longer blocks have less white noise, and as much of slower noise.
     white = fit.amplitudes[:, 0] * (residuals.period / (period or residuals.period) - 1)
     return {fits.design.drives[d]: float(np.sqrt(max(
