@@ -220,16 +220,13 @@ def find_changed_positions(recording: Recording) -> Iterator[OtherReading]:
         alike = np.abs(ratio / factor - 1) < table.NEARLY
         still = (size[1:] == 0) | (size[:-1] == 0)
         for k in np.flatnonzero(np.all(alike | still, axis=1) & np.any(alike, axis=1)).tolist():
-            # One zero crossing may have any ratio: a change of unit lasts, and changes steps too.
+            # One zero crossing may have any ratio: a change of unit lasts.
             if not 9 <= k < len(size) - 11:
                 continue
             parts = slice(k - 9, k + 1), slice(k + 1, k + 11)
             before, after = (np.median(size[part], axis=0) for part in parts)
-            slow, fast = (np.median(np.abs(np.diff(recording.position[part], axis=0)), axis=0)
-                          for part in parts)
-            steps = np.where(slow + fast > 0, fast / np.maximum(slow, 1e-300) / factor, 1.0)
-            if np.all((steps > 0.5) & (steps < 2)) and np.all(
-                    np.abs(after / np.maximum(before, 1e-300) / factor - 1) < 10 * table.NEARLY):
+            if np.all(np.abs(after / np.maximum(before, 1e-300) / factor - 1)
+                      < 10 * table.NEARLY) and _steps_change(recording.position, parts, factor):
                 when = (f'from {recording.time[k + 1]:.4g} s on' if is_after
                         else f'until {recording.time[k]:.4g} s')
                 yield OtherReading.of(
@@ -237,6 +234,14 @@ def find_changed_positions(recording: Recording) -> Iterator[OtherReading]:
                     f'the positions look like {units[unit]} {when}, unlike in the rest; the parts '
                     'must be recordings of their own')
                 return
+
+
+def _steps_change(position: Array, parts: tuple[slice, slice], factor: float) -> bool:
+    """Return whether the steps of a single drive change by the factor, too."""
+    if position.shape[1] > 1:
+        return True
+    before, after = (np.median(np.abs(np.diff(position[part, 0]))) for part in parts)
+    return bool(0.5 < after / max(float(before), 1e-300) / factor < 2)
 
 
 # ------------------------------------------------------------------------------- measurements
