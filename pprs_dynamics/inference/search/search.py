@@ -131,10 +131,9 @@ class Search:
             if number < (FIRST_REFINED if len(fitted.candidates) == 1 else REFINED):
                 self.fits.refined(fitted)
         # A scan puts it where each drive pays by itself: with others that is seldom right.
-        single = [fitted for fitted in new
-                  if len(fitted.candidates) == len(fitted.effects) == 1]
-        for fitted in sorted(single, key=lambda fitted: fitted.cost)[:FIRST_REFINED]:
-            simplified(self.fits, fitted)
+        for fitted in new:
+            if len(fitted.candidates) == len(fitted.effects) == 1:
+                simplified(self.fits, fitted)
 
     def _with_constants(self, sets: Iterable[CandidateSet]) -> list[CandidateSet]:
         """Return sets with one effect more, where only constants make them worse than the best.
