@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from made_up_recordings import (
     QUANTITIES,
@@ -371,6 +371,7 @@ def test_a_short_recording_is_told_and_kept() -> None:
 
 
 @settings(max_examples=60)
+@example(times=[0.0, -8.98846567431158e+307, 0.0, 1.0, 0.5], seed=0)
 @given(times=st.lists(st.one_of(st.floats(), st.floats(0, 3).map(lambda t: round(t, 2))),
                       min_size=1, max_size=80), seed=st.integers(0, 99))
 def test_whatever_the_stamps_segments_are_ordered_and_everything_is_finite(

@@ -28,6 +28,7 @@ LEAST_BETWEEN_RESETS = 50
 # Longer than this many median steps: samples are missing. Below 2, which is one lost sample, and
 # above what jitter makes.
 LOST_STEPS = 1.5
+MOST_LOST = 1e12  # samples that are counted as lost in one step
 # Longer than this many median steps and longer than this time [s]: nothing is known in between.
 # A cubic through 20 ms of a 3 Hz motion of 50 mm errs by (2 pi 3 0.02)^4/384 50 mm = 3 um, about
 # the resolution of an encoder; longer gaps cannot be interpolated.
@@ -141,7 +142,8 @@ def gaps(time: Array, part: slice) -> tuple[Indices, Indices, int]:
     padded = np.concatenate(([step], steps, [step]))
     not_made_up = np.minimum(padded[:-2], padded[2:]) + steps > (LOST_STEPS + 1) * step
     lost = (steps > LOST_STEPS * step) & not_made_up & ~gap
-    count = int(np.sum(np.rint(steps[lost] / step) - 1))
+    # Damaged stamps may be as far off as numbers reach.
+    count = int(np.sum(np.rint(np.minimum(steps[lost], MOST_LOST * step) / step) - 1))
     return part.start + 1 + np.flatnonzero(gap), part.start + 1 + np.flatnonzero(lost), count
 
 
