@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
+from page_block import replace_block
+
 from pprs_dynamics.app.commands.pprs import COMMANDS
 
 PAGE = Path(__file__).parent / 'commands.md'
@@ -48,12 +50,5 @@ def table() -> str:
     return '\n\n'.join(sections)
 
 
-def main() -> None:
-    """Replace the table in the page."""
-    before, _, rest = PAGE.read_text(encoding='utf-8').partition(BEGIN)
-    PAGE.write_text(f'{before}{BEGIN}\n\n{table()}\n\n{END}{rest.partition(END)[2]}',
-                    encoding='utf-8')
-
-
 if __name__ == '__main__':
-    main()
+    replace_block(PAGE, BEGIN, END, table())

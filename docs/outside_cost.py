@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from pathlib import Path
 
+from page_block import replace_block
+
 from pprs_dynamics.inference.search.decisions import OUTSIDE_COST
 
 import_module('pprs_dynamics.inference.adoption.adopt')  # lists all rules
@@ -21,12 +23,5 @@ def table() -> str:
     return '\n'.join(['| rule | code |', '|---|---|', *rows])
 
 
-def main() -> None:
-    """Replace the table in the page."""
-    before, _, rest = PAGE.read_text(encoding='utf-8').partition(BEGIN)
-    PAGE.write_text(f'{before}{BEGIN}\n\n{table()}\n\n{END}{rest.partition(END)[2]}',
-                    encoding='utf-8')
-
-
 if __name__ == '__main__':
-    main()
+    replace_block(PAGE, BEGIN, END, table())

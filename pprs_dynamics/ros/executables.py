@@ -76,7 +76,7 @@ def _run(module: str, node: str, has_actions: bool = False) -> int:
 
 
 def _check_arguments(name: str, arguments: list[str]) -> None:
-    """Exit with usage where something is asked for, or given, that is not ROS 2's to take.
+    """Exit where something is asked for, is not for ROS 2, or is a file that cannot be read.
 
     ROS 2 passes over what stands outside of --ros-args: a model given there would not be used.
     """

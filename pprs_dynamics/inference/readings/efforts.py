@@ -221,9 +221,9 @@ def find_changed_positions(recording: Recording) -> Iterator[OtherReading]:
         still = (size[1:] == 0) | (size[:-1] == 0)
         for k in np.flatnonzero(np.all(alike | still, axis=1) & np.any(alike, axis=1)).tolist():
             # One zero crossing may have any ratio: a change of unit lasts.
-            if not 9 <= k < len(size) - 11:
+            if not table.LASTING - 1 <= k < len(size) - table.LASTING - 1:
                 continue
-            parts = slice(k - 9, k + 1), slice(k + 1, k + 11)
+            parts = (slice(k + 1 - table.LASTING, k + 1), slice(k + 1, k + 1 + table.LASTING))
             before, after = (np.median(size[part], axis=0) for part in parts)
             if np.all(np.abs(after / np.maximum(before, 1e-300) / factor - 1)
                       < 10 * table.NEARLY) and _steps_change(recording.position, parts, factor):
@@ -241,7 +241,8 @@ def _steps_change(position: Array, parts: tuple[slice, slice], factor: float) ->
     if position.shape[1] > 1:
         return True
     before, after = (np.median(np.abs(np.diff(position[part, 0]))) for part in parts)
-    return bool(0.5 < after / max(float(before), 1e-300) / factor < 2)
+    change = after / max(float(before), 1e-300) / factor
+    return bool(1 / table.LIKE_STEPS < change < table.LIKE_STEPS)
 
 
 # ------------------------------------------------------------------------------- measurements

@@ -99,6 +99,8 @@ CLEARLY = 3.0  # times that a changed reading fits better
 LEAST_PART = 0.1  # share of a recording that a change lasts
 SHARP = 0.2  # [s]; a change that is known better is reported as one moment
 NEARLY = 0.02  # relative error of a step of positions
+LASTING = 10  # samples for which positions in another unit must last, on both sides
+LIKE_STEPS = 2.0  # factor within which the steps of a single drive change as its unit does
 BOTH_SIGNS = 0.05  # share of the model's squared efforts of the other sign
 
 # ----------------------------------------------------------------------- columns by their names

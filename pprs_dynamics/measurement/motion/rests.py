@@ -15,8 +15,6 @@ SHORTEST_REST = 0.5  # [s]; reversals of a motion are over sooner
 GLANCE = 0.1  # [s] over which speeds are taken to tell motion from rest
 NORMAL_MEDIAN = 0.6745  # of standard deviations: median size of what is normally distributed
 RESOLVED = 4.0  # steps, or deviations of the noise, of a measured position, that are no motion
-
-
 SLOW_SHARE = 0.2  # of a drive's own fast speed: a slower one is a rest
 
 
