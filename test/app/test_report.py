@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pprs_command import pprs, simulate_into
+from pprs_command import pprs
 
 from pprs_dynamics.app.report.charts import thinned
 from pprs_dynamics.drives import DRIVES
@@ -24,8 +24,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp('compare')
     # A name that would be a script where it is not escaped.
     run = folder / '<script>alert(1)</script>.mcap'.replace('/', '')
-    simulate_into(folder, '--output', run.name, '--effect', 'coulomb_friction', '--seed', '11',
-                  '--duration', '15', '--json', 'truth.json')
+    done = pprs('simulate', '--output', run.name, '--effect', 'coulomb_friction', '--seed', '11',
+                '--duration', '15', '--json', 'truth.json', cwd=folder)
+    assert done.returncode == 0, done.stderr
     done = pprs('compare', run, '--json', folder / 'mcap.json', '--report', folder / 'page.html')
     assert done.returncode == 0, done.stderr
     (folder / 'stdout.txt').write_text(done.stdout)

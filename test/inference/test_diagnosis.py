@@ -152,11 +152,6 @@ def test_the_catalogues_own_form_is_found_with_its_values_and_to_the_noise() -> 
     assert rms < found.effects[0].error_before / 3
 
 
-OFFSETS = dict(zip(DRIVES, (0.44, -0.32, 0.89, -0.63, -0.88, -0.43), strict=True))
-WRENCH = {'force_x': 0.66, 'force_y': 0.78, 'force_z': 0.1,
-          'moment_x': -0.05, 'moment_y': 0.04, 'moment_z': 0.02}
-
-
 def test_a_tilted_base_is_no_friction_on_drives_that_stand() -> None:
     true = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['base_tilt'],
                         'effects.base_tilt.x': 0.045, 'effects.base_tilt.y': -0.048})
@@ -170,24 +165,6 @@ def test_a_tilted_base_is_no_friction_on_drives_that_stand() -> None:
     assert found.effects[0].parameters['y'].value == pytest.approx(-0.048, abs=5e-4)
     assert any('slide_1, slide_2 and slide_3 hardly moved' in one for one in found.warnings)
     assert not any('independent samples' in one for one in found.warnings)
-
-
-def test_a_wrench_is_found_with_its_moments_and_no_offsets() -> None:
-    true = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['external_wrench'], **{
-        f'effects.external_wrench.{key}': value for key, value in WRENCH.items()}})
-    found = diagnose(MODEL, [record(true, 0.08)])
-    assert [one.name for one in found.effects] == ['external_wrench']
-    for key, value in WRENCH.items():
-        one = found.effects[0].parameters[key]
-        assert abs(one.value - value) < 4 * one.std < 0.2
-
-
-def test_offsets_on_all_drives_are_offsets_and_no_springs() -> None:
-    true = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['effort_offset'], **{
-        f'effects.effort_offset.{key}.force': value for key, value in OFFSETS.items()}})
-    found = diagnose(MODEL, [record(true, 0.08)])
-    assert [one.name for one in found.effects] == ['effort_offset']
-    assert found.effects[0].drives == DRIVES
 
 
 def test_friction_fades_from_the_start_of_the_recording_not_of_what_is_kept() -> None:

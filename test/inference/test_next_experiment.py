@@ -5,22 +5,17 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from pprs_command import pprs
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.experiments.columns import ColumnPlan, FittedTerm
 from pprs_dynamics.inference.experiments.criteria import (
     Contest,
     Explanation,
     Information,
-    Precision,
     whitened,
 )
 from pprs_dynamics.inference.experiments.fourier_path import FourierPath
@@ -51,7 +46,6 @@ from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 
@@ -182,14 +176,6 @@ def test_misfit_is_what_least_squares_leaves() -> None:
     assert contest.misfit(columns.T @ columns) == pytest.approx(rest @ rest, rel=1e-6)
 
 
-def test_precision_is_the_scatter_of_estimates() -> None:
-    rng = np.random.default_rng(2)
-    columns = rng.normal(size=(40, 3)) @ np.array([[1, 0.5, 0], [0, 1, 0.3], [0, 0, 1]])
-    covariance = np.linalg.inv(columns.T @ columns)
-    found = Precision((1, 2), (0,), np.array([0.1, 10.0])).deviations(columns.T @ columns)
-    assert found == pytest.approx(np.sqrt(np.diag(covariance))[1:], rel=1e-6)
-
-
 # Limits and search.
 
 
@@ -236,31 +222,3 @@ def test_a_recording_is_needed_to_know_what_to_tell_apart(model: DriveModel) -> 
 
 
 # The command.
-
-@pytest.mark.slow
-def test_commission_writes_poses_json_and_page(tmp_path: Path) -> None:
-    done = pprs('next-experiment', '--purpose', 'commission', '--output', 'first.csv',
-                '--json', 'first.json', '--report', 'first.html', cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    motion = read_poses(tmp_path / 'first.csv', 100.0)
-    assert motion.time is not None
-    assert motion.time[-1] == pytest.approx(20.0)
-    assert motion.is_closed()
-    forces = DriveModel.load().drive_forces(motion)
-    assert np.abs(forces.mechanism.velocity).max() <= 0.45 + 1e-6
-    result = json.loads((tmp_path / 'first.json').read_text())
-    assert result['separates'] == []
-    assert result['question'] == 'commission'
-    assert max(result['limits'].values()) <= 1.0
-    assert {f'drive_inertia.{drive}.mass' for drive in DRIVES} <= {
-        one['label'] for one in result['accuracy']}
-    for one in result['accuracy']:
-        assert one['std_after'] <= (one['std_before'] or np.inf) * (1 + 1e-6)
-    known = {one['label']: one for one in result['accuracy']}
-    # Platform and payload weigh alike: their sum is told, their shares are not.
-    assert known['masses.payload']['std_after'] > 0.5 * known['masses.payload']['std_before']
-    assert known['masses.lifts[1]']['std_before'] == pytest.approx(0.5 * 0.1 / 2.5)
-    assert known['payload_mass.mass']['std_after'] < 0.1
-    page = (tmp_path / 'first.html').read_text()
-    assert 'The next experiment' in page
-    assert 'http' not in page.split('plotly')[0]
