@@ -329,11 +329,10 @@ def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
 
 
 def _findings(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
-    kind = diagnosis.model.kind
     if words.effects:
         with page.fold('Reported effects'):
             for finding, effect in zip(words.effects, diagnosis.effects, strict=True):
-                page.card(finding.title, _lines(finding, effect.effect.card_in(kind).equation),
+                page.card(finding.title, _lines(finding, effect.effect.card.equation),
                           figures.effect_pictures(diagnosis, effect))
     if words.unexplained:
         with page.fold('Patterns that no effect of the catalogue explains'):
@@ -350,7 +349,7 @@ def _alternatives(page: Page, diagnosis: Diagnosis, words: Sentences,
     if words.rivals:
         with page.fold('Rivals, which explain the data about as well'):
             for finding, rival in zip(words.rivals, rivals, strict=True):
-                equation = rival.effect.card_in(diagnosis.model.kind).equation
+                equation = rival.effect.card.equation
                 page.card(finding.title, _lines(finding, equation),
                           figures.effect_pictures(diagnosis, rival))
     _sets(page, diagnosis)
