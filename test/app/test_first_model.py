@@ -338,7 +338,7 @@ def test_the_command_writes_says_what_info_says_and_what_comes_next(
     assert main(['init', 'arm.urdf', 'run.csv', '--json', 'x.json']) == 0
     said = ' '.join(capsys.readouterr().out.split())
     assert '800 of 800 samples' in said
-    assert 'Next pprs fit run.csv --model robot.yaml --output base.yaml' in said
+    assert 'pprs fit run.csv --model robot.yaml --output base.yaml' in said
     assert json.loads((tmp_path / 'x.json').read_text())['drives'] == list(JOINTS)
     before = (tmp_path / 'robot.yaml').read_text()
     assert 'guessed: no header: columns 2 to 4 taken as positions' in before
@@ -348,6 +348,6 @@ def test_the_command_writes_says_what_info_says_and_what_comes_next(
     assert 'exists already' in capsys.readouterr().err
     assert (tmp_path / 'robot.yaml').read_text() == before
     assert main(['init', 'arm.urdf', '--overwrite']) == 0
-    assert 'Next pprs info RECORDING' in ' '.join(capsys.readouterr().out.split())
+    assert 'pprs info RECORDING' in ' '.join(capsys.readouterr().out.split())
     assert main(['init', 'arm.urdf', 'none.csv', '--output', 'y.yaml']) == 2
     assert not (tmp_path / 'y.yaml').exists()
