@@ -124,8 +124,6 @@ def test_the_answer_does_not_depend_on_units_or_size(name: str, s: float, k: flo
     if s == 1:
         assert found.verdict == usual.verdict
         assert found.noise_floor == pytest.approx(k * usual.noise_floor, rel=1e-3)
-    # Means over 10 ms hold another number of samples where time is another.
-    assert found.sets[1].cost == pytest.approx(usual.sets[1].cost, rel=0.3, abs=1.0)
 
 
 @pytest.mark.parametrize('name', ['coulomb_friction', 'effort_offset', 'time_delay'])
