@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
 from ros_processes import environment, executable, node_process
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
@@ -28,7 +29,6 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
-from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import Setpoint
 from pprs_dynamics.simulation.plant import Plant
