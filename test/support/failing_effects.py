@@ -23,11 +23,10 @@ SOURCE = '''
 import os
 import numpy as np
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 
-CARD = Card('c q_dot', '', '', '', '')
 PLACE, FAULT = os.environ.get('WORN_BRAKE', 'columns none').split()
 
 def fault(place, result):
@@ -50,9 +49,14 @@ def fault(place, result):
             return (result[0] * np.nan, *result[1:])
 
 class WornBrake(DriveEffect):
+    """A brake.
+
+    Equation
+    --------
+    c q_dot
+    """
     name = 'worn_brake'
     linear = (Parameter('coefficient', 'c', 'N s/m', 'a coefficient', 0.0, 1e6),)
-    card = CARD
 
     def __init__(self, drives):
         fault('__init__', None)
@@ -71,10 +75,15 @@ class WornBrake(DriveEffect):
         return fault('drive_memory', {'samples': 0})
 
 class Hose(BodyEffect):
+    """A hose.
+
+    Equation
+    --------
+    F
+    """
     name = 'hose'
     acts_in = frozenset({'platform', 'mechanism'})
     linear = (Parameter('force', 'F', 'N', 'downward force', 0.0, 1e6),)
-    card = CARD
 
     def load(self, state):
         wrench = np.zeros((len(state.velocity), 6))

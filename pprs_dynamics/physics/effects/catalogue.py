@@ -19,7 +19,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from pprs_dynamics.physics.effects import laws
-from pprs_dynamics.physics.effects.effect import Card, CatalogueEffect, Parameter
+from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
 from pprs_dynamics.physics.effects.foreign_effects import guard
 from pprs_dynamics.system.plain_text import displayed
 
@@ -88,10 +88,11 @@ def _load(point: EntryPoint, known: dict[str, type[CatalogueEffect]]) -> type[Ca
                                    'DriveEffect')
     if missing := sorted(effect.__abstractmethods__):
         raise _UnusableEffectError(f'{effect.__name__} does not define {", ".join(missing)}')
-    for attribute, kind in (('name', str), ('card', Card)):
-        if not isinstance(getattr(effect, attribute, None), kind):
-            raise _UnusableEffectError(
-                f'{effect.__name__} must have {attribute}, a {kind.__name__}')
+    if not isinstance(getattr(effect, 'name', None), str):
+        raise _UnusableEffectError(f'{effect.__name__} must have name, a str')
+    if not effect.card.equation:
+        raise _UnusableEffectError(f'the docstring of {effect.__name__} must have a section '
+                                   'Equation')
     for attribute in ('linear', 'shape'):
         parameters = getattr(effect, attribute, None)
         if not (isinstance(parameters, tuple)

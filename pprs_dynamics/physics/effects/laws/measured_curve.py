@@ -20,7 +20,6 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card
 from pprs_dynamics.physics.mechanism.state import MechanismState
 
 OWN = ('position', 'velocity', 'acceleration', 'load')  # of the drive itself
@@ -102,18 +101,33 @@ def spline_basis(
 
 
 class MeasuredCurve(DriveEffect):
-    """A drive's force over one variable, as it was measured: a table, not a cause."""
+    """A drive's force over one variable, as it was measured: a table, not a cause.
+
+    Equation
+    --------
+    f(x), a cubic B-spline over position, velocity, acceleration, load, or position or velocity
+    of another drive
+
+    Symptom
+    -------
+    Whatever no other effect explains, as long as it depends on one variable.
+
+    Causes
+    ------
+    Unknown: a cogging map, a cable that pulls, a bent screw and a belt stage look like this.
+
+    Confirmation
+    ------------
+    A second recording along another motion must fall by it as well.
+
+    References
+    ----------
+    De Boor, A Practical Guide to Splines, Springer, 1978.
+    """
 
     name = 'measured_curve'
     linear = ()
     variants = ((),)
-    card = Card(
-        'f(x), a cubic B-spline over position, velocity, acceleration, load, or position or '
-        'velocity of another drive',
-        'whatever no other effect explains, as long as it depends on one variable',
-        'not told: a cogging map, a cable that pulls, a bent screw and a belt stage look like this',
-        'a second recording along another motion must fall by it as well',
-        'de Boor, A Practical Guide to Splines, Springer, 1978')
 
     def __init__(self, drives: Mapping[str, Mapping[str, Any]]) -> None:
         super().__init__({drive: dict(values) for drive, values in drives.items()})
