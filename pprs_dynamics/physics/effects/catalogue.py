@@ -18,9 +18,11 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from pprs_dynamics.errors import EffectError
 from pprs_dynamics.physics.effects import laws
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
-from pprs_dynamics.physics.effects.foreign_effects import guard
+from pprs_dynamics.physics.effects.foreign_effects import check_columns, guard
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
@@ -65,7 +67,7 @@ def catalogue() -> dict[str, type[CatalogueEffect]]:
     for point in sorted(entry_points(group=GROUP), key=lambda point: (point.name, point.value)):
         try:
             effect = _load(point, effects)
-        except _UnusableEffectError as error:
+        except (_UnusableEffectError, EffectError) as error:
             warnings.warn(displayed(f'{_origin(point)} is left out: {error}'), RuntimeWarning,
                           stacklevel=2)
         else:
@@ -105,6 +107,8 @@ def _load(point: EntryPoint, known: dict[str, type[CatalogueEffect]]) -> type[Ca
     if effect.name in (*known, *EFFECTS, *RESERVED):
         raise _UnusableEffectError(f'the name {effect.name} is taken')
     guard(effect)
+    if issubclass(effect, DriveEffect):
+        check_columns(effect)
     return effect
 
 
