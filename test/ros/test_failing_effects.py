@@ -99,8 +99,8 @@ def test_a_parameter_that_an_effect_fails_at_is_refused_with_the_reason(
 @pytest.mark.nodes
 def test_the_process_lives_on_and_ends_as_ever(ros_domain: int, tmp_path: Path) -> None:
     file = model_file(install(tmp_path), 'worn_brake')
-    env = {**environment(ros_domain), 'WORN_BRAKE': 'columns_1 raises', 'PYTHONPATH': os.pathsep.join(
-        filter(None, (str(tmp_path), os.environ.get('PYTHONPATH'))))}
+    path = os.pathsep.join(filter(None, (str(tmp_path), os.environ.get('PYTHONPATH'))))
+    env = {**environment(ros_domain), 'WORN_BRAKE': 'columns_1 raises', 'PYTHONPATH': path}
     server = [executable('feedforward'), '--ros-args', '--params-file', str(file)]
     with bench() as running:
         commands = running.listen(Float64MultiArray, '/feedforward/commands')

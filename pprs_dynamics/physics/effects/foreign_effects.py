@@ -70,9 +70,9 @@ def check_columns(effect: type[DriveEffect]) -> None:
     """Raise EffectError where the columns of three samples of a drive are not what they must be."""
     row = np.array([0.1, 0.2, 0.3])
     drive = DriveSamples(row, row, row, row, np.ones(3), row, row, effect.drive_memory())
-    shape = effect.trials(DriveRange(1.0, 0.1, 0.2, 0.3))[0]
-    columns: Any = effect.columns(drive, **{
-        p.name: shape.get(p.name, p.default) for p in effect.shape})
+    defaults = {p.name: p.default for p in effect.shape if p.default is not None}
+    columns: Any = effect.columns(
+        drive, **{**defaults, **effect.trials(DriveRange(1.0, 0.1, 0.2, 0.3))[0]})
     count = len(effect.coefficients)
     if not isinstance(columns, tuple) or len(columns) != count:
         raise EffectError(effect.name, f'columns returned {columns!r:.80}, must be a tuple of '
