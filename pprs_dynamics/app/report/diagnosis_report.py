@@ -15,7 +15,13 @@ from typing import Any
 
 from pprs_dynamics.app.report import diagnosis_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.terminal import escape, stacked, text_table, verdict_panel
+from pprs_dynamics.app.report.terminal import (
+    escape,
+    shell_command,
+    stacked,
+    text_table,
+    verdict_panel,
+)
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import RivalEffect
@@ -114,7 +120,7 @@ def _following(words: Sentences) -> Iterator[Any]:
     """Yield what to do next, and the command for it."""
     yield f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}'
     if words.command:
-        yield f'  [bold cyan]{escape(words.command)}[/]'
+        yield shell_command(words.command)
 
 
 def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
