@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
 from ros_processes import environment, executable, node_process
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
@@ -281,10 +280,9 @@ def _tracking(commands: np.ndarray, states: np.ndarray, late_share: float) -> Tr
     inside = (states[:, 0] > commands[0, 0] + LEAD_IN) & (states[:, 0] < commands[-1, 0])
     sent, positions, velocities, _ = _columns(commands)
     times, measured, _, _ = _columns(states[inside])
-    geometry = DriveModel.load().robot.geometry
-    goal = solve_forward_kinematics(
-        geometry, CubicHermiteSpline(sent, positions, velocities)(times))
-    found = solve_forward_kinematics(geometry, measured)
+    robot, rest = DriveModel.load().robot, np.zeros_like(measured)
+    wanted = CubicHermiteSpline(sent, positions, velocities)(times)
+    goal, found = (robot.motion_of_drives(q, rest, rest) for q in (wanted, measured))
     turn = (Rotation.from_quat(goal.orientation).inv()
             * Rotation.from_quat(found.orientation)).magnitude()
     return Tracking(times - sent[0] - LEAD_IN, found.position - goal.position, turn, late_share,

@@ -18,6 +18,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT, DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.evaluation import KernelParameters
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.places import PLATFORM, BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal
@@ -37,6 +38,7 @@ from pprs_dynamics.physics.three_pprs.kernel_parameters import (
 )
 from pprs_dynamics.physics.three_pprs.kinematics import PlatformKinematics
 from pprs_dynamics.physics.three_pprs.rigid_body import RigidBody, solve_bodies
+from pprs_dynamics.physics.three_pprs.tree import tree_structure
 
 RODS = 'rods'
 HOME_HEIGHT = 0.5  # [m], of the platform at home
@@ -168,6 +170,14 @@ class ThreePprs:
         return KernelParameters(RobotParameters(
             self.geometry.kernel_parameters.named, body, (first, second, third),
             Vector(*self.gravity)))
+
+    def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array, *, is_free: bool = True,
+                     ) -> Mechanism:
+        """Return the robot as a mechanism; see `tree_structure`."""
+        structure = tree_structure(self.geometry, self.masses, (*strokes, efforts), is_free)
+        bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
+        return Mechanism(structure, bodies, structure.inertial[bodies], np.zeros(COUNT),
+                         self.gravity)
 
     # --- motion --------------------------------------------------------------------------------
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,12 +26,8 @@ from pprs_dynamics.physics.mechanism.description import (
     body_at,
     rotation_of,
 )
-from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.structure import Structure, build_structure
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
-
-if TYPE_CHECKING:
-    from pprs_dynamics.physics.three_pprs.robot import ThreePprs
 
 HOME_HEIGHT = 0.5  # of the platform [m]
 UNLOADED = Masses(1.0, 0.0, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 6)
@@ -47,32 +42,23 @@ def structure_of(geometry: Geometry) -> Structure:
     ModelError
         Where the drives do not determine the platform's motion at home.
     """
-    return _structure(geometry, UNLOADED, (np.full(6, -np.inf), *np.full((2, 6), np.inf)), True)
+    return tree_structure(geometry, UNLOADED, (np.full(6, -np.inf), *np.full((2, 6), np.inf)))
 
 
-def mechanism_of(robot: ThreePprs, strokes: tuple[Array, Array], efforts: Array, *,
-                 is_free: bool = True) -> Mechanism:
-    """Return a 3-PPRS as a mechanism.
+def tree_structure(geometry: Geometry, masses: Masses, limits: tuple[Array, Array, Array],
+                   is_free: bool = True) -> Structure:
+    """Return the joints, closures and bodies of a 3-PPRS.
 
     Parameters
     ----------
-    robot : ThreePprs
-    strokes : tuple of two (6,) arrays
-        Lowest and highest position of each drive [m].
-    efforts : (6,) array
-        Largest force of each drive [N].
+    geometry : Geometry
+    masses : Masses
+    limits : tuple of three (6,) arrays
+        Lowest and highest position of each drive [m], and its largest force [N].
     is_free : bool, optional
         Whether the platform is a free body that three spherical closures hold. Otherwise it hangs
         on the first rod by three revolute joints, and two closures remain.
     """
-    structure = _structure(robot.geometry, robot.masses, (*strokes, efforts), is_free)
-    bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
-    return Mechanism(structure, bodies, structure.inertial[bodies], np.zeros(len(DRIVES)),
-                     robot.gravity)
-
-
-def _structure(geometry: Geometry, masses: Masses, limits: tuple[Array, Array, Array],
-               is_free: bool) -> Structure:
     R, r, l = geometry.base_radius, geometry.platform_radius, geometry.rod_length  # noqa: E741
     platform = body_at(masses.total, masses.centre, masses.inertia_tensor)
     links = {'base': np.zeros(PARAMETERS)}
