@@ -207,17 +207,6 @@ def test_reconstruction_alone_costs_less_than_5_mN_on_every_drive(motion):
     assert np.all(error < FORCE_ERROR)
 
 
-def test_smoothed_motion_is_the_true_one():
-    real = truth(3.0, 0.03, 0.08)
-    found = reconstruct(MODEL, recording_of(real))
-    assert_allclose(found.position, real.drives.position[found.index], rtol=0, atol=1e-6)
-    # Friction turns over within 1 mm/s: a fiftieth of that does not move a reversal.
-    assert rms(found.velocity - real.drives.velocity[found.index]).max() < 2e-5
-    assert rms(found.acceleration - real.drives.acceleration[found.index]).max() < 3e-3
-    assert not found.near_branch.any()
-    assert not len(found.jumps)
-
-
 # Treatment -----------------------------------------------------------------------------------
 
 def test_model_and_effort_get_the_same_operation():

@@ -116,17 +116,6 @@ def test_a_motion_of_rows_is_checked_like_one_of_arrays():
             PlatformMotion.from_rows(given[:1], time)
 
 
-@pytest.mark.parametrize('wrong', [np.nan])
-@pytest.mark.parametrize('column', range(6))
-def test_a_number_that_is_none_is_refused_in_every_column(column, wrong):
-    motion = random_motion(np.random.default_rng(10), 30)
-    columns = [np.array(motion.rows[:, part]) for part in (
-        slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 13), slice(13, 16), slice(16, 19))]
-    columns[column][17, 1] = wrong
-    with pytest.raises(MotionError, match='sample 17'):
-        PlatformMotion(*columns)
-
-
 OF_EITHER_KIND = {
     'three_pprs': "model, motion = DriveModel.load(), Excitation(2.0).motion(time)",
     'hexapod': """model = DriveModel.load('config/hexapod.yaml')
