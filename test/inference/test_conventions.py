@@ -182,7 +182,8 @@ def test_velocities_that_are_not_the_derivative_are_told(factor: float, word: st
     expect(told((time, position, factor * velocity, effort)),
            [f'velocity of all drives is {word} the derivative of the position'])
     velocity[:, 3:] *= factor
-    expect(told((time, position, velocity, effort)), [f'velocity of lift_1, lift_2, lift_3 is {word}'])
+    expect(told((time, position, velocity, effort)),
+           [f'velocity of lift_1, lift_2, lift_3 is {word}'])
 
 
 def test_a_real_drive_is_called_right() -> None:
