@@ -79,7 +79,8 @@ MISTAKES: dict[str, tuple[Callable[[Arrays], Arrays], list[str]]] = {
     'a lift in kN': (scaled(effort=[1, 1, 1, 1e-3, 1, 1]), [f'of lift_1 looks like 0.001 {TIMES}']),
     'ms': (scaled(time=1e3), ['times look like milliseconds: .* 1000 times too slow']),
     'mm': (scaled(motion=1e3), ['positions of all drives look like millimetres']),
-    'lifts in mm': (scaled(motion=[1, 1, 1, 1e3, 1e3, 1e3]), ['positions of lift_1, lift_2, lift_3 .*milli']),
+    'lifts in mm': (scaled(motion=[1, 1, 1, 1e3, 1e3, 1e3]),
+                    ['positions of lift_1, lift_2, lift_3 .*milli']),
     'negated': (scaled(motion=-1.0), ['positions of all drives look negated']),
     'a slide negated': (scaled(motion=[1, 1, -1, 1, 1, 1]), ['position of slide_3 looks negated']),
     'a slide counts the other way': (
