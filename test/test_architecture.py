@@ -12,16 +12,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from layers import (
-    FOLDERS,
-    MAY_USE,
-    PACKAGE,
-    circles,
-    files,
-    imported_files,
-    imports,
-    mathematics,
-)
+from layers import FOLDERS, MAY_USE, PACKAGE, circles, files, imported_files, imports, mathematics
 
 import pprs_dynamics
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE

@@ -10,9 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.inference.residuals.measuring import (
-    measure_residuals,
-)
+from pprs_dynamics.inference.residuals.measuring import measure_residuals
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation

@@ -34,9 +34,7 @@ from pprs_dynamics.errors import (
 )
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.physics.three_pprs.inverse_kinematics import (
-    solve_inverse_kinematics,
-)
+from pprs_dynamics.physics.three_pprs.inverse_kinematics import solve_inverse_kinematics
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.robot import ThreePprs
 
