@@ -199,19 +199,4 @@ def test_noise_has_its_size_and_its_correlation() -> None:
         assert found == pytest.approx(0.9 ** lag, abs=0.04)
 
 
-def test_noise_at_once_is_the_noise_sample_by_sample_and_has_the_stated_covariance() -> None:
-    settings = SensorSettings(white_noise=0.05, coloured_noise=0.06, noise_correlation=0.8,
-                              pink_noise=0.02)
-    one, all_of_it = (EffortNoise(settings, np.random.default_rng(4)) for _ in range(2))
-    np.testing.assert_allclose([one.sample() for _ in range(30)],
-                               np.vstack((all_of_it.samples(10), all_of_it.samples(20))),
-                               rtol=0, atol=1e-14)
-    lags = np.array([0, 1, 3, 10])
-    quick = SensorSettings(white_noise=0.05, coloured_noise=0.06, noise_correlation=0.8)
-    source = EffortNoise(quick, np.random.default_rng(5))
-    samples = source.samples(200_000)
-    found = [np.mean(samples[lag:] * samples[:len(samples) - lag]) for lag in lags]
-    np.testing.assert_allclose(found, source.autocovariance(lags), atol=3e-5)
-
-
 # House rules.
