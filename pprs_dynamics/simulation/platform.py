@@ -44,7 +44,7 @@ class PlatformMechanism(DriveModel):
             blocks |= dict.fromkeys(joints, block)
         effects: tuple[Effect, ...] = (AxisFriction(0.0, 0.0), AxisOffset(0.0),
                                        ModelJointFriction(blocks))
-        robot = mechanism_of(model.robot, model.strokes, model.effort_limits)
+        robot = mechanism_of(model.robot, model.limits.strokes, model.limits.efforts)
         return cls(robot=robot, effects=effects, reversal=model.reversal, limits=model.limits,
                    values=values)
 

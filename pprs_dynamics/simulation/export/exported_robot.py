@@ -128,7 +128,8 @@ def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
     robot = with_bodies(model.robot, model.effects)
     if model.moves_joints:
         return described(model.block, robot, expressed.joints)
-    mechanism = mechanism_of(robot, model.strokes, model.effort_limits, is_free=kind != URDF)
+    limits = model.limits
+    mechanism = mechanism_of(robot, limits.strokes, limits.efforts, is_free=kind != URDF)
     return described('three_pprs', mechanism, expressed.joints)
 
 
