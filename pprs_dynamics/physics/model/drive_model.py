@@ -140,7 +140,7 @@ class DriveModel:
             for effect in effects:
                 if isinstance(effect, BodyEffect):
                     loaded = effect.changed(loaded)
-                    loaded.require_bodies(f'effects.{effect.name}', effect.to_file())
+                    loaded.require_bodies(f'effects.{effect.name}', effect.values)
             return cls(robot=robot, effects=effects, reversal=reversal, limits=limits,
                        values=values, source=source)
 
