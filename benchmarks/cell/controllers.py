@@ -60,7 +60,7 @@ def gravity_of(position: Array) -> Array:
     """Return what holds the drives at rest at positions (6,), which need not be on the path."""
     model, rest = DriveModel.load(), np.zeros((1, len(DRIVES)))
     found = solve_forward_motion(model.robot.geometry, position[None], rest, rest)
-    return np.asarray(model.drive_forces(found.motion).total[0])
+    return np.asarray(model.drive_forces(found).total[0])
 
 
 def beside(running: Cell, controller: str = JTC, **parameters: Any) -> list[dict[str, Any]]:

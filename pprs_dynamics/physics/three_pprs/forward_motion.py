@@ -14,14 +14,13 @@ c_i = omega x (omega x rho_i). A_i stays in its chain's plane: the terms of the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pprs_dynamics.arrays import Array, Sample
-from pprs_dynamics.errors import ConvergenceError, MotionError
+from pprs_dynamics.errors import ConvergenceError
 from pprs_dynamics.physics.mechanism.evaluation import evaluate
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.vectors import add, cross, in_chain
@@ -48,31 +47,12 @@ LONGEST_MOVE = 0.005
 LEAST_SINE = 1e-6  # of a rod, below which its drive tells nothing
 # Two solutions from different seeds agree to rounding; other solutions lie centimetres away.
 SAME_POSE = 1e-6
-# A pose that moves otherwise than its twist says by more than this, of the move and at least
-# [m, rad], has left its branch. The trapezoidal rule errs by less from sample to sample.
-JUMP_SHARE = 0.2
-SMALLEST_JUMP = 1e-5
-
-
-@dataclass(frozen=True)
-class ForwardMotion:
-    """The platform's motion at N samples, and how sure its branch is.
-
-    Parameters
-    ----------
-    motion : PlatformMotion
-    near_branch : (N,) bool array
-        See `ForwardKinematics`.
-    """
-
-    motion: PlatformMotion
-    near_branch: np.ndarray
 
 
 def solve_forward_motion(
     geometry: Geometry, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike,
     seed: PlatformMotion | None = None,
-) -> ForwardMotion:
+) -> PlatformMotion:
     """Return the platform's motion that belongs to a continuous motion of the drives.
 
     Parameters
@@ -95,8 +75,7 @@ def solve_forward_motion(
     found = solve_forward_kinematics(
         geometry, q, follow_branch(geometry, q, seed) if len(q) > 1 else seed)
     poses = PlatformMotion.at_rest(found.position, found.orientation)
-    return ForwardMotion(platform_rates(geometry, poses, velocity, acceleration),
-                         found.near_branch)
+    return platform_rates(geometry, poses, velocity, acceleration)
 
 
 def follow_branch(
@@ -198,28 +177,6 @@ def centripetal_terms(
     inward = cross(omega, spin)
     u_dot = add(in_chain(k, X_dot.v), spin).e / (l * c.sin_u)
     return inward.n, c.sin_u * inward.k - c.cos_u * inward.e + l * u_dot * u_dot
-
-
-def find_pose_jumps(motion: PlatformMotion) -> np.ndarray:
-    """Return the samples of a motion with times before which the pose jumps, (N,) bool.
-
-    A jump is a move between samples that contradicts the twists there: the solution of forward
-    kinematics has left its branch, or the drives were moved while not recorded.
-    """
-    if motion.time is None:
-        raise MotionError('time', 'it is absent', 'be known to find jumps', 'time')
-    jumps = np.zeros(len(motion), dtype=bool)
-    step = np.diff(motion.time)[:, None]
-    v, omega = motion.linear_velocity, motion.angular_velocity
-    moved, turning = (v[1:] + v[:-1]) / 2 * step, (omega[1:] + omega[:-1]) / 2 * step
-    error = np.linalg.norm(np.diff(motion.position, axis=0) - moved, axis=1)
-    scale = np.linalg.norm(moved, axis=1)
-    cosine = np.abs(np.sum(motion.orientation[1:] * motion.orientation[:-1], axis=1))
-    turned = 2 * np.arccos(np.minimum(cosine, 1.0))
-    excess = np.abs(turned - np.linalg.norm(turning, axis=1))
-    jumps[1:] = ((error > SMALLEST_JUMP + JUMP_SHARE * scale)
-                 | (excess > SMALLEST_JUMP + JUMP_SHARE * np.minimum(turned, 1.0)))
-    return jumps
 
 
 def _marks(position: Array) -> np.ndarray:

@@ -174,7 +174,7 @@ class ThreePprs:
     def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
                          seed: PlatformMotion | None = None) -> PlatformMotion:
         """Return the platform's motion, by forward kinematics."""
-        return solve_forward_motion(self.geometry, position, velocity, acceleration, seed).motion
+        return solve_forward_motion(self.geometry, position, velocity, acceleration, seed)
 
     def at_home(self, samples: int) -> PlatformMotion:
         """Return the platform at rest at its home pose."""
