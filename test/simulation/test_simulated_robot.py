@@ -5,9 +5,7 @@
 
 from __future__ import annotations
 
-import ast
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -195,25 +193,3 @@ def test_noise_has_its_size_and_its_correlation() -> None:
 
 
 # House rules.
-
-# The plant takes numbers and motions from the model, no equations: its own are compared with them.
-CONTAINERS = (
-    'drives', 'physics.mechanism.motion', 'physics.mechanism.joint_motion',
-    'physics.mechanism.joint_series', 'physics.mechanism.description', 'physics.mechanism.urdf',
-    'physics.mechanism.mjcf', 'physics.mechanism.structure', 'physics.mechanism.tree_tables',
-    'physics.mechanism.passive_joints', 'physics.model.drive_model', 'physics.model.limits',
-    'physics.model.robot_block', 'physics.three_pprs.tree', 'physics.effects.effect',
-    'physics.effects.laws.axis_friction', 'physics.effects.laws.joint_friction', 'errors', 'arrays')
-# Of the equations, which are compiled functions over tables, names and kinds of rows alone.
-NAMES_OF_TABLES = {'AXES', 'KIND', 'LOOP', 'TRANSLATION', 'JointFriction'}
-
-
-def test_the_simulation_shares_no_physics_with_the_model() -> None:
-    for file in (Path(pprs_dynamics.__file__).parent / 'simulation').glob('*.py'):
-        for node in ast.walk(ast.parse(file.read_text())):
-            if isinstance(node, ast.ImportFrom) and (node.module or '').startswith(
-                    'pprs_dynamics.'):
-                name = str(node.module).removeprefix('pprs_dynamics.')
-                assert name.startswith('simulation') or name in CONTAINERS, file
-                if name.endswith('tree_tables'):
-                    assert {each.name for each in node.names} <= NAMES_OF_TABLES, file

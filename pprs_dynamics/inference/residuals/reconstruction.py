@@ -163,18 +163,18 @@ def follow(model: DriveModel, time: Array, drives: DriveMotion,
     """
     parts: list[Any] = []
     for segment in drives.segments:
-        last = None
+        closed: dict[Any, Array] = {}
         for start in range(segment.start, segment.stop, CHUNK):
             rows = slice(start, min(start + CHUNK, segment.stop))
             try:
                 parts.append(model.robot.motion_of_drives(
-                    drives.position[rows], drives.velocity[rows], drives.acceleration[rows], last))
+                    drives.position[rows], drives.velocity[rows], drives.acceleration[rows],
+                    closed))
             except ConvergenceError as error:
                 sample = start + error.sample
                 raise ConvergenceError(
                     int(drives.index[sample]), f'at {time[sample]:.6g} s {error.found}',
                     error.rule) from None
-            last = parts[-1][-1:]
             if progress is not None:
                 progress(rows.stop, len(time))
     kind = type(parts[0])
