@@ -40,8 +40,7 @@ MOST_SHAPES = 60
 CURVE = 24  # hat functions of a free curve over a drive's position
 
 
-def noise_floors(fits: FittedSets, period: float | None = None,
-                 best: JointFit | None = None) -> dict[str, float]:
+def noise_floors(fits: FittedSets, period: float | None = None) -> dict[str, float]:
     """Return the rms of the noise of each drive [N], where the recordings determine it.
 
     Parameters
@@ -50,18 +49,12 @@ def noise_floors(fits: FittedSets, period: float | None = None,
         Around the input model.
     period : float, optional
         Between the samples of the noise [s]; by default that of the design.
-    best : JointFit, optional
-        Of a set of effects, whose columns take the place of the curves.
     """
     regression, residuals = fits.regression, fits.design.residuals
-    further = best.blocks if best else [
-        regression.block({d: _curve(residuals.variables['position'][:, d])})
-        for d in regression.drives if fits.design.moves(d)]
-    fit = regression.fit(tuple(dict.fromkeys((*catalogue_blocks(fits), *further))),
-                         fits.evaluate(()).fit.amplitudes)
-    spectra = [fit.amplitudes, best.amplitudes] if best else [fit.amplitudes]
-    seen = np.all([_shares_seen(fits, fit, amplitudes) >= fits.decisions.noise_seen
-                   for amplitudes in spectra], axis=0)
+    curves = [regression.block({d: _curve(residuals.variables['position'][:, d])})
+              for d in regression.drives if fits.design.moves(d)]
+    fit = regression.fit((*catalogue_blocks(fits), *curves), fits.evaluate(()).fit.amplitudes)
+    seen = _shares_seen(fits, fit) >= fits.decisions.noise_seen
     # Means over longer blocks have less white noise, and as much of slower noise.
     white = fit.amplitudes[:, 0] * (residuals.period / (period or residuals.period) - 1)
     return {fits.design.drives[d]: float(np.sqrt(max(
@@ -143,12 +136,12 @@ def _directions(fits: FittedSets, effect: type[DriveEffect], d: int) -> Array:
     return axes[:, kept].T @ rows
 
 
-def _shares_seen(fits: FittedSets, fit: JointFit, amplitudes: Array) -> Array:
-    """Return the share of a noise where a fit's columns leave degrees of freedom, (D,)."""
+def _shares_seen(fits: FittedSets, fit: JointFit) -> Array:
+    """Return the share of its noise where a fit's columns leave degrees of freedom, (D,)."""
     regression = fits.regression
     leverage = NormalEquations(regression, fit.blocks).solve(fit.spectra,
                                                              regression.counts).leverage
-    power = amplitudes @ regression.noise_shapes.at_bands
+    power = fit.amplitudes @ regression.noise_shapes.at_bands
     free = np.maximum(regression.counts - leverage, 0.0)
     shares: Array = np.sum(free * power, axis=1) / np.sum(regression.counts * power, axis=1)
     return shares
