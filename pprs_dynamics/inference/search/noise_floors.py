@@ -4,9 +4,8 @@
 """The noise of every drive of a recording: that of the largest fit.
 
 The noise is estimated with all columns at once, as Mallows' C_p takes the variance of the largest
-model: every effect of the catalogue, and a free curve over each drive's position. The restricted
-likelihood counts the degrees of freedom that they use. Nothing is chosen, so that the noise does
-not depend on what a search reports: all commands print the same number.
+model: every effect of the catalogue. The restricted likelihood counts the degrees of freedom that
+they use. All commands print this number, and all residuals are judged by it.
 
 References
 ----------
@@ -37,24 +36,25 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 LEAST_DIRECTION, MOST_DIRECTIONS = 0.03, 6
 # Shapes of an effect beyond these span no few directions: ripples of any period are any curve.
 MOST_SHAPES = 60
-CURVE = 24  # hat functions of a free curve over a drive's position
 
 
-def noise_floors(fits: FittedSets, period: float | None = None) -> dict[str, float]:
+def noise_floors(fits: FittedSets, period: float | None = None,
+                 reported: JointFit | None = None) -> dict[str, float]:
     """Return the rms of the noise of each drive [N], where the recordings determine it.
 
     Parameters
     ----------
     fits : FittedSets
-        Around the input model.
     period : float, optional
         Between the samples of the noise [s]; by default that of the design.
+    reported : JointFit, optional
+        Of a set of effects. Its columns are added, and the largest fit must determine its noise.
     """
     regression, residuals = fits.regression, fits.design.residuals
-    curves = [regression.block({d: _curve(residuals.variables['position'][:, d])})
-              for d in regression.drives if fits.design.moves(d)]
-    fit = regression.fit((*catalogue_blocks(fits), *curves), fits.evaluate(()).fit.amplitudes)
-    seen = _shares_seen(fits, fit) >= fits.decisions.noise_seen
+    blocks = (*catalogue_blocks(fits), *(reported.blocks if reported else ()))
+    fit = regression.fit(tuple(dict.fromkeys(blocks)), fits.evaluate(()).fit.amplitudes)
+    seen = np.all([_shares_seen(fits, fit, noise.amplitudes) >= fits.decisions.noise_seen
+                   for noise in (fit, reported or fit)], axis=0)
     # Means over longer blocks have less white noise, and as much of slower noise.
     white = fit.amplitudes[:, 0] * (residuals.period / (period or residuals.period) - 1)
     return {fits.design.drives[d]: float(np.sqrt(max(
@@ -65,13 +65,6 @@ def noise_floors(fits: FittedSets, period: float | None = None) -> dict[str, flo
 def noise_at_most(floor: float, bound: float) -> float:
     """Return a noise level, or an upper bound of it that is lower beyond its accuracy."""
     return bound if bound * (1 + DECISIONS.noise_accuracy) < floor else floor
-
-
-def _curve(position: Array) -> Array:
-    """Return hat functions of a position, (CURVE, M)."""
-    place = (position - position.min()) / max(float(np.ptp(position)), 1e-12) * (CURVE - 1)
-    hats: Array = np.maximum(0.0, 1 - np.abs(place - np.arange(CURVE)[:, None]))
-    return hats[np.any(hats, axis=1)]
 
 
 def measure_columns(
@@ -136,12 +129,12 @@ def _directions(fits: FittedSets, effect: type[DriveEffect], d: int) -> Array:
     return axes[:, kept].T @ rows
 
 
-def _shares_seen(fits: FittedSets, fit: JointFit) -> Array:
-    """Return the share of its noise where a fit's columns leave degrees of freedom, (D,)."""
+def _shares_seen(fits: FittedSets, fit: JointFit, amplitudes: Array) -> Array:
+    """Return the share of a noise where a fit's columns leave degrees of freedom, (D,)."""
     regression = fits.regression
     leverage = NormalEquations(regression, fit.blocks).solve(fit.spectra,
                                                              regression.counts).leverage
-    power = fit.amplitudes @ regression.noise_shapes.at_bands
+    power = amplitudes @ regression.noise_shapes.at_bands
     free = np.maximum(regression.counts - leverage, 0.0)
     shares: Array = np.sum(free * power, axis=1) / np.sum(regression.counts * power, axis=1)
     return shares
