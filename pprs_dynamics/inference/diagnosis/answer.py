@@ -114,7 +114,7 @@ class Answer:
         # The residual of the reported set is an upper bound of the noise.
         most = {self.drives[d]: self.fits.regression.noise_floor(self.fitted.fit, d)
                 for d in self.fits.regression.drives}
-        known = noise_floors(table.last, reported=table.reported.fit)
+        known = noise_floors(table.first, reported=table.reported.fit)
         self.noise_levels = {name: noise_at_most(known.get(name, np.inf), bound)
                              for name, bound in most.items()}
         self.unseen = tuple(name for name in most if name not in known)

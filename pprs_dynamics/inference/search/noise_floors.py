@@ -48,11 +48,10 @@ def noise_floors(fits: FittedSets, period: float | None = None,
     period : float, optional
         Between the samples of the noise [s]; by default that of the design.
     reported : JointFit, optional
-        Of a set of effects. Its columns are added, and the largest fit must determine its noise.
+        Of a set of effects, whose noise the largest fit must determine as well.
     """
     regression, residuals = fits.regression, fits.design.residuals
-    blocks = (*catalogue_blocks(fits), *(reported.blocks if reported else ()))
-    fit = regression.fit(tuple(dict.fromkeys(blocks)), fits.evaluate(()).fit.amplitudes)
+    fit = regression.fit(catalogue_blocks(fits), fits.evaluate(()).fit.amplitudes)
     seen = np.all([_shares_seen(fits, fit, noise.amplitudes) >= fits.decisions.noise_seen
                    for noise in (fit, reported or fit)], axis=0)
     # Means over longer blocks have less white noise, and as much of slower noise.
