@@ -132,19 +132,19 @@ def main() -> int:
 def workbench_command(story: Story) -> str:
     """Return the command that opens the two recordings in the workbench."""
     return shlex.join((executable('pprs'), 'workbench', story.file('run.mcap'), '--validate',
-                       story.file('other.mcap')))
+                       story.file('other.mcap'), '--demo'))
 
 
 def record(story: Story, effect: str, seed: int, duration: float) -> None:
     """Record two motions of a robot with a hidden effect; what it is, nobody here knows."""
     story.chapter('A robot with a secret')
     story.say(f'A physics engine plays the robot. One effect out of {len(CATALOGUE)} that the '
-              'catalogue knows and a few that it\ndoes not is drawn and hidden in it. Its name '
+              'catalogue knows and a few that it does not is drawn and hidden in it. Its name '
               f'goes to {story.file("truth.json")}, which stays closed till the end.')
     # The folder is the demonstration's own, which may run again.
     for name in ('run.mcap', 'other.mcap'):
         (story.folder / name).unlink(missing_ok=True)
-    common = ('--effect', effect, '--seed', str(seed), '--duration', f'{duration:g}')
+    common = ('--effect', effect, '--seed', str(seed), '--duration', f'{duration:g}', '--demo')
     first = story.start('simulate', '--output', story.file('run.mcap'), *common,
                         '--json', story.file('truth.json'))
     # Beside the first, as there are two cores; its bar would write over the first one's.
@@ -160,14 +160,14 @@ def compare(story: Story) -> None:
     """Say how wrong the model is, and where."""
     story.chapter('How wrong is the model, and where?')
     story.run('compare', story.file('run.mcap'), '--report', story.file('before.html'),
-              '--json', story.file('before.json'))
+              '--json', story.file('before.json'), '--demo')
 
 
 def diagnose(story: Story) -> dict[str, Any]:
     """Say why, and return what was said."""
     story.chapter('Why?')
     story.run('diagnose', story.file('run.mcap'), '--validate', story.file('other.mcap'),
-              '--report', story.file('why.html'), '--json', story.file('why.json'))
+              '--report', story.file('why.html'), '--json', story.file('why.json'), '--demo')
     diagnosis = story.read('why.json')
     for names in diagnosis['indistinguishable']:
         story.say(f'[yellow]This motion cannot tell {" from ".join(names)}.[/] The first is '
@@ -189,7 +189,7 @@ def adopt(story: Story, diagnosis: dict[str, Any]) -> bool:
             'no effect of the catalogue has the form of this error. The model stays as it is.'))
         return False
     data = (story.file('run.mcap'), '--validate', story.file('other.mcap'),
-            '--output', story.file('adopted.yaml'))
+            '--output', story.file('adopted.yaml'), '--demo')
     if len(names) == 1:
         status = story.run('adopt', names[0], *data, accepted=(0, REFUSED))
     else:

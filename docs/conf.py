@@ -45,7 +45,8 @@ nb_execution_mode = 'off'
 
 napoleon_google_docstring = False
 napoleon_use_ivar = True
-napoleon_custom_sections = [('Class attributes', 'params_style')]
+napoleon_custom_sections = [('Class attributes', 'params_style'), 'Equation', 'Symptom',
+                            'Causes', 'Confirmation']
 autodoc_member_order = 'bysource'
 autodoc_typehints = 'description'
 autodoc_typehints_description_target = 'documented'

@@ -32,7 +32,6 @@ from pprs_dynamics.measurement.motion.differentiation import Stretch, choose_smo
 from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.parameter_file import default_parameters
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.simulation.engine import MechanismEngine
 from pprs_dynamics.simulation.engine_loops import ClosedMotion
 from pprs_dynamics.simulation.injection import (
@@ -201,9 +200,8 @@ class Scene:
         _, rate, burst = differentiator.differentiated(run.beside)
         velocity[inside] += rate
         acceleration[inside] += burst
-        found = solve_forward_motion(self.model.robot.geometry, run.position, velocity,
-                                     acceleration, self.platform[:1])
-        return self.model.drive_forces(found.motion.with_time(motion.time)).total
+        found = self.model.robot.motion_of_drives(run.position, velocity, acceleration)
+        return self.model.drive_forces(found.with_time(motion.time)).total
 
     def recording(self, name: str, effects: Sequence[Choice], settings: SensorSettings,
                   noise: np.ndarray, off: Sequence[np.random.Generator] = ()) -> Recording:

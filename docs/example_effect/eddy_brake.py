@@ -5,11 +5,6 @@
 
 An effect of one's own, complete: this file, and one line in pyproject.toml. After `pip install .`
 it may stand in model files, and `pprs diagnose` looks for it.
-
-References
-----------
-J. H. Wouterse, Critical torque and speed of eddy current brake with widely separated soft iron
-poles, IEE Proceedings B 138 (1991).
 """
 
 from __future__ import annotations
@@ -19,11 +14,32 @@ from typing import ClassVar
 
 import numpy as np
 
-from pprs_dynamics import Array, Card, DriveEffect, DriveRange, DriveSamples, Parameter
+from pprs_dynamics import Array, DriveEffect, DriveRange, DriveSamples, Parameter
 
 
 class EddyBrake(DriveEffect):
-    """A magnet over a conducting rail: it brakes most at the critical velocity, less beyond."""
+    """A magnet over a conducting rail: it brakes most at the critical velocity, less beyond.
+
+    Equation
+    --------
+    c q_dot / (1 + (q_dot / v_c)^2)
+
+    Symptom
+    -------
+    Grows with velocity, then falls again. Never a step at a reversal.
+
+    Causes
+    ------
+    A magnet near a conducting part that moves.
+
+    Confirmation
+    ------------
+    Take the magnet away and repeat.
+
+    References
+    ----------
+    Wouterse, IEE Proceedings B 138, 1991.
+    """
 
     name: ClassVar[str] = 'eddy_brake'
     # The force is linear in these: one column each ...
@@ -32,12 +48,6 @@ class EddyBrake(DriveEffect):
     # ... and these shape the columns: they are searched for, starting from `trials`.
     shape = (Parameter('critical_velocity', 'v_c', 'm/s', 'velocity of the largest force', 1e-4,
                        100.0, scale=0.05),)
-    card = Card(
-        'c q_dot / (1 + (q_dot / v_c)^2)',
-        'grows with velocity, then falls again; never a step at a reversal',
-        'a magnet near a conducting part that moves',
-        'take the magnet away and repeat',
-        'Wouterse, IEE Proceedings B 138, 1991')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

@@ -6,10 +6,6 @@
 A sensor effect of one's own, complete. It changes how all other effects show in the measured
 effort, and says so (`nonlinear`); the diagnosis needs nothing more. The package's own
 `effort_filter` is a sensor effect with a memory.
-
-References
-----------
-J. Fraden, Handbook of Modern Sensors, 5th ed., 2016, on dead bands.
 """
 
 from __future__ import annotations
@@ -19,11 +15,32 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from pprs_dynamics import Array, Card, DriveRange, MeasurementEffect, Parameter
+from pprs_dynamics import Array, DriveRange, MeasurementEffect, Parameter
 
 
 class SensorDeadBand(MeasurementEffect):
-    """A force sensor with play in its mount: small efforts do not reach it."""
+    """A force sensor with play in its mount: small efforts do not reach it.
+
+    Equation
+    --------
+    y = F - b (F > b), F + b (F < -b), 0 between
+
+    Symptom
+    -------
+    The measured effort stands at 0 while it changes sign, and is too small elsewhere.
+
+    Causes
+    ------
+    Play or friction in the mount of a force sensor.
+
+    Confirmation
+    ------------
+    Hang growing weights on the sensor, and look from which on it says something.
+
+    References
+    ----------
+    Fraden, Handbook of Modern Sensors, 2016.
+    """
 
     name: ClassVar[str] = 'sensor_dead_band'
     idealised: ClassVar[bool] = False
@@ -32,12 +49,6 @@ class SensorDeadBand(MeasurementEffect):
     linear = ()
     shape = (Parameter('width', 'b', 'N', 'effort that does not reach the sensor', 1e-4, 1e4,
                        scale=0.5),)
-    card = Card(
-        'y = F - b (F > b), F + b (F < -b), 0 between',
-        'the measured effort stands at 0 while it changes sign, and is too small elsewhere',
-        'play or friction in the mount of a force sensor',
-        'hang growing weights on the sensor, and look from which on it says something',
-        'Fraden, Handbook of Modern Sensors, 2016')
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:

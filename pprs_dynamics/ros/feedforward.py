@@ -114,9 +114,9 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         return super().on_activate(state)
 
     def _create_topics(self) -> None:
-        # What a controller has of this node's; whether any ever had; whether it is to be held.
+        # The last trajectory for a controller, and whether there was ever one.
         self._sent: DriveTrajectory | None = None
-        self._has_sent = self._hold_is_due = False
+        self._has_sent = False
         # Its memory begins anew.
         self._feedforward = Feedforward(self._settings.model, self._settings.node_values)
         self._commands = self._publisher(Float64MultiArray, '~/commands')
@@ -281,18 +281,12 @@ class FeedforwardNode(ExplainsRefusals, ManagedNode):
         return f'{self._joint_trajectory.topic_name}: {said}' if said else ''
 
     def _on_controller(self, state: Any) -> None:
-        """Hold a controller that becomes active: by itself it holds a pose without any effort.
-
-        Only one that this node has commanded before, and that stands: it may be another's now.
-        """
-        has_become_active = self._controller.heard(state)
-        self._hold_is_due |= has_become_active and self._has_sent
-        reference = self._controller.at_rest
-        if (not self._hold_is_due or reference is None or self._watchdog is None
-                or self.state != 'active' or self._watchdog.fresh
-                or self._settings.node_values['timeout_action'] != HOLD_GRAVITY):
+        """Let a controller hold with gravity where it would hold without."""
+        self._controller.heard(state, self._has_sent)
+        if (self._watchdog is None or self.state != 'active' or self._watchdog.fresh
+                or self._settings.node_values['timeout_action'] != HOLD_GRAVITY
+                or (reference := self._controller.take_hold()) is None):
             return
-        self._hold_is_due = False
         try:
             self._send_hold(self._feedforward.hold_at(reference))
         except PprsError as error:

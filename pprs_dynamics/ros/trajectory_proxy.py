@@ -89,8 +89,7 @@ class TrajectoryProxyNode(ExplainsRefusals):
         self._server = ActionServer(
             self, FollowJointTrajectory, '~/follow_joint_trajectory', self._execute,
             goal_callback=self._accept, cancel_callback=self._cancel)
-        self._joints = RobotNames.of(self._settings.model).joints
-        self._controller, self._hold_is_due = ControllerWatch(self._joints), False
+        self._controller = ControllerWatch(RobotNames.of(self._settings.model).joints)
         where = node_values['action'].rpartition('/')[0]
         self._speed_scaling = 1.0  # the largest that the controller has reported
         self._hold = publisher(self, JointTrajectory, f'{where}/joint_trajectory')
@@ -128,14 +127,16 @@ class TrajectoryProxyNode(ExplainsRefusals):
             if answer.status == GoalStatus.STATUS_SUCCEEDED:
                 self._check_in_time(goal, watched.sent_at)
         except ControllerError as error:
-            self._hold_is_due = self._hold_is_due or error.began
+            if error.began:
+                self._controller.require_hold()
             # It has not kept to the path, and where it is is not known.
             return self._aborted(handle, error, Result.PATH_TOLERANCE_VIOLATED
                                  if error.began else Result.INVALID_GOAL)
-        self._hold_is_due = answer.status != GoalStatus.STATUS_SUCCEEDED
         if answer.status == GoalStatus.STATUS_SUCCEEDED:
             handle.succeed()
-        elif answer.status == GoalStatus.STATUS_CANCELED and handle.is_cancel_requested:
+            return answer.result
+        self._controller.require_hold()
+        if answer.status == GoalStatus.STATUS_CANCELED and handle.is_cancel_requested:
             handle.canceled()
         else:
             handle.abort()
@@ -148,14 +149,10 @@ class TrajectoryProxyNode(ExplainsRefusals):
     def _on_controller(self, state: Any) -> None:
         """Let the controller hold with gravity where it would hold without."""
         self._speed_scaling = max(self._speed_scaling, state.speed_scaling_factor)
-        has_become_active = self._controller.heard(state)
-        # What another commands is not held.
-        self._hold_is_due |= has_become_active and self._counters['passed_on'] > 0
-        reference = self._controller.at_rest
-        # It would go over to the hold in the middle of a goal, which brings its own efforts.
-        if not (self._hold_is_due and self._relay.is_idle) or reference is None:
+        self._controller.heard(state, self._counters['passed_on'] > 0)
+        # In the middle of a goal, which has its own efforts, a hold would replace it.
+        if not self._relay.is_idle or (reference := self._controller.take_hold()) is None:
             return
-        self._hold_is_due = False
         model = self._settings.model
         try:
             held = Feedforward(model, self._settings.node_values).hold_at(reference)

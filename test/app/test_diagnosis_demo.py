@@ -50,7 +50,8 @@ def test_the_error_falls_and_the_secret_is_told_last(tmp_path: Path) -> None:
         assert f'$ pprs {command}' in before
     opens = shlex.split(next(line for line in after.splitlines() if ' workbench ' in line))
     assert opens[2:] == ['workbench', str(tmp_path / 'run.mcap'), '--validate',
-                         str(tmp_path / 'other.mcap')]
+                         str(tmp_path / 'other.mcap'), '--demo']
+    assert 'No --model is given' not in done.stdout
     assert Path(opens[1]).exists()
     assert f'--seed {SEED}' in after
     # On the motion that was never fitted, evaluated here again: the error falls to the noise,

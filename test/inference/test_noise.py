@@ -120,16 +120,6 @@ def test_a_constant_takes_no_part_in_the_fit() -> None:
     assert beside.deviance > without.deviance + 1000
 
 
-@pytest.mark.parametrize('phi', [0.0, 0.9, 0.97])
-def test_effective_samples_of_ar1_noise_follow_its_correlation(phi: float) -> None:
-    rng = np.random.default_rng(7)
-    found = []
-    for _ in range(3):
-        regression, fit = fitted(np.stack([ar1(phi, 8000, rng) for _ in range(3)], axis=1))
-        found += [one.effective_samples(8000) for one in regression.noise(fit).values()]
-    assert np.median(found) == pytest.approx(8000 * (1 - phi) / (1 + phi), rel=0.3)
-
-
 def test_covariance_and_rms_are_those_of_the_spectrum() -> None:
     noise = NoiseSpectrum(np.array([0.5, 4.0]), np.array([0.3, 40.0, 2.0]), PERIOD)
     frequency = (np.arange(200_000) + 0.5) / 200_000 * 0.5 / PERIOD
@@ -154,19 +144,6 @@ def test_a_regression_spends_leverage_and_does_not_hide_noise_by_it() -> None:
         found.append(regression.noise(fit)[0].rms)
     # Without leverage it would be sqrt(1 - 200 / 1000) = 0.89.
     assert np.mean(found) == pytest.approx(1.0, abs=0.03)
-
-
-def test_the_transform_keeps_squares_and_can_be_inverted() -> None:
-    rng = np.random.default_rng(9)
-    noise = rng.normal(size=(2000, 1))
-    series = DriveSeries(recording(noise), 0, FrequencyBands.of(20.0, PERIOD))
-    coefficients = series.transform(noise[:, 0])
-    assert coefficients @ coefficients == pytest.approx(series.error @ series.error)
-    np.testing.assert_allclose(series.inverse(coefficients), series.error, atol=1e-12)
-    a, b = rng.normal(size=(2, 3, len(series)))
-    np.testing.assert_allclose(series.products(a, b).sum(axis=0), a @ b.T, atol=1e-9)
-    assert series.sums(a).sum(axis=-1) == pytest.approx(a.sum(axis=-1))
-    assert series.counts.sum() == len(series)
 
 
 def with_rests(noise: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -103,11 +103,16 @@ assert catalogue() is catalogue()
 
 GOOD = """
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 class Mine(DriveEffect):
+    '''A force.
+
+    Equation
+    --------
+    F
+    '''
     name = 'mine'
     linear = (Parameter('force', 'F', 'N', 'a force', -1.0, 1.0),)
-    card = Card('F', '', '', '', '')
     @classmethod
     def columns(cls, drive, **shape):
         return (0 * drive.velocity + 1,)
@@ -117,7 +122,8 @@ BROKEN = {
     'fails': ('raise OSError("no licence\\nserver")', '{module}:Mine',
               'cannot be imported (OSError: no licence server)'),
     'quits': ('raise SystemExit(3)', '{module}:Mine', 'cannot be imported (SystemExit: 3)'),
-    'no_card': (GOOD.replace('card = ', 'chart = '), '{module}:Mine', 'Mine must have card'),
+    'no_card': (GOOD.replace('Equation', 'Chart'), '{module}:Mine',
+                'the docstring of Mine must have a section Equation'),
     'taken': (GOOD.replace("'mine'", "'payload_mass'"), '{module}:Mine',
               'the name payload_mass is taken'),
 }

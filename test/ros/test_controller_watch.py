@@ -42,7 +42,7 @@ class Cell:
                 ahead = self.now + STEP * np.arange(10)
                 self.watch.sent(np.stack([self.path(t) for t in ahead]), left, moves_at_end)
             if (position := reference(self.now)) is not None:
-                self.watch.heard(state(position, joints, efforts))
+                self.watch.heard(state(position, joints, efforts), sends)
             said.append(self.watch.complaint())
         return said
 
@@ -91,32 +91,43 @@ def test_a_controller_that_falls_silent_is_not_active() -> None:
     assert cell.run(2.0, lambda t: None, sends=False)[-1] == ''
 
 
-@pytest.mark.parametrize('step', [0.02, 1.1])
-def test_a_controller_appears_once_however_seldom_its_states_come(step: float) -> None:
+def hear(cell: Cell, *position: float, velocity: float = 0.0, after: float = 0.02,
+         has_commanded: bool = True) -> list[float] | None:
+    """Return where the controller must be held after one more state."""
+    cell.now += after
+    cell.watch.heard(state(position, JOINTS, True, [velocity, 0.0]), has_commanded)
+    held = cell.watch.take_hold()
+    return None if held is None else held.tolist()
+
+
+def test_a_controller_is_held_once_where_it_becomes_active_and_stands() -> None:
     cell = Cell()
-    appeared = []
-    for k in range(30):
-        cell.now += step * (10 if k == 20 else 1) + (1.0 if k == 20 else 0.0)
-        appeared.append(cell.watch.heard(state([0.3, 0.4], JOINTS, True)))
-    assert appeared[0]
-    assert appeared[20]
-    # Of a state every second the first step is not known yet.
-    assert sum(appeared) <= 3
+    assert hear(cell, 0.3, 0.4) is None  # one state alone says nothing of rest
+    assert hear(cell, 0.3, 0.4) == [0.3, 0.4]
+    assert [hear(cell, 0.3, 0.4) for _ in range(5)] == [None] * 5
+    assert hear(cell, 0.3, 0.4, after=2.0) is None
+    assert hear(cell, 0.3, 0.4) == [0.3, 0.4]
 
 
-def test_a_reference_is_at_rest_where_two_states_agree_and_have_no_velocity() -> None:
+@pytest.mark.parametrize('after', [0.02, 1.1])
+def test_nothing_holds_a_controller_that_this_node_has_never_commanded(after: float) -> None:
+    """A node that starts beside a moving controller, or one that is slow or stalls."""
     cell = Cell()
+    places = [*np.linspace(0.0, 0.3, 20), *[0.3] * 20]
+    speeds = [*[0.283] * 20, *[0.0] * 20]
+    for k, (place, speed) in enumerate(zip(places, speeds, strict=True)):
+        stall = 3.0 if k in (10, 30) else 0.0
+        assert hear(cell, place, 0.4, velocity=speed, after=after + stall,
+                    has_commanded=False) is None
 
-    def heard(*position: float, velocity: float) -> Any:
-        cell.now += 0.02
-        cell.watch.heard(state(position, JOINTS, True, [velocity, 0.0]))
-        return cell.watch.at_rest
 
-    assert heard(0.3, 0.4, velocity=0.0) is None  # one state alone
-    assert heard(0.3, 0.4, velocity=0.0).tolist() == [0.3, 0.4]
-    assert heard(0.3, 0.4, velocity=0.1) is None
-    assert heard(0.31, 0.4, velocity=0.0) is None
-    assert heard(0.31, 0.4, velocity=0.0) is not None
+def test_a_moving_controller_is_held_where_it_comes_to_rest() -> None:
+    cell = Cell()
+    cell.watch.require_hold()  # a goal was cancelled
+    assert hear(cell, 0.3, 0.4, velocity=0.1) is None
+    assert hear(cell, 0.31, 0.4) is None
+    assert hear(cell, 0.32, 0.4) is None
+    assert hear(cell, 0.32, 0.4) == [0.32, 0.4]
 
 
 @pytest.mark.parametrize(('scale', 'is_told'), [(1.1, False), (1.6, True)])

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -14,10 +15,12 @@ import pytest
 from node_bench import LATCHED, Bench, bench
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
 from pprs_dynamics import DriveModel
+from pprs_dynamics.physics.mechanism.paths import HelicalPath
 from pprs_dynamics.ros.live_joint_states import LiveJointStates, LiveNodes
 from pprs_dynamics.ros.messages import conversions
 
@@ -87,4 +90,33 @@ def test_remapping_prefix_and_qos_come_from_the_command_line(ros_domain: int) ->
             assert running.spin_until(
                 lambda: publisher.publish(message) or nodes.to_dict()['age'] is not None)
         finally:
+            nodes.close()
+
+
+def test_a_simulation_at_half_speed_is_compared_in_its_own_time(ros_domain: int) -> None:
+    began, path = time.monotonic(), HelicalPath()
+    with bench() as running:
+        clock = running.probe.create_publisher(Clock, '/clock', 10)
+        states = running.probe.create_publisher(JointState, '/joint_states', 100)
+        nodes = LiveNodes(MODEL, arguments=['--ros-args', '-p', 'use_sim_time:=true'])
+
+        def publish() -> None:
+            passed = 0.5 * (time.monotonic() - began)
+            now = round((100.0 + passed) * 1e9)
+            clock.publish(Clock(clock=conversions.time(now)))
+            forces = MODEL.drive_forces(path.motion([passed % path.duration]))
+            position, velocity, _ = forces.drive_motion
+            states.publish(conversions.joint_state(now, forces.total[0], position[0], velocity[0]))
+
+        timer = running.probe.create_timer(0.005, publish)
+        try:
+            assert running.spin_until(lambda: len(nodes.to_dict()['time']) > 100, 20)
+            found = nodes.to_dict()
+            assert found['trouble'] == ''
+            # Half as many seconds have passed as on the wall; at that speed the forces agree.
+            assert found['kept'] < 0.6 * (time.monotonic() - began)
+            size = np.std(MODEL.drive_forces(path.motion(np.arange(0.0, 2.0, 0.01))).total, axis=0)
+            assert (np.array(found['error'], dtype=float) < 0.1 * size).all()
+        finally:
+            timer.cancel()
             nodes.close()

@@ -138,6 +138,13 @@ def test_effects_are_injected_into_an_axis_or_refused(name: str) -> None:
             or np.abs(run.position - plain.position).max() > 1e-3)
 
 
+@pytest.mark.parametrize('name', ['payload_offset', 'platform_inertia'])
+def test_what_acts_on_a_platform_is_not_injected_into_an_arm(model: DriveModel, name: str) -> None:
+    """The catalogue has it on a 3-PPRS alone: no diagnosis of an arm could name it."""
+    with pytest.raises(InjectedEffectError, match='choose payload_mass'):
+        simulate_mechanism(model, (name,), 4, duration=8.0)
+
+
 def test_motors_without_a_map_rub_nowhere(model: DriveModel) -> None:
     with pytest.raises(InjectedEffectError, match=r'friction: \{motors:'):
         simulate_mechanism(model, ('coupled_drives',), 4, duration=10.0)

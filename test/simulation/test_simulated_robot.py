@@ -5,9 +5,7 @@
 
 from __future__ import annotations
 
-import ast
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -201,17 +199,6 @@ def test_noise_has_its_size_and_its_correlation() -> None:
         assert found == pytest.approx(0.9 ** lag, abs=0.04)
 
 
-@pytest.mark.parametrize('exponent', [1.5])
-def test_pink_noise_falls_with_its_exponent(exponent: float) -> None:
-    samples = noise(16384, pink_noise=1.0, pink_exponent=exponent)
-    power = np.mean(np.abs(np.fft.rfft(samples * np.hanning(16384)[:, None], axis=0)) ** 2, axis=1)
-    frequency = np.fft.rfftfreq(16384)
-    band = (frequency > 2e-3) & (frequency < 2e-2)
-    slope = np.polyfit(np.log(frequency[band]), np.log(power[band]), 1)[0]
-    # About 300 lines of six drives in the band: the standard error of the slope is 0.03.
-    assert slope == pytest.approx(-exponent, abs=0.2)
-
-
 def test_noise_at_once_is_the_noise_sample_by_sample_and_has_the_stated_covariance() -> None:
     settings = SensorSettings(white_noise=0.05, coloured_noise=0.06, noise_correlation=0.8,
                               pink_noise=0.02)
@@ -228,25 +215,3 @@ def test_noise_at_once_is_the_noise_sample_by_sample_and_has_the_stated_covarian
 
 
 # House rules.
-
-# The plant takes numbers and motions from the model, no equations: its own are compared with them.
-CONTAINERS = (
-    'drives', 'physics.mechanism.motion', 'physics.mechanism.joint_motion',
-    'physics.mechanism.joint_series', 'physics.mechanism.description', 'physics.mechanism.urdf',
-    'physics.mechanism.mjcf', 'physics.mechanism.structure', 'physics.mechanism.tree_tables',
-    'physics.mechanism.passive_joints', 'physics.model.drive_model', 'physics.model.limits',
-    'physics.model.robot_block', 'physics.three_pprs.tree', 'physics.effects.effect',
-    'physics.effects.laws.axis_friction', 'physics.effects.laws.joint_friction', 'errors', 'arrays')
-# Of the equations, which are compiled functions over tables, names and kinds of rows alone.
-NAMES_OF_TABLES = {'AXES', 'KIND', 'LOOP', 'TRANSLATION', 'JointFriction'}
-
-
-def test_the_simulation_shares_no_physics_with_the_model() -> None:
-    for file in (Path(pprs_dynamics.__file__).parent / 'simulation').glob('*.py'):
-        for node in ast.walk(ast.parse(file.read_text())):
-            if isinstance(node, ast.ImportFrom) and (node.module or '').startswith(
-                    'pprs_dynamics.'):
-                name = str(node.module).removeprefix('pprs_dynamics.')
-                assert name.startswith('simulation') or name in CONTAINERS, file
-                if name.endswith('tree_tables'):
-                    assert {each.name for each in node.names} <= NAMES_OF_TABLES, file

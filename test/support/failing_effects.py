@@ -23,12 +23,11 @@ SOURCE = '''
 import os
 import numpy as np
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 
-CARD = Card('c q_dot', '', '', '', '')
-PLACE, FAULT = os.environ.get('WORN_BRAKE', 'columns none').split()
+PLACE, FAULT = os.environ.get('WORN_BRAKE', 'nowhere none').split()
 
 def fault(place, result):
     if place != PLACE:
@@ -50,9 +49,14 @@ def fault(place, result):
             return (result[0] * np.nan, *result[1:])
 
 class WornBrake(DriveEffect):
+    """A brake.
+
+    Equation
+    --------
+    c q_dot
+    """
     name = 'worn_brake'
     linear = (Parameter('coefficient', 'c', 'N s/m', 'a coefficient', 0.0, 1e6),)
-    card = CARD
 
     def __init__(self, drives):
         fault('__init__', None)
@@ -71,10 +75,15 @@ class WornBrake(DriveEffect):
         return fault('drive_memory', {'samples': 0})
 
 class Hose(BodyEffect):
+    """A hose.
+
+    Equation
+    --------
+    F
+    """
     name = 'hose'
     acts_in = frozenset({'platform', 'mechanism'})
     linear = (Parameter('force', 'F', 'N', 'downward force', 0.0, 1e6),)
-    card = CARD
 
     def load(self, state):
         wrench = np.zeros((len(state.velocity), 6))
@@ -88,11 +97,19 @@ class Hose(BodyEffect):
 FAULTS = {
     'raises': 'columns raised ZeroDivisionError: division by zero (',
     'exits': 'columns raised SystemExit: 3 (',
-    'none': "columns raised TypeError: 'NoneType' object is not iterable",
-    'longer': 'columns returned an array of shape (2,), must be (1,)',
-    'fewer': 'columns returned 0 arrays, must be 1 (coefficient)',
-    'words': 'columns raised ValueError: could not convert string to float',
-    'nan': 'columns returned an array with nan, must be finite',
+    'none': "force raised TypeError: 'NoneType' object is not iterable",
+    'longer': 'force raised ValueError: ',
+    'fewer': 'force raised ValueError: ',
+    'words': 'force raised TypeError: ',
+}
+# The same where they are there when the package is loaded.
+LOADED = {
+    'raises': 'columns raised ZeroDivisionError: division by zero (',
+    'none': 'columns returned None, must be a tuple of 1 arrays (coefficient)',
+    'longer': 'columns returned array([0.1, 0.2, 0.3, 0. ]) for three samples',
+    'fewer': 'columns returned (), must be a tuple of 1 arrays (coefficient)',
+    'words': "columns returned 'much' for three samples",
+    'nan': 'columns returned array([nan, nan, nan]) for three samples',
 }
 EFFECTS = {'worn_brake': 'WornBrake', 'hose': 'Hose'}
 BLOCKS = {'worn_brake': {'slide_2': {'coefficient': 3.0}}, 'hose': {'force': 2.0}}

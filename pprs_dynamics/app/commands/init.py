@@ -16,7 +16,7 @@ from pprs_dynamics.app.commands.info import show_recordings
 from pprs_dynamics.app.commands.input_output import write_json
 from pprs_dynamics.app.report.mechanism_description import mechanism_lines
 from pprs_dynamics.app.report.pictures import plot_over_time, save
-from pprs_dynamics.app.report.terminal import console, shown
+from pprs_dynamics.app.report.terminal import console, shell_command, shown
 from pprs_dynamics.drives import common_unit
 from pprs_dynamics.system.output_files import write_text
 from pprs_dynamics.system.plain_text import displayed
@@ -74,12 +74,14 @@ def run(options: argparse.Namespace) -> int:
     names = ' '.join(quote(str(recording)) for recording in first.recordings) or 'RECORDING'
     model = quote(options.output)
     if first.has_efforts:
-        screen.print(f'[bold]Next[/] pprs fit {names} --model {model} --output base.yaml')
-        screen.print(f'then pprs diagnose {names} --model base.yaml')
+        screen.print('[bold]Next[/] Fit the model, then diagnose another run:')
+        screen.print(shell_command(f'pprs fit {names} --model {model} --output base.yaml'))
+        screen.print(shell_command(f'pprs diagnose {names} --model base.yaml'))
         screen.print('A fault of the robot becomes part of the model that is fitted to it: fit a '
                      'healthy run without load, and diagnose another one.')
     else:
-        screen.print(f'[bold]Next[/] pprs info {names} --model {model}')
+        screen.print('[bold]Next[/] See what the recording contains:')
+        screen.print(shell_command(f'pprs info {names} --model {model}'))
     if options.json:
         write_json(options.json, {
             'model': options.output, 'notes': list(first.notes),

@@ -18,8 +18,9 @@ from pprs_dynamics.app.commands.arguments import (
     seed,
 )
 from pprs_dynamics.app.commands.input_output import read_inputs, tell
-from pprs_dynamics.app.report.terminal import console, shown, staged_bar
+from pprs_dynamics.app.report.terminal import console, shell_command, shown, staged_bar
 from pprs_dynamics.inference.experiments.next_experiment import PURPOSES, check_purpose
+from pprs_dynamics.system.plain_text import displayed
 
 EXAMPLE = 'pprs next-experiment run.mcap --model robot.yaml --output next.csv'
 
@@ -55,5 +56,6 @@ def run(options: argparse.Namespace) -> int:
         command = shlex.join([
             'ros2', 'run', 'pprs_dynamics', 'play_trajectory', '--ros-args', '-p', 'source:=csv',
             '-p', f'file:={options.output}', '-p', f'rate:={RATE}', '-p', 'lead_in:=3.0'])
-        screen.print(f'[bold]Play it[/]: {shown(command)}')
+        screen.print('[bold]Play it[/]:')
+        screen.print(shell_command(displayed(command)))
     return 0

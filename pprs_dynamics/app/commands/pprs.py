@@ -41,7 +41,7 @@ COMMANDS = ('adopt', 'compare', 'diagnose', 'export', 'fit', 'history', 'info',
             'init', 'next-experiment', 'reproduce', 'simulate', 'survey', 'trend', 'workbench')
 # Commands without --model (they name a model file or a store) and without --json.
 WITHOUT_MODEL, WITHOUT_JSON = ('export', 'history', 'init', 'trend'), ('workbench',)
-NO_MODEL = ('No --model is given: the model is that of the paper\'s robot (--demo). '
+NO_MODEL = ('No --model is given: the model is that of the paper\'s robot (--demo).\n'
             '`pprs init ROBOT.urdf RECORDING` writes the model of your robot.')
 EXAMPLES = """\
 examples:

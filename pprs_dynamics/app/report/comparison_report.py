@@ -10,7 +10,7 @@ from typing import Any
 
 from pprs_dynamics.app.report import comparison_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, text_table
+from pprs_dynamics.app.report.terminal import PlainTable, escape, shell_command, stacked, text_table
 from pprs_dynamics.inference.diagnosis.comparison import Beside, Comparison
 from pprs_dynamics.inference.diagnosis.quantities import percent, plain, rounded_as, sentence
 from pprs_dynamics.inference.residuals.residuals import Residuals
@@ -60,7 +60,7 @@ def comparison_view(comparison: Comparison, following: tuple[str, str], details:
         parts += [escape(drive.verdict) for drive in comparison.drives.values()]
     if comparison.is_beyond_noise:
         words, command = following
-        parts += [f'[bold]Next[/] {escape(words)}:', f'  [bold cyan]{escape(command)}[/]']
+        parts += [f'[bold]Next[/] {escape(words)}:', shell_command(command)]
     if beside is not None:
         parts.append(_beside_table(comparison, beside))
     return stacked(*parts)

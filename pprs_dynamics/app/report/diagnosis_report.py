@@ -15,7 +15,13 @@ from typing import Any
 
 from pprs_dynamics.app.report import diagnosis_figures as figures
 from pprs_dynamics.app.report.page import ErrorRow, Page
-from pprs_dynamics.app.report.terminal import escape, stacked, text_table, verdict_panel
+from pprs_dynamics.app.report.terminal import (
+    escape,
+    shell_command,
+    stacked,
+    text_table,
+    verdict_panel,
+)
 from pprs_dynamics.arrays import root_mean_square
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
 from pprs_dynamics.inference.diagnosis.found_effects import RivalEffect
@@ -114,7 +120,7 @@ def _following(words: Sentences) -> Iterator[Any]:
     """Yield what to do next, and the command for it."""
     yield f'[bold]Next[/] {escape(words.following)}{":" if words.command else ""}'
     if words.command:
-        yield f'  [bold cyan]{escape(words.command)}[/]'
+        yield shell_command(words.command)
 
 
 def _parts(diagnosis: Diagnosis, words: Sentences) -> Iterator[Any]:
@@ -323,11 +329,10 @@ def _first_picture(page: Page, diagnosis: Diagnosis) -> None:
 
 
 def _findings(page: Page, diagnosis: Diagnosis, words: Sentences) -> None:
-    kind = diagnosis.model.kind
     if words.effects:
         with page.fold('Reported effects'):
             for finding, effect in zip(words.effects, diagnosis.effects, strict=True):
-                page.card(finding.title, _lines(finding, effect.effect.card_in(kind).equation),
+                page.card(finding.title, _lines(finding, effect.effect.card.equation),
                           figures.effect_pictures(diagnosis, effect))
     if words.unexplained:
         with page.fold('Patterns that no effect of the catalogue explains'):
@@ -344,7 +349,7 @@ def _alternatives(page: Page, diagnosis: Diagnosis, words: Sentences,
     if words.rivals:
         with page.fold('Rivals, which explain the data about as well'):
             for finding, rival in zip(words.rivals, rivals, strict=True):
-                equation = rival.effect.card_in(diagnosis.model.kind).equation
+                equation = rival.effect.card.equation
                 page.card(finding.title, _lines(finding, equation),
                           figures.effect_pictures(diagnosis, rival))
     _sets(page, diagnosis)

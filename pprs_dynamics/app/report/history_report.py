@@ -50,12 +50,12 @@ def details(step: Step) -> list[str]:
                  step.recordings, step.sha256, step.spans[::2], step.spans[1::2], strict=False)]
     found = [', '.join(values), f'from {", ".join(spans)}; {step.date}, version {step.version}']
     if step.calibrated:
-        found.append(f'{counted(len(step.calibrated), "number of the model")} moved as well: '
+        found.append(f'{counted(len(step.calibrated), "number of the model")} changed as well: '
                      f'{_first_of(step.calibrated)}')
     if step.rivals:
-        found.append(f'{", ".join(step.rivals)} would explain the recordings as well')
+        found.append(f'rivals, which explain the recordings as well: {", ".join(step.rivals)}')
     if step.forced:
-        found.append(f'forced, in spite of this: {"; ".join(step.objections)}')
+        found.append(f'adopted in spite of objections: {"; ".join(step.objections)}')
     return [entry for entry in found if entry]
 
 
@@ -72,7 +72,7 @@ def _parts(steps: Sequence[Step], unit: str) -> Iterator[Any]:
     rows = [('', 'before', f'{steps[0].error_before:.3f}', f'{steps[0].held_out_before:.3f}',
              _bar(steps[0].error_before, largest, 'red'))]
     for number, step in enumerate(steps, start=1):
-        again = f' (on other recordings {step.error_before:.3f} before)' if number > 1 and (
+        again = f' (before, on its own recordings: {step.error_before:.3f})' if number > 1 and (
             step.sha256 != steps[number - 2].sha256) else ''
         on = f' on {", ".join(step.drives)}' if step.drives else ''
         rows.append((f'{number}', escape(f'{_sign(step)} {step.effect}{on}{again}'),
@@ -101,7 +101,7 @@ def _bar(value: float, largest: float, colour: str) -> str:
 
 def history_page(name: str, steps: Sequence[Step], unit: str = 'N') -> Page:
     """Return the page of the ledger of a model file."""
-    page = Page(f'How {name} came to be')
+    page = Page(f'History of {name}')
     if not steps:
         page.text('No effect was added to this model yet.', 'lead')
         return page

@@ -35,6 +35,10 @@ def console(**options: Any) -> Any:
             plain = text.encode(self.encoding, PLAIN).decode(self.encoding)
             return super().render_str(plain, *args, **options)
 
+        def print(self, *objects: Any, **options: Any) -> None:
+            # Names of files stay whole, so that they can be copied.
+            super().print(*objects, **{'overflow': 'ignore', 'crop': False, **options})
+
     # A name such as a:bug:.csv is no picture.
     return PlainConsole(emoji=False, **options)
 
@@ -76,6 +80,11 @@ def as_html(view: Any, width: int) -> str:
                      force_jupyter=False)
     screen.print(view)
     return screen.export_html(inline_styles=True, code_format=HTML)
+
+
+def shell_command(command: str) -> Any:
+    """Return a command that is printed on one line of any length, so that it can be copied."""
+    return _rich('text').Text(f'  {command}', style='bold cyan', no_wrap=True, overflow='ignore')
 
 
 def verdict_panel(word: str, colour: str, text: str) -> Any:

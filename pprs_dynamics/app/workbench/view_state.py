@@ -208,7 +208,7 @@ def effect_to_dict(view: ViewState, effect: type[CatalogueEffect], model: DriveM
     called_for : set of str or None
         Effects that the diagnosis calls for; None where there is none yet.
     """
-    card, drives = effect.card_in(model.kind), model.drives
+    card, drives = effect.card, model.drives
     tick = view.ticks.get(effect.name)
     offer = next((offer for offer in view.offers if offer.candidate.effect is effect), None)
     candidate = tick.best if tick else offer.candidate if offer else None

@@ -351,7 +351,7 @@ def _rivals(diagnosis: Diagnosis, effect: FoundEffect) -> list[str]:
 
 
 def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> Finding:
-    card, unit = effect.effect.card_in(diagnosis.model.kind), diagnosis.residuals.unit
+    card, unit = effect.effect.card, diagnosis.residuals.unit
     title, is_validated = _title(diagnosis, effect), diagnosis.held_out_on == 'validation'
     what = (_otherwise(diagnosis, effect) if effect.in_model else
             f'The model lacks {title}: {_parameters(diagnosis, effect)}')
@@ -371,7 +371,7 @@ def _effect(diagnosis: Diagnosis, effect: FoundEffect) -> Finding:
 
 
 def _rival(diagnosis: Diagnosis, rival: RivalEffect) -> Finding:
-    card, unit = rival.effect.card_in(diagnosis.model.kind), diagnosis.residuals.unit
+    card, unit = rival.effect.card, diagnosis.residuals.unit
     title = _title(diagnosis, rival)
     held_out = '' if isnan(rival.held_out_after) else (
         f', and {in_unit(rival.held_out_after, unit)} on held-out data')

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ConvergenceError, MotionError
 from pprs_dynamics.measurement.files.samples import Progress
 from pprs_dynamics.measurement.motion.differentiation import Smoothing
@@ -35,36 +34,29 @@ from pprs_dynamics.physics.effects.laws.elastic_joint import LINK_POSITION
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.forward_motion import find_pose_jumps, solve_forward_motion
-from pprs_dynamics.physics.three_pprs.geometry import Geometry
+from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 
 if TYPE_CHECKING:
     from pprs_dynamics.measurement.files.recording import Recording
 
 POSITION_STEP = 1e-4  # [m, rad], for derivatives of errors by positions
 CHUNK = 16_000  # samples at a time; a million at once would take gigabytes
+PLATFORM_COLUMNS = 19  # of `PlatformMotion.rows`
 Motion = PlatformMotion | JointMotion
 
 
 class FollowedMotion(NamedTuple):
-    """Motion of N samples without times, nearness to another branch (N,), and jumps (J,)."""
+    """Motion of N samples without times, and nearness to another branch (N,)."""
 
     motion: Motion
     near_branch: np.ndarray
-    jumps: np.ndarray
 
-    def notes(self, time: Array) -> list[str]:
-        """Return the findings as sentences; time (N,) [s]."""
-        notes = []
-        if np.any(self.near_branch):
-            notes.append(
-                f'{int(self.near_branch.sum())} samples lie near another solution of the forward '
-                'kinematics, where small errors of positions matter most')
-        if len(self.jumps):
-            notes.append(f'the pose jumps at {len(self.jumps)} places, first at '
-                         f'{time[self.jumps[0]]:.6g} s: forward kinematics may have left its '
-                         'branch')
-        return notes
+    @property
+    def notes(self) -> list[str]:
+        """The findings as sentences."""
+        count = int(self.near_branch.sum())
+        return [f'{count} samples lie near another solution of the forward kinematics, where small '
+                'errors of positions matter most'] if count else []
 
 
 @dataclass(frozen=True)
@@ -106,9 +98,7 @@ class Reconstruction(DriveMotion):
     treat : Treatment
         What effort and model both get: values (N, k) -> (M, k).
     near_branch : (N,) bool array
-        See `ForwardKinematics`.
-    jumps : (J,) int array
-        Samples before which the pose jumps.
+        See `ForwardMotion`.
     gain : (D,) array
         By which recorded currents were multiplied [N m/A, N/A]; NaN where efforts were recorded.
     dropped : int
@@ -132,7 +122,6 @@ class Reconstruction(DriveMotion):
     effort: Array
     treat: Treatment
     near_branch: np.ndarray
-    jumps: np.ndarray
     gain: Array
     dropped: int
     start: float
@@ -172,14 +161,13 @@ class Reconstruction(DriveMotion):
                 first = last
 
 
-def follow(model: DriveModel | Geometry, time: Array, drives: DriveMotion,
+def follow(model: DriveModel, time: Array, drives: DriveMotion,
            progress: Progress | None = None) -> FollowedMotion:
-    """Return the motion that belongs to the drives': of an axis and an arm it is the same.
+    """Return the motion that belongs to the drives'; of the platform, on a 3-PPRS.
 
     Parameters
     ----------
-    model : DriveModel or Geometry
-        Of any kind, or the geometry of a 3-PPRS.
+    model : DriveModel
     time : (N,) array
         [s].
     drives : DriveMotion
@@ -191,65 +179,40 @@ def follow(model: DriveModel | Geometry, time: Array, drives: DriveMotion,
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    if isinstance(model, DriveModel) and model.moves_joints:
-        return FollowedMotion(JointMotion(drives.position, drives.velocity, drives.acceleration),
-                              np.zeros(len(time), dtype=bool), np.zeros(0, dtype=int))
-    geometry = model if isinstance(model, Geometry) else model.robot.geometry
-    return _follow_platform(geometry, time, drives, progress)
-
-
-def _follow_platform(geometry: Geometry, time: Array, drives: DriveMotion,
-                     progress: Progress | None) -> FollowedMotion:
-    """Return the platform's motion by forward kinematics, chunk by chunk."""
     count = len(time)
-    arrays = [np.empty((count, width)) for width in (3, 4, 3, 3, 3, 3)]
+    if model.moves_joints:
+        return FollowedMotion(JointMotion(drives.position, drives.velocity, drives.acceleration),
+                              np.zeros(count, dtype=bool))
+    platform = np.empty((count, PLATFORM_COLUMNS))
     near = np.zeros(count, dtype=bool)
     for segment in drives.segments:
-        seed = None
+        closed: dict[Any, Array] = {}
         for start in range(segment.start, segment.stop, CHUNK):
             rows = slice(start, min(start + CHUNK, segment.stop))
             try:
                 found = solve_forward_motion(
-                    geometry, drives.position[rows], drives.velocity[rows],
-                    drives.acceleration[rows], seed)
+                    model.robot.geometry, drives.position[rows], drives.velocity[rows],
+                    drives.acceleration[rows], closed)
             except ConvergenceError as error:
                 sample = start + error.sample
                 raise ConvergenceError(
                     int(drives.index[sample]), f'at {time[sample]:.6g} s {error.found}',
                     error.rule) from None
-            part = found.motion
-            for array, values in zip(arrays, (
-                    part.position, part.orientation, part.linear_velocity, part.angular_velocity,
-                    part.linear_acceleration, part.angular_acceleration), strict=True):
-                array[rows] = values
-            near[rows] = found.near_branch
-            seed = part[-1:]
+            platform[rows], near[rows] = found.motion.rows, found.near_branch
             if progress is not None:
                 progress(rows.stop, count)
-    motion = PlatformMotion(*arrays)
-    return FollowedMotion(motion, near, _jumps(motion, time, drives.segments))
-
-
-def _jumps(motion: PlatformMotion, time: Array, segments: Sequence[slice]) -> np.ndarray:
-    jumps = []
-    for segment in segments:
-        for start in range(segment.start, segment.stop, CHUNK):
-            first = max(start - 1, segment.start)  # the step from the last chunk counts too
-            rows = slice(first, min(start + CHUNK, segment.stop))
-            jump = find_pose_jumps(motion[rows].with_time(time[rows]))
-            jumps.append(first + np.flatnonzero(jump))
-    return np.concatenate(jumps)
+    return FollowedMotion(PlatformMotion.from_rows(platform), near)
 
 
 def reconstruct(
-    model: DriveModel | Geometry, recording: Recording, progress: Progress | None = None,
+    model: DriveModel, recording: Recording, progress: Progress | None = None,
     window: float | None = None,
 ) -> Reconstruction:
     """Return the motion and effort behind a recording.
 
     Parameters
     ----------
-    model : DriveModel or Geometry
+    model : DriveModel
         Whose kinematics to use.
     recording : Recording
         Or anything with its arrays and segments.
@@ -265,16 +228,13 @@ def reconstruct(
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    names = model.drives if isinstance(model, DriveModel) else DRIVES
+    names = model.drives
     if tuple(recording.drives) != names:
         order = ', in this order' if len(names) > 1 else ''
         raise MotionError('drives', f'they are {", ".join(recording.drives)}',
                           f'be {", ".join(names)}{order}', 'shape')
-    if isinstance(model, DriveModel):
-        unit = 'rad' if all(units.turns for units in model.units) else 'm'
-        drives = smooth_drives(recording, window, model.blocks_per_period, unit)
-    else:
-        drives = smooth_drives(recording, window)
+    unit = 'rad' if all(units.turns for units in model.units) else 'm'
+    drives = smooth_drives(recording, window, model.blocks_per_period, unit)
     read, time, total = drives, recording.time[drives.index], len(drives.index)
     effort = _efforts(model, recording)[drives.index]
     windup = _windup(recording, read)
@@ -282,7 +242,7 @@ def reconstruct(
     dropped = sum(part.stop - part.start for part in recording.segments) - total
     notes = [*drives.notes, f'{dropped} samples are dropped: half a window at the ends of '
              f'{len(drives.segments)} segments, what fills no block, and segments too short',
-             *followed.notes(time)]
+             *followed.notes]
     rests = np.isfinite(recording.effort[drives.index]) & np.isnan(effort)
     if np.any(rests):
         shares = (f'{name} {share:.0%}' for name, share in zip(
@@ -293,7 +253,7 @@ def reconstruct(
     return Reconstruction(
         **vars(drives), time=time, motion=followed.motion, effort=effort,
         treat=Treatment(drives.block_starts, total), near_branch=followed.near_branch,
-        jumps=followed.jumps, gain=_applied_gain(recording), dropped=dropped,
+        gain=_applied_gain(recording), dropped=dropped,
         start=float(recording.time[0]), channels=_channels(recording, drives.index),
         recorded=recording, read=read, windup=windup)
 
@@ -313,8 +273,7 @@ def read_by(reconstruction: Reconstruction, model: DriveModel) -> Reconstruction
         reconstruction.windup)
     return replace(reconstruction, position=drives.position, velocity=drives.velocity,
                    acceleration=drives.acceleration, smoothing=drives.smoothing,
-                   motion=followed.motion,
-                   near_branch=followed.near_branch, jumps=followed.jumps)
+                   motion=followed.motion, near_branch=followed.near_branch)
 
 
 def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recording: Recording,
@@ -348,11 +307,11 @@ def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recordin
 
 
 def _followed_rightly(
-    model: DriveModel | Geometry, recording: Recording, read: DriveMotion, time: Array,
+    model: DriveModel, recording: Recording, read: DriveMotion, time: Array,
     windup: Array | None, progress: Progress | None = None,
 ) -> tuple[DriveMotion, FollowedMotion]:
     """Return the true motion of the drives, and of what they move, behind that which was read."""
-    if not isinstance(model, DriveModel) or not model.misreadings:
+    if not model.misreadings:
         return read, follow(model, time, read, progress)
     q, q_dot, q_ddot = misread(model.misreadings, model.drives, recording, read)
     drives = replace(read, position=read.position - q, velocity=read.velocity - q_dot,
@@ -403,13 +362,13 @@ def _channels(recording: Recording, index: Array) -> dict[str, Array]:
     return found
 
 
-def _efforts(model: DriveModel | Geometry, recording: Recording) -> Array:
+def _efforts(model: DriveModel, recording: Recording) -> Array:
     """Return the efforts of a recording, NaN where a drive stands between motions.
 
     Where poses are held throughout, their efforts count: they show gravity and offsets.
     """
     effort = recording.effort
-    if isinstance(model, DriveModel) and model.rest_speed and not are_held_poses(
+    if model.rest_speed and not are_held_poses(
             recording.position, recording.segments):
         effort = effort.copy()
         for part in recording.segments:

@@ -6,7 +6,9 @@
 from __future__ import annotations
 
 import copyreg
+import inspect
 import math
+import re
 from abc import ABC, ABCMeta, abstractmethod
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -14,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import MISSING, ModelError, UnknownNameError
-from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
+from pprs_dynamics.physics.mechanism.places import PLATFORM
 from pprs_dynamics.physics.mechanism.state import MechanismState
 
 
@@ -153,7 +155,7 @@ class Effect(ABC):
 
 @dataclass(frozen=True)
 class Card:
-    """Description of an effect for users.
+    """Description of an effect for users, from the sections of its docstring.
 
     Parameters
     ----------
@@ -172,6 +174,16 @@ class Card:
     causes: str
     confirm: str
     reference: str
+
+    SECTIONS: ClassVar = ('Equation', 'Symptom', 'Causes', 'Confirmation', 'References')
+
+    @classmethod
+    def of(cls, docstring: str) -> Card:
+        """Return the texts of the sections of an effect's docstring, '' for missing ones."""
+        _, *parts = re.split(r'^(\w+)\n-+\n', inspect.cleandoc(docstring), flags=re.M)
+        texts = {heading: ' '.join(text.split()).removesuffix('.')
+                 for heading, text in zip(parts[::2], parts[1::2], strict=True)}
+        return cls(*(texts.get(section, '') for section in cls.SECTIONS))
 
 
 class Wave(NamedTuple):
@@ -206,8 +218,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
 
     Class attributes
     ----------------
-    card, mechanism_card : Card
-        The latter where a mechanism needs other words than a 3-PPRS.
+    card : Card
+        From the docstring.
     needs_several_drives : bool
         Whether a single drive feels it as it feels another effect, always.
     acts_in : set of {'platform', 'slide', 'mechanism'}
@@ -254,7 +266,6 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     """
 
     card: ClassVar[Card]
-    mechanism_card: ClassVar[Card | None] = None
     needs_several_drives: ClassVar[bool] = False
     acts_in: ClassVar[frozenset[str]] = frozenset({PLATFORM})
     linear: ClassVar[tuple[Parameter, ...]]
@@ -277,6 +288,8 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     waves: ClassVar[tuple[Wave, ...]] = ()
 
     def __init_subclass__(cls) -> None:
+        if cls.__doc__ and 'name' in vars(cls):
+            cls.card = Card.of(cls.__doc__)
         if hasattr(cls, 'linear'):
             cls.parameters = cls.linear + cls.shape
             if 'coefficients' not in vars(cls):
@@ -347,11 +360,6 @@ class CatalogueEffect(Effect, metaclass=EffectType):
     @abstractmethod
     def to_file(self) -> dict[str, Any]:
         """Return the block from which `from_file` makes this effect."""
-
-    @classmethod
-    def card_in(cls, kind: str) -> Card:
-        """Return the description for a kind of model."""
-        return cls.card if kind != MECHANISM else cls.mechanism_card or cls.card
 
     @classmethod
     def to_coefficients(cls, values: Mapping[str, float]) -> dict[str, float]:

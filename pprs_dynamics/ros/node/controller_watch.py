@@ -72,6 +72,7 @@ class ControllerWatch:
         self._strays_since: float | None = None
         self._names: tuple[str, ...] = ()
         self._has_efforts = True
+        self._hold_is_due = False
 
     @property
     def was_heard(self) -> bool:
@@ -86,17 +87,17 @@ class ControllerWatch:
         self._sent.append(SentPoints(now, np.array(position), left, moves_at_end))
         _forget(self._sent, now - LOOKED_BACK)
 
-    def heard(self, state: Any) -> bool:
+    def heard(self, state: Any, has_commanded: bool) -> None:
         """Take note of a controller's state.
+
+        A controller that was silent before has just become active. It holds a pose without any
+        effort by itself, so a hold is due if this node has commanded it before.
 
         Parameters
         ----------
         state : control_msgs/JointTrajectoryControllerState
-
-        Returns
-        -------
-        bool
-            Whether it was silent before: it has just become active.
+        has_commanded : bool
+            Whether this node has ever sent it a trajectory: another node may command it now.
         """
         now, reference = self._clock(), state.reference
         self._names = tuple(state.joint_names)
@@ -104,13 +105,14 @@ class ControllerWatch:
         silence, self._heard = now - self._heard, now
         # States may come less often than once a second.
         was_silent = silence > max(LOOKED_BACK, SLOW * self._step)
+        self._hold_is_due |= was_silent and has_commanded
         self._step = silence if np.isfinite(silence) else 0.0
         values = dict(zip(state.joint_names, reference.positions, strict=False))
         if was_silent or any(joint not in values for joint in self._joints):
             self._went.clear()
         self._stands = not np.any(np.abs(reference.velocities) > STILL)
         if any(joint not in values for joint in self._joints):
-            return was_silent
+            return
         place = np.array([values[joint] for joint in self._joints])
         self._went.append((now, place))
         while len(self._went) > 2 and self._went[0][0] < now - LOOKED_BACK:
@@ -119,15 +121,23 @@ class ControllerWatch:
             self._strays_since = None
         elif self._strays_since is None:
             self._strays_since = now
-        return was_silent
 
-    @property
-    def at_rest(self) -> Array | None:
-        """Reference positions (D,), where the last two are the same and have no velocity."""
-        if not self._stands or len(self._went) < 2:
+    def require_hold(self) -> None:
+        """Note that the controller has lost its trajectory and must be held."""
+        self._hold_is_due = True
+
+    def take_hold(self) -> Array | None:
+        """Return reference positions (D,) where a hold is due, once; None while they move.
+
+        The reference is at rest if the last two are the same and have no velocity.
+        """
+        if not self._hold_is_due or not self._stands or len(self._went) < 2:
             return None
         (_, before), (_, now) = list(self._went)[-2:]
-        return now if (before == now).all() else None
+        if (before != now).any():
+            return None
+        self._hold_is_due = False
+        return now
 
     def complaint(self) -> str:
         """Return that the controller does not follow, and the likely reason; '' where it does."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
 FORCES = ('force_forward', 'force_backward')
@@ -25,7 +25,31 @@ VISCOUS = ('viscous_forward', 'viscous_backward')
 
 
 class AsymmetricFriction(DriveEffect):
-    """Friction that differs by direction: wipers, worm and screw drives, check valves."""
+    """Friction that differs by direction: wipers, worm and screw drives, check valves.
+
+    Equation
+    --------
+    F_f + c_f q_dot while q_dot > 0; -F_b + c_b q_dot while q_dot < 0
+
+    Symptom
+    -------
+    Over velocity, a branch that is higher or steeper on one side of zero than on the other.
+
+    Causes
+    ------
+    A lip seal or wiper that digs in one way, a screw or belt lifting against a preload, a
+    pneumatic counterbalance with a throttled port, a guide that tilts under the push.
+
+    Confirmation
+    ------------
+    Run the drive at several constant speeds, both ways, and draw force over speed. The two
+    branches must differ. A dry part alone is also a coulomb_friction and an effort_offset, so
+    check for a constant force at rest (cable, counterbalance) first.
+
+    References
+    ----------
+    Armstrong-Helouvry, Control of Machines with Friction, Kluwer, 1991.
+    """
 
     name = 'asymmetric_friction'
     is_friction = True
@@ -38,15 +62,6 @@ class AsymmetricFriction(DriveEffect):
         Parameter('viscous_backward', 'c_b', 'N s/m', 'viscous coefficient backwards', -1e6, 1e6,
                   0.0, 5.0))
     variants = (*((name,) for name in VISCOUS + FORCES), FORCES, VISCOUS, FORCES + VISCOUS)
-    card = Card(
-        'F_f + c_f q_dot while q_dot > 0; -F_b + c_b q_dot while q_dot < 0',
-        'over velocity, a branch that is higher or steeper on one side of zero than on the other',
-        'a lip seal or wiper that digs in one way, a screw or belt lifting against a preload, a '
-        'pneumatic counterbalance with a throttled port, a guide that tilts under the push',
-        'run the drive at several constant speeds, both ways, and draw force over speed: the two '
-        'branches must differ; a dry part alone is also a coulomb_friction and an effort_offset, '
-        'so check for a constant force at rest (cable, counterbalance) first',
-        'Armstrong-Helouvry, Control of Machines with Friction, Kluwer, 1991')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

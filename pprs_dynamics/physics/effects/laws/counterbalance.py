@@ -15,7 +15,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.mechanism.places import MECHANISM
 
 PRESSURE = 'pressure'
@@ -29,7 +29,35 @@ BEND = 0.2
 
 
 class Counterbalance(DriveEffect):
-    """Spring, gas or hydraulic cylinder that carries weight, between two links."""
+    """Spring, gas or hydraulic cylinder that carries weight, between two links.
+
+    Equation
+    --------
+    (F_b + K l + A_b p) dl/dq, l = sqrt(1 + rho^2 - 2 rho cos(q - q_0)), p its measured
+    pressure
+
+    Symptom
+    -------
+    A curve over the position of one joint, the same both ways, at any speed and with any load.
+    It is zero where its ends are in line with the axis, steepest near that of these positions
+    where both are on one side. It is like a mass on the link, but not with the sine of an
+    angle from the vertical, nor in other joints.
+
+    Causes
+    ------
+    The balancer of a heavy robot: springs, a gas cylinder, or a hydraulic cylinder with a gas
+    accumulator. A gas spring at a door or an arm. Its pressure falls over the years.
+
+    Confirmation
+    ------------
+    Read its pressure, or take it off with the arm propped: the error must be gone. Let the
+    joint creep over its range, both ways, with two loads: the curve must not change.
+
+    References
+    ----------
+    Jubien and Gautier, Global identification of spring balancer, dynamic parameters and drive
+    gains of heavy industrial robots, IROS, 2013.
+    """
 
     name = 'counterbalance'
     acts_in = frozenset({MECHANISM})
@@ -45,20 +73,6 @@ class Counterbalance(DriveEffect):
                        'in line with the axis', -100.0, 100.0, scale=0.3))
     variants = (('force', 'stiffness'), ('area',))
     scanned = ('force', 'stiffness')
-    card = Card(
-        '(F_b + K l + A_b p) dl/dq, l = sqrt(1 + rho^2 - 2 rho cos(q - q_0)), p its measured '
-        'pressure; F_b and K are force and stiffness times b and b^2, b and rho b the distances '
-        'of its ends from the axis',
-        'a curve over the position of one joint, the same both ways, at any speed and with any '
-        'load: zero where its ends are in line with the axis, steepest near that of these '
-        'positions where both are on one side; like a mass on the link, but not with the sine of '
-        'an angle from the vertical, nor in other joints',
-        'the balancer of a heavy robot: springs, a gas cylinder, or a hydraulic cylinder with a '
-        'gas accumulator; a gas spring at a door or an arm; its pressure falls over the years',
-        'read its pressure, or take it off with the arm propped: the error must be gone; let the '
-        'joint creep over its range, both ways, with two loads: the curve must not change',
-        'Jubien and Gautier, Global identification of spring balancer, dynamic parameters and '
-        'drive gains of heavy industrial robots, IROS, 2013')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

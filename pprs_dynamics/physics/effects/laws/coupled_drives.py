@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.places import MECHANISM
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
@@ -24,24 +24,39 @@ from pprs_dynamics.physics.mechanism.state import MechanismState
 
 
 class CoupledDrives(StructureEffect):
-    """Friction of a motor that moves more than one joint, by the map of the model file."""
+    """Friction of a motor that moves more than one joint, by the map of the model file.
+
+    Equation
+    --------
+    tau -> tau + A' (c m_dot + F sgn(m_dot)), m_dot = A q_dot of one motor
+
+    Symptom
+    -------
+    A step in the efforts of several joints at once, in the proportions of the map, where a sum
+    of their velocities changes sign. As long as one joint stands it looks like friction of the
+    other, and like masses where both move.
+
+    Causes
+    ------
+    Differentials, wrists whose motors sit in the forearm, parallelogram drives: gear, bearings
+    and seals of a motor rub with its own speed, not with that of a joint.
+
+    Confirmation
+    ------------
+    Move both joints so that the motor stands (the sum of its map stays), then so that it turns
+    twice as fast: the friction must vanish in the first case, and double in the second.
+
+    References
+    ----------
+    Gautier, Janot, Vandanjon, A new closed-loop output error method for parameter
+    identification of robot dynamics, IEEE Trans. Control Systems Technology 21, 2013.
+    """
 
     name = 'coupled_drives'
     acts_in = frozenset({MECHANISM})
     is_friction = True
     is_of_one_place = True
     linear = ()
-    card = Card(
-        "tau -> tau + A' (c m_dot + F sgn(m_dot)), m_dot = A q_dot of one motor",
-        'a step in the efforts of several joints at once, in the proportions of the map, where a '
-        'sum of their velocities turns over; as long as one joint stands it looks like friction '
-        'of the other, and like masses where both move',
-        'differentials, wrists whose motors sit in the forearm, parallelogram drives: gear, '
-        'bearings and seals of a motor rub with its own speed, not with that of a joint',
-        'move both joints so that the motor stands (the sum of its map stays), then so that it '
-        'turns twice as fast: the friction must vanish in both, and come back in both',
-        'Gautier, Janot, Vandanjon, A new closed-loop output error method for parameter '
-        'identification of robot dynamics, IEEE Trans. Control Systems Technology 21, 2013')
     maps: ClassVar[Mapping[str, tuple[float, ...]]] = {}
 
     @classmethod

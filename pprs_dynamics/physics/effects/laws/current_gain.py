@@ -12,7 +12,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveRange, DriveSamples, GainEffect
-from pprs_dynamics.physics.effects.effect import Card, Parameter, Wave
+from pprs_dynamics.physics.effects.effect import Parameter, Wave
 from pprs_dynamics.physics.effects.laws.friction_temperature import (
     middle_temperature,
     warmer_than,
@@ -27,6 +27,31 @@ class CurrentGain(GainEffect):
     """Torque per current that falls as magnets warm, or ripples as the motor turns.
 
     Efforts are currents times one constant; what the motor gives per current is another one.
+
+    Equation
+    --------
+    measured effort = (1 + kappa (T - T_0) + a sin(2 pi q / p + phi)) F
+
+    Symptom
+    -------
+    An error in proportion to the effort itself, weight, inertia and friction alike, that grows
+    with the temperature of the drive. Or a wave over its position that is higher the larger
+    the effort is, and is gone where the effort is 0 (that of force_ripple stays).
+
+    Causes
+    ------
+    Magnets lose 0.1 to 0.2 % of their flux per kelvin. Windings and poles that differ, offsets
+    and gains of current sensors that differ by phase make torque ripple with the current.
+
+    Confirmation
+    ------------
+    Hold a known load, cold and warm, and read the current. Creep to and fro with and without
+    the load: the wave must grow with it (if it does not: force_ripple).
+
+    References
+    ----------
+    Gautier and Briot, Global identification of joint drive gains and dynamic parameters of
+    robots, 2014.
     """
 
     name = 'current_gain'
@@ -50,18 +75,6 @@ class CurrentGain(GainEffect):
                   expected=(0.03, 0.03)))
     variants = (('temperature',), ('sine', 'cosine'))
     waves = (Wave('ripple', 'phase', 'sine', 'cosine'),)
-    card = Card(
-        'measured effort = (1 + kappa (T - T_0) + a sin(2 pi q / p + phi)) F',
-        'an error in proportion to the effort itself, weight, inertia and friction alike, that '
-        'grows with the temperature of the drive, or is a wave over its position that is higher '
-        'the larger the effort is, and is gone where the effort is 0 (that of force_ripple stays)',
-        'magnets lose 0.1 to 0.2 % of their flux per kelvin; windings and poles that differ, '
-        'offsets and gains of current sensors that differ by phase make torque ripple with the '
-        'current',
-        'hold a known load, cold and warm, and read the current; creep to and fro with and '
-        'without the load: the wave must grow with it (if it does not: force_ripple)',
-        'Gautier and Briot, Global identification of joint drive gains and dynamic parameters '
-        'of robots, 2014')
 
     @classmethod
     def shares(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

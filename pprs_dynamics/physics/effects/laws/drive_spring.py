@@ -14,12 +14,36 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.relaxed_position import FARTHEST, relaxed_position
 
 
 class DriveSpring(DriveEffect):
-    """Force in proportion to position: cable chain, counterbalance, bellows."""
+    """Force in proportion to position: cable chain, counterbalance, bellows.
+
+    Equation
+    --------
+    k (q - q_0)
+
+    Symptom
+    -------
+    A straight line over position, the same on the way there and back, at any speed.
+
+    Causes
+    ------
+    A cable chain or hose that is bent, a spring or gas counterbalance, a bellows. A negative k
+    is a cable that hangs more the farther the drive goes.
+
+    Confirmation
+    ------------
+    Stop the drive at some positions and read the effort (from both sides, for the friction).
+    Uncouple the cable chain or counterbalance and repeat.
+
+    References
+    ----------
+    Jubien and Gautier, Global identification of spring balancer, dynamic parameters and drive
+    gains of heavy industrial robots, IROS, 2013.
+    """
 
     name = 'drive_spring'
     linear = (
@@ -29,15 +53,6 @@ class DriveSpring(DriveEffect):
     coefficients = (
         linear[0],
         Parameter('force', '-k q_0', 'N', 'force at position 0', -1e9, 1e9, scale=0.5))
-    card = Card(
-        'k (q - q_0)',
-        'a straight line over position, the same on the way there and back, at any speed',
-        'a cable chain or hose that bends, a spring or gas counterbalance, a bellows; a negative '
-        'k is a cable that hangs more the farther the drive goes',
-        'stop the drive at some positions and read the effort (from both sides, for the '
-        'friction); uncouple the cable chain or counterbalance and repeat',
-        'Jubien and Gautier, Global identification of spring balancer, dynamic parameters and '
-        'drive gains of heavy industrial robots, IROS, 2013')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

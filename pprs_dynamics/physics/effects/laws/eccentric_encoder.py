@@ -5,10 +5,6 @@
 
 Once a turn of what it sits on: of the joint, or of the motor before its gear. Linear in
 A cos(phi) and A sin(phi); velocities and accelerations have the wave's own.
-
-References
-----------
-X.-D. Lu, D. L. Trumper, Self-calibration of on-axis rotary encoders, CIRP Annals 56, 2007.
 """
 
 from __future__ import annotations
@@ -20,14 +16,40 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveRange, MeasurementEffect
-from pprs_dynamics.physics.effects.effect import Card, Parameter, Wave
+from pprs_dynamics.physics.effects.effect import Parameter, Wave
 from pprs_dynamics.physics.mechanism.places import MECHANISM
 
 TURN = 2 * math.pi
 
 
 class EccentricEncoder(MeasurementEffect):
-    """Positions that are wrong by a wave once a turn of the encoder."""
+    """Positions that are wrong by a wave once a turn of the encoder.
+
+    Equation
+    --------
+    measured position = q + A sin(2 pi q / p + phi)
+
+    Symptom
+    -------
+    A wave over the position, always at the same places, whose height grows with the square of
+    the speed. The drive seems to hurry and to linger once in every turn of its encoder, and
+    inertia is seen where nothing accelerates.
+
+    Causes
+    ------
+    A disc or ring that is not centred on its shaft, a bent shaft, a coupling with an offset, a
+    resolver whose channels differ.
+
+    Confirmation
+    ------------
+    Turn at a steady low speed under the motor alone and compare with a second encoder or a
+    polygon. The difference repeats once a turn. Two reading heads opposite to each other
+    cancel it. A ripple of the force keeps its height at any speed.
+
+    References
+    ----------
+    Lu and Trumper, Self-calibration of on-axis rotary encoders, CIRP Annals 56, 2007.
+    """
 
     name = 'eccentric_encoder'
     # Of a joint that turns, or of a drive whose motor is known to turn so often.
@@ -46,17 +68,6 @@ class EccentricEncoder(MeasurementEffect):
             ('sine', 'A cos phi', 'amplitude of the sine'),
             ('cosine', 'A sin phi', 'amplitude of the cosine')))
     waves = (Wave('amplitude', 'phase', 'sine', 'cosine'),)
-    card = Card(
-        'measured position = q + A sin(2 pi q / p + phi)',
-        'a wave over the position, always at the same places, whose height grows with the square '
-        'of the speed: the drive seems to hurry and to linger once in every turn of its encoder, '
-        'and inertia is seen where nothing accelerates',
-        'a disc or ring that is not centred on its shaft, a bent shaft, a coupling with an offset, '
-        'a resolver whose channels differ',
-        'turn at a steady low speed under the motor alone and compare with a second encoder or a '
-        'polygon: the difference repeats once a turn; two reading heads opposite to each other '
-        'cancel it; a ripple of the force keeps its height at any speed',
-        'Lu and Trumper, Self-calibration of on-axis rotary encoders, CIRP Annals 56, 2007')
 
     @classmethod
     def may_show(cls, covered: DriveRange) -> bool:

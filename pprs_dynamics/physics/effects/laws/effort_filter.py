@@ -9,10 +9,6 @@ form is an eighth of the change that each of them makes. The residual of a singl
 for a Butterworth filter and a third for a pure delay. T is the filter's mean delay, whatever its
 order. Every fit allows for another order: to the second order in T d/dt a Butterworth filter is as
 far from two lags as these are from one.
-
-References
-----------
-G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems, 3rd ed., 1998.
 """
 
 from __future__ import annotations
@@ -24,7 +20,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import ALONE, DriveRange, MeasurementEffect
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.first_order import first_order
 
 LAGS = 2
@@ -33,7 +29,30 @@ SHORTEST, LONGEST, TRIALS = 0.002, 0.2, 14
 
 
 class EffortFilter(MeasurementEffect):
-    """The amplifier's or the recorder's effort signal is smoothed before it is recorded."""
+    """The amplifier's or the recorder's effort signal is smoothed before it is recorded.
+
+    Equation
+    --------
+    (T/2 d/dt + 1)^2 y = F, y measured
+
+    Symptom
+    -------
+    Steps of the effort at reversals come rounded and late, peaks too low. No fast noise is
+    left.
+
+    Causes
+    ------
+    A filter on the current or torque signal, in the amplifier, the controller or the recorder.
+
+    Confirmation
+    ------------
+    Switch the filter off, or read its cut-off f_c (T is about 1 / (2 pi f_c) times the order).
+    Command a step of force against a stop, and look at its shape.
+
+    References
+    ----------
+    Franklin, Powell, Workman, Digital Control of Dynamic Systems, 1998.
+    """
 
     name = 'effort_filter'
     nonlinear = True
@@ -42,15 +61,6 @@ class EffortFilter(MeasurementEffect):
     linear = ()
     shape = (Parameter('time_constant', 'T', 's', 'mean delay of the filter', 1e-4, 1.0,
                        scale=0.01),)
-    card = Card(
-        '(T/2 d/dt + 1)^2 y = F, y measured',
-        'steps of the effort at reversals come rounded and late, peaks too low; no fast noise is '
-        'left',
-        'a filter on the current or torque signal, in the amplifier, the controller or the '
-        'recorder',
-        'switch the filter off, or read its cut-off f_c (T is about 1 / (2 pi f_c) times the '
-        'order); command a step of force against a stop, and look at its shape',
-        'Franklin, Powell, Workman, Digital Control of Dynamic Systems, 1998')
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:

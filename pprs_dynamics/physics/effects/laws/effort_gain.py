@@ -1,13 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A measured effort that is scaled: (1 + g) F.
-
-References
-----------
-M. Gautier, S. Briot, Global identification of joint drive gains and dynamic parameters of
-robots, J. Dynamic Systems, Measurement, and Control 136 (2014).
-"""
+"""A measured effort that is scaled: (1 + g) F."""
 
 from __future__ import annotations
 
@@ -16,11 +10,35 @@ from typing import Any
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 
 
 class EffortGain(MeasurementEffect):
-    """A drive constant (force per current) that is not what the amplifier thinks."""
+    """A drive constant (force per current) that is not what the amplifier thinks.
+
+    Equation
+    --------
+    measured effort = (1 + g) F
+
+    Symptom
+    -------
+    An error that looks like the effort itself: the same share of weight, inertia and friction
+    alike.
+
+    Causes
+    ------
+    A force constant from a data sheet, a weakened magnet, the pitch or efficiency of a screw
+    entered wrongly.
+
+    Confirmation
+    ------------
+    Hang a known mass on the drive, or load it against a load cell, and compare.
+
+    References
+    ----------
+    Gautier and Briot, Global identification of joint drive gains and dynamic parameters of
+    robots, 2014.
+    """
 
     name = 'effort_gain'
     idealised = False
@@ -29,15 +47,6 @@ class EffortGain(MeasurementEffect):
     # another unit or motor, which belongs into the model.
     linear = (Parameter('gain', 'g', '1', 'by which effort is measured too large', -1 / 3, 0.5,
                         scale=0.05, expected=(0.04, 0.04)),)
-    card = Card(
-        'measured effort = (1 + g) F',
-        'an error that looks like the effort itself: the same share of weight, inertia and '
-        'friction alike',
-        'a force constant from a data sheet, a weakened magnet, the pitch or efficiency of a '
-        'screw entered wrongly',
-        'hang a known mass on the drive, or load it against a load cell, and compare',
-        'Gautier and Briot, Global identification of joint drive gains and dynamic parameters '
-        'of robots, 2014')
 
     @classmethod
     def drive_sensed(cls, effort: Array, time: Array | None, parameters: Mapping[str, float],

@@ -9,24 +9,39 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 
 
 class EffortOffset(DriveEffect):
-    """Constant force: a counterbalance, a hanging cable, a biased amplifier."""
+    """Constant force: a counterbalance, a hanging cable, a biased amplifier.
+
+    Equation
+    --------
+    F_0
+
+    Symptom
+    -------
+    The same error at every position, speed and direction, at rest as well.
+
+    Causes
+    ------
+    Zero of the force or current sensor, bias of the amplifier, a counterbalance or a hanging
+    cable, a slide that is not level (then all drives show it: base_tilt).
+
+    Confirmation
+    ------------
+    Read the effort with the drive uncoupled or the amplifier disabled: the remaining effort is
+    the sensor's. Else hang the cable or counterbalance off and repeat.
+
+    References
+    ----------
+    Khalil and Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002, on
+    the offset of motor currents.
+    """
 
     name = 'effort_offset'
     may_be_measurement = True
     linear = (Parameter('force', 'F_0', 'N', 'constant force', -1e6, 1e6, scale=0.5),)
-    card = Card(
-        'F_0',
-        'the same error at every position, speed and direction, at rest as well',
-        'zero of the force or current sensor, bias of the amplifier, a counterbalance or a '
-        'hanging cable, a slide that is not level (then all drives show it: base_tilt)',
-        'read the effort with the drive uncoupled or the amplifier disabled: what is left is the '
-        "sensor's; else hang the cable or counterbalance off and repeat",
-        'Khalil and Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002, '
-        'on the offset of motor currents')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect, Windup
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
 LINK_POSITION = 'link_position'
@@ -26,7 +26,32 @@ SOFT = (2e-6, 3e-4)
 
 
 class ElasticJoint(MeasurementEffect):
-    """Gear, shaft or belt that winds up between an encoder on the motor and the link."""
+    """Gear, shaft or belt that winds up between an encoder on the motor and the link.
+
+    Equation
+    --------
+    motor position = q + w, k w + d w_dot = tau
+
+    Symptom
+    -------
+    Weight and inertia as of a drive that stands aside, the more the more it carries, and
+    shakes after jerks. The difference to an encoder on the link follows the load.
+
+    Causes
+    ------
+    The flexspline of a harmonic drive, a belt, a long shaft or screw. More than before: a
+    crack, a loose clamp, a worn belt.
+
+    Confirmation
+    ------------
+    Lock the motor, load the link by known weights, and read its own encoder: slope and width
+    of the loop are 1/k and the loss. Without one a dial gauge does.
+
+    References
+    ----------
+    Spong, Modeling and control of elastic joint robots, ASME J. Dynamic Systems, Measurement,
+    and Control 109, 1987.
+    """
 
     name = 'elastic_joint'
     acts_in = frozenset({PLATFORM, MECHANISM})
@@ -37,16 +62,6 @@ class ElasticJoint(MeasurementEffect):
         Parameter('loss', 'd/k', 's', 'loss over stiffness: by which wind-up is behind its load',
                   -10.0, 10.0, 0.0, scale=0.01, expected=(0.03, 0.03)))
     is_positive = True
-    card = Card(
-        'motor position = q + w, k w + d w_dot = tau',
-        'weight and inertia as of a drive that stands aside, the more the more it carries, and '
-        'shakes after jerks; the difference to an encoder on the link follows the load',
-        'the flexspline of a harmonic drive, a belt, a long shaft or screw; more than before: a '
-        'crack, a loose clamp, a worn belt',
-        'lock the motor, load the link by known weights, and read its own encoder: slope and width '
-        'of the loop are 1/k and the loss; without one a dial gauge does',
-        'Spong, Modeling and control of elastic joint robots, ASME J. Dynamic Systems, '
-        'Measurement, and Control 109, 1987')
 
     @classmethod
     def sizes_seen(cls, windup: Windup) -> Mapping[str, float]:

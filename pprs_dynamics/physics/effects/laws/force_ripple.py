@@ -16,7 +16,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter, Wave
+from pprs_dynamics.physics.effects.effect import Parameter, Wave
 
 SHORTEST = 8e-4  # [m], pitch tried
 FEWEST = 3  # periods over the stroke; fewer are a spring's curve as well
@@ -27,7 +27,34 @@ TURN = 2 * math.pi
 
 
 class ForceRipple(DriveEffect):
-    """Force that repeats with each turn or pole: screw, gear or motor cogging."""
+    """Force that repeats with each turn or pole: screw, gear or motor cogging.
+
+    Equation
+    --------
+    A sin(2 pi q / p + phi) + A_2 sin(4 pi q / p + phi_2)
+
+    Symptom
+    -------
+    A wave over position, always at the same places, both ways and at any speed. Over time its
+    frequency follows the speed.
+
+    Causes
+    ------
+    Cogging of the motor (p is the pole pitch, or lead / poles), a bent or eccentric screw (p
+    is the lead), balls entering a nut or carriage, gear or belt teeth. The wave generator of a
+    harmonic drive ripples twice a turn of the motor (p is pi over the gear ratio).
+
+    Confirmation
+    ------------
+    Compare p with lead, pole pitch and tooth pitch, or 2 pi / p with the gear ratio. Creep
+    along the stroke both ways: peaks must stay in place. Turn the motor against the screw by
+    half a period at the coupling and repeat: cogging moves with the motor.
+
+    References
+    ----------
+    Van den Braembussche, Swevers, Van Brussel, Vanherck, Accurate tracking control of linear
+    synchronous motor machine tool axes, Mechatronics 6, 1996.
+    """
 
     name = 'force_ripple'
     linear = (
@@ -50,27 +77,6 @@ class ForceRipple(DriveEffect):
     variants = (('sine', 'cosine'), ('sine', 'cosine', 'second_sine', 'second_cosine'))
     waves = (Wave('force', 'phase', 'sine', 'cosine'),
              Wave('second', 'second_phase', 'second_sine', 'second_cosine'))
-    card = Card(
-        'A sin(2 pi q / p + phi) + A_2 sin(4 pi q / p + phi_2)',
-        'a wave over position, always at the same places, both ways and at any speed; over time '
-        'its frequency follows the speed',
-        'cogging of the motor (p is the pole pitch, or lead / poles), a bent or eccentric screw '
-        '(p is the lead), balls entering a nut or carriage, gear or belt teeth',
-        'compare p with lead, pole pitch and tooth pitch; creep along the stroke both ways: '
-        'peaks must stay in place; turn the motor against the screw by half a period at the '
-        'coupling and repeat: cogging moves with the motor',
-        'Van den Braembussche, Swevers, Van Brussel, Vanherck, Accurate tracking control of '
-        'linear synchronous motor machine tool axes, Mechatronics 6, 1996')
-    mechanism_card = Card(
-        'A sin(2 pi q / p + phi) + A_2 sin(4 pi q / p + phi_2)',
-        'a wave over the angle of the joint, always at the same places, both ways and at any '
-        'speed; over time its frequency follows the speed',
-        'the gear: the wave generator of a harmonic drive ripples twice a turn of the motor (p is '
-        'pi over the gear ratio), teeth of other gears once a tooth; cogging of the motor',
-        'compare 2 pi / p with the gear ratio and numbers of teeth and poles; creep to and fro: '
-        'peaks must stay in place',
-        'Van den Braembussche, Swevers, Van Brussel, Vanherck, Accurate tracking control of '
-        'linear synchronous motor machine tool axes, Mechatronics 6, 1996')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

@@ -17,12 +17,40 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.first_order import first_order
 
 
 class FrictionDrift(DriveEffect):
-    """Friction that changes while the robot works: cold grease, seals that warm up."""
+    """Friction that changes while the robot works: cold grease, seals that warm up.
+
+    Equation
+    --------
+    (F exp(-t / tau) + F_w w) sgn(q_dot) + c_w w q_dot, t since the start, tau w_dot = |q_dot|
+    - w
+
+    Symptom
+    -------
+    The step at each reversal shrinks from the beginning of a recording to its end (or grows,
+    where F is negative), whatever the motion. By work it shrinks, or the slope over velocity,
+    while the drive is fast, and grows again while it is slow.
+
+    Causes
+    ------
+    Grease that warms by the friction itself or after a cold start, seals that settle, a
+    preload that changes as screw or guide expand.
+
+    Confirmation
+    ------------
+    Repeat the same motion for an hour from cold, and after a night's rest. The friction must
+    fade alike both times. Measure the temperature of nut and guide as well.
+
+    References
+    ----------
+    Bittencourt and Gunnarsson, Static friction in a robot joint: modeling and identification
+    of load and temperature effects, ASME J. Dynamic Systems, Measurement, and Control 134,
+    2012.
+    """
 
     name = 'friction_drift'
     assumed_at_start = 'the drive is cold, the time of fading begins'
@@ -38,19 +66,6 @@ class FrictionDrift(DriveEffect):
                        scale=10.0),)
     variants = (('force',), ('worked',), ('thinned',), ('force', 'worked', 'thinned'))
     unphysical_below: ClassVar[Mapping[str, float]] = {'force': 0.0}
-    card = Card(
-        '(F exp(-t / tau) + F_w w) sgn(q_dot) + c_w w q_dot, t since the start, '
-        'tau w_dot = |q_dot| - w',
-        'the step at each reversal shrinks from the beginning of a recording to its end (or '
-        'grows, where F is negative), whatever the motion; by work it shrinks, or the slope over '
-        'velocity, while the drive is fast, and comes back while it is slow',
-        'grease that warms by the friction itself or after a cold start, seals that settle, a '
-        'preload that changes as screw or guide expand',
-        "repeat the same motion for an hour from cold, and after a night's rest: the friction "
-        'must fade alike both times; measure the temperature of nut and guide beside it',
-        'Bittencourt and Gunnarsson, Static friction in a robot joint: modeling and '
-        'identification of load and temperature effects, ASME J. Dynamic Systems, Measurement, '
-        'and Control 134, 2012')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
 TEMPERATURE = 'temperature'
@@ -29,6 +29,33 @@ class FrictionTemperature(DriveEffect):
     """Dry and viscous friction that change with the temperature of the drive.
 
     Without a measured temperature it is not there: the model's friction is that at the reference.
+
+    Equation
+    --------
+    F_T (T - T_0) sgn(q_dot) + c_T T_d (1 - exp(-(T - T_0) / T_d)) q_dot, T the measured
+    temperature of the drive
+
+    Symptom
+    -------
+    The step at each reversal, or the slope over velocity, shrinks or grows with the
+    temperature of the drive, up and down. Friction_drift follows the clock, or the work of the
+    drive itself.
+
+    Causes
+    ------
+    Oil and grease thin as they warm: viscous friction falls to a half in 15 to 30 K. Seals and
+    preload change the dry part, either way.
+
+    Confirmation
+    ------------
+    Warm the drive by work, let it cool, and run the same slow and fast strokes on the way:
+    friction must follow the temperature, not with the time of the day.
+
+    References
+    ----------
+    Bittencourt and Gunnarsson, Static friction in a robot joint: modeling and identification
+    of load and temperature effects, ASME J. Dynamic Systems, Measurement, and Control 134,
+    2012.
     """
 
     name = 'friction_temperature'
@@ -43,19 +70,6 @@ class FrictionTemperature(DriveEffect):
              Parameter('thinning', 'T_d', 'K', 'difference of temperature in which oil loses a '
                        'factor e of its viscosity', 5.0, 1e4, 25.0, scale=10.0))
     variants = (('coulomb',), ('viscous',), ('coulomb', 'viscous'))
-    card = Card(
-        'F_T (T - T_0) sgn(q_dot) + c_T T_d (1 - exp(-(T - T_0) / T_d)) q_dot, T the measured '
-        'temperature of the drive',
-        'the step at each reversal, or the slope over velocity, shrinks or grows with the '
-        'temperature of the drive, up and down; friction_drift follows the clock, or the '
-        'work of the drive itself',
-        'oil and grease thin as they warm: viscous friction falls to a half in 15 to 30 K; seals '
-        'and preload change the dry part, either way',
-        'warm the drive by work, let it cool, and run the same slow and fast strokes on the way: '
-        'friction must come back with the temperature, not with the time of the day',
-        'Bittencourt and Gunnarsson, Static friction in a robot joint: modeling and '
-        'identification of load and temperature effects, ASME J. Dynamic Systems, Measurement, '
-        'and Control 134, 2012')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

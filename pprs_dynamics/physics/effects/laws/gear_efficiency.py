@@ -7,12 +7,40 @@ from __future__ import annotations
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
 
 class GearEfficiency(DriveEffect):
-    """A share of what a gear passes on is lost, another one where the load drives the motor."""
+    """A share of what a gear passes on is lost, another one where the load drives the motor.
+
+    Equation
+    --------
+    mu_d |tau| sgn(q_dot) for tau q_dot > 0, mu_b |tau| sgn(q_dot) else, tau what gear or screw
+    pass on
+
+    Symptom
+    -------
+    A step at each reversal that grows with the load, like load_friction, but another one where
+    a load is lifted than where it is let down: as if it were heavier and rubbed.
+
+    Causes
+    ------
+    Every worm, screw, harmonic and planetary gear: teeth slide in proportion to what they
+    transmit, and more so while the motor drives. Grease, wear and preload change what is in
+    the data sheet.
+
+    Confirmation
+    ------------
+    Lift a load slowly, hold it, let it down slowly, then with twice the load. Both steps from
+    the held effort must double, each in its own size. Where they are alike it is
+    load_friction. A mass or a current gain that is off changes lifting and lowering alike.
+
+    References
+    ----------
+    Wang, Kim, Directional efficiency in geared transmissions: characterization of
+    backdrivability towards improved proprioceptive control, ICRA, 2015.
+    """
 
     name = 'gear_efficiency'
     is_friction = True
@@ -21,19 +49,6 @@ class GearEfficiency(DriveEffect):
                         'load: 1 / efficiency - 1', -100.0, 100.0, scale=0.05),
               Parameter('driven_back', 'mu_b', '1', 'share that is lost where the load drives the '
                         'motor: 1 - efficiency', -100.0, 100.0, scale=0.05))
-    card = Card(
-        'mu_d |tau| sgn(q_dot) for tau q_dot > 0, mu_b |tau| sgn(q_dot) else, tau what gear or '
-        'screw pass on',
-        'a step at each reversal that grows with the load, like load_friction, but another one '
-        'where a load is lifted than where it is let down: as if it were heavier and rubbed',
-        'every worm, screw, harmonic and planetary gear: teeth slide in proportion to what they '
-        'transmit, and more so while the motor drives; grease, wear and preload change what is in '
-        'the data sheet',
-        'lift a load slowly, hold it, let it down slowly, then with twice the load: both steps '
-        'from the held effort must double, each in its own size; where they are alike it is '
-        'load_friction; a mass or a current gain that is off changes lifting and lowering alike',
-        'Wang, Kim, Directional efficiency in geared transmissions: characterization of '
-        'backdrivability towards improved proprioceptive control, ICRA, 2015')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

@@ -1,12 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A drive whose zero is off: its encoder says q + z where the drive stands at q.
-
-References
-----------
-J.-P. Merlet, Parallel Robots, 2nd ed., 2006, chapter on calibration.
-"""
+"""A drive whose zero is off: its encoder says q + z where the drive stands at q."""
 
 from __future__ import annotations
 
@@ -17,12 +12,37 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
 
 class HomingError(MeasurementEffect):
-    """The whole mechanism stands elsewhere than its encoders say."""
+    """The whole mechanism stands elsewhere than its encoders say.
+
+    Equation
+    --------
+    measured position = q + z
+
+    Symptom
+    -------
+    A slowly changing error of this drive and of others that depends on the pose: the weight
+    pulls in another direction than in the model. On a parallel robot it is largest where the
+    rods lean most.
+
+    Causes
+    ------
+    A homing switch that moved, a lost encoder count, an index pulse one turn away, a drive
+    mounted a little aside, a joint put together one tooth aside, zeros of another robot.
+
+    Confirmation
+    ------------
+    Home the drive again and repeat. Move to the zero marks and check the zero with a gauge
+    block or a level.
+
+    References
+    ----------
+    Merlet, Parallel Robots, 2006.
+    """
 
     name = 'homing_error'
     # No force of an axis depends on its zero.
@@ -35,21 +55,6 @@ class HomingError(MeasurementEffect):
     linear = (Parameter('zero', 'z', 'm', 'by which positions are measured too large', -0.1, 0.1,
                         scale=0.001, expected=(0.001, math.radians(1.0)),
                         turning=(-math.pi, math.pi)),)
-    card = Card(
-        'measured position = q + z',
-        'a slowly changing error on several drives at once, largest where the rods lean most: '
-        'weight and inertia are shared out among the drives by the wrong pose',
-        'a homing switch that moved, a lost encoder count, an index pulse one turn away, a '
-        'drive mounted a little aside',
-        'home the drive again and repeat; check the zero with a gauge block',
-        'Merlet, Parallel Robots, 2006')
-    mechanism_card = Card(
-        'measured position = q + z',
-        'an error of this joint and of those before it, that depends on the pose: the weight '
-        'pulls in another direction than the model thinks',
-        'an encoder that lost counts, a joint put together one tooth aside, zeros of another arm',
-        'move to the zero marks of the arm; measure an angle with a level',
-        'Merlet, Parallel Robots, 2006')
 
     def position_error(self, drives: Sequence[str], position: Array) -> Array:
         """Return z of each drive, the same at every sample, (N, D) [m, rad]."""

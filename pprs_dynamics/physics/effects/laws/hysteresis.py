@@ -19,14 +19,42 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 
 # Distances that are tried: give of guides, nuts and seals; of gears and their bearings.
 PUSHED, TURNED = (3e-5, 5e-3), (2e-4, 5e-2)  # [m], [rad]
 
 
 class Hysteresis(DriveEffect):
-    """Elastic give of the contacts before they slide: preloaded ball guides, seals, belts."""
+    """Elastic give of the contacts before they slide: preloaded ball guides, seals, belts.
+
+    Equation
+    --------
+    (F + mu N) (z - sgn q_dot), dz/dq = (1 - z sgn q_dot) / x_d
+
+    Symptom
+    -------
+    A spike after each reversal, where the model already asks for full friction and the drive
+    does not yet need it. It decays with the distance moved, not with time or speed, and over
+    position the force draws loops.
+
+    Causes
+    ------
+    Elastic give of preloaded ball guides, nuts, seals and wipers before they slide. A toothed
+    belt. Play has a similar look, but a dead zone instead of a slope.
+
+    Confirmation
+    ------------
+    Move the drive to and fro by less than a millimetre, slowly, and draw force over position:
+    a loop with rounded flanks, the same at half the speed. Reduce the preload and repeat: it
+    must shrink.
+
+    References
+    ----------
+    Dahl, A solid friction model, The Aerospace Corporation TOR-0158(3107-18)-1, 1968. Canudas
+    de Wit, Olsson, Astrom, Lischinsky, A new model for control of systems with friction, IEEE
+    Trans. Automatic Control 40, 1995.
+    """
 
     name = 'hysteresis'
     assumed_at_start = 'the contacts are relaxed, friction builds up first'
@@ -37,19 +65,6 @@ class Hysteresis(DriveEffect):
     variants = (('force',), ('coefficient',), ('force', 'coefficient'))
     shape = (Parameter('distance', 'x_d', 'm', 'distance over which it builds up', 1e-7, 0.1,
                        scale=1e-4, turning=(1e-6, 1.0)),)
-    card = Card(
-        '(F + mu N) (z - sgn q_dot), dz/dq = (1 - z sgn q_dot) / x_d',
-        'a spike after each reversal, where the model already asks for full friction and the '
-        'drive does not yet need it; it decays with the distance moved, not with time or speed, '
-        'and over position the force draws loops',
-        'elastic give of preloaded ball guides, nuts, seals and wipers before they slide; a '
-        'toothed belt; play has a similar look, but a dead zone instead of a slope',
-        'move the drive to and fro by less than a millimetre, slowly, and draw force over '
-        'position: a loop with rounded flanks, the same at half the speed; reduce the preload '
-        'and repeat: it must shrink',
-        'Dahl, A solid friction model, The Aerospace Corporation TOR-0158(3107-18)-1, 1968; '
-        'Canudas de Wit, Olsson, Astrom, Lischinsky, A new model for control of systems with '
-        'friction, IEEE Trans. Automatic Control 40, 1995')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

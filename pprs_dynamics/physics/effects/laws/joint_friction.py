@@ -5,11 +5,6 @@
 
 Torque against the relative rate: c w + (T + mu r N) sgn(w), with N the force that the joint
 transmits across its axis, of a ball all of it; by virtual work T' tau at the drives.
-
-References
-----------
-T.-P. Itul, D. L. Pisla, The Influence of Friction on the Dynamic Model for a 6-DOF Parallel Robot
-with Triangular Platform, 2007, on the friction of revolute and ball joints.
 """
 
 from __future__ import annotations
@@ -19,7 +14,7 @@ from functools import cache
 from typing import Any, ClassVar
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.physics.effects.effect import Card, Effect, Parameter
+from pprs_dynamics.physics.effects.effect import Effect, Parameter
 from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 from pprs_dynamics.physics.mechanism.alike import alike_joints
 from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
@@ -34,6 +29,31 @@ class JointFrictionEffect(PassiveJointEffect):
 
     On a 3-PPRS that of its revolute joints C_i, or of its ball joints A_i, alike in all chains. It
     goes to the drives by virtual power of the whole mechanism, whatever friction.approach is.
+
+    Equation
+    --------
+    tau -> tau + T' (c w + (T + mu r N) sgn(w)), of one passive joint; of a 3-PPRS of all C_i
+    or A_i
+
+    Symptom
+    -------
+    Errors of several drives at once, in the proportions in which they move the joint, with the
+    sign of its rate or growing with it. On a 3-PPRS they change sign where a rod reverses its
+    swing (C_i), or the platform turns against a rod (A_i), not where a drive reverses.
+
+    Causes
+    ------
+    A bearing or ball joint that runs dry, is dirty, overtightened, preloaded or worn. A stiff
+    seal or boot, cold grease, a cable loom over the joint.
+
+    Confirmation
+    ------------
+    Take the load off, move the joint by hand and compare it with its like. Lubricate it and
+    repeat, run the robot warm and compare: the error must fall.
+
+    References
+    ----------
+    Itul, Pisla, 2007, Eq. (9) and (12).
     """
 
     name = 'joint_friction'
@@ -42,25 +62,6 @@ class JointFrictionEffect(PassiveJointEffect):
     is_of_one_place = True
     linear = ()
     radii: ClassVar[Mapping[str, float]] = {}
-    card = Card(
-        'moment (c |w| + T + mu r N) against the motion in C_i, w = u_dot_i, or in A_i, '
-        'w = omega_n,i',
-        'errors on all six drives at once that turn over where a rod reverses its swing (C_i), or '
-        'the platform turns back against a rod (A_i), not where a drive reverses',
-        'dry, dirty or overtightened bearings at the feet of the rods, preloaded ball joints under '
-        'the platform, stiff seals and boots, cold grease',
-        'uncouple a rod from the platform, swing it by hand and turn its ball; grease the joint '
-        'and repeat; run the robot warm and compare',
-        'Itul, Pisla, 2007, Eq. (9) and (12)')
-    mechanism_card = Card(
-        'tau -> tau + T\' (c w + (T + mu r N) sgn(w)), of one passive joint',
-        'errors of several drives at once, in the proportions in which they move the joint, with '
-        'the sign of its rate or growing with it',
-        'a bearing that runs dry, is overtightened or worn; a seal; a cable loom over the joint',
-        'take the load off, move the joint by hand and compare it with its like; lubricate it and '
-        'repeat: the error must fall',
-        'Itul, Pisla, The Influence of Friction on the Dynamic Model for a 6-DOF Parallel Robot, '
-        '2007')
 
     @classmethod
     def bound(cls, robot: Any) -> Any:

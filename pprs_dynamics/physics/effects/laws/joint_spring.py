@@ -1,12 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Springs in passive joints: k (q - q_0), q an angle, or the position of a slide.
-
-References
-----------
-L. L. Howell, Compliant Mechanisms, 2001, on flexures as torsional springs.
-"""
+"""Springs in passive joints: k (q - q_0), q an angle, or the position of a slide."""
 
 from __future__ import annotations
 
@@ -16,7 +11,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.relaxed_position import FARTHEST, relaxed_position
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.alike import alike_joints
@@ -29,6 +24,29 @@ class JointSpring(BodyEffect):
     """A spring between the links of a passive joint; what is fitted is k q + M with M = -k q_0.
 
     On a 3-PPRS in its joints C_i, between lift and rod, alike in all chains.
+
+    Equation
+    --------
+    tau -> tau + T' k (q - q_0), of one passive joint; of a 3-PPRS of all C_i
+
+    Symptom
+    -------
+    Errors of several drives at once, in the proportions in which they move the joint, that
+    follow its position whatever the speed. They are the same at every pass through a pose, in
+    both directions.
+
+    Causes
+    ------
+    Flexures in place of bearings, a cable loom or hose across the joint, a seal or boot that
+    is deformed.
+
+    Confirmation
+    ------------
+    Free the loom or take off the boot and repeat. Move slowly: the error must stay.
+
+    References
+    ----------
+    Howell, Compliant Mechanisms, 2001.
     """
 
     name = 'joint_spring'
@@ -36,19 +54,6 @@ class JointSpring(BodyEffect):
     is_of_one_place = True
     linear = ()
     joints: ClassVar[tuple[str, ...]] = ()
-    card = Card(
-        'moment k (u_i - u_0) about n_i in C_i',
-        'errors that follow the rod angles u_i whatever the speed, above all on the lifts: the '
-        'same at every pass through a pose, in both directions',
-        'flexures in place of bearings, a cable loom or hose across the joint, a seal or boot '
-        'that is bent',
-        'free the loom or take off the boot and repeat; move slowly: the error must stay',
-        'Howell, Compliant Mechanisms, 2001')
-    mechanism_card = Card(
-        'tau -> tau + T\' k (q - q_0), of one passive joint',
-        'errors of several drives at once, in the proportions in which they move the joint, that '
-        'follow its position whatever the speed: the same at every pass, in both directions',
-        card.causes, card.confirm, card.reference)
 
     def __init__(self, values: Mapping[str, float]) -> None:
         super().__init__(values)

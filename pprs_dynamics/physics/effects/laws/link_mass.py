@@ -1,20 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""A body on a link that the model does not have, or a link heavier or lighter than its model's.
-
-References
-----------
-W. Khalil, E. Dombre, Modeling, Identification and Control of Robots, 2002, on base inertial
-parameters.
-"""
+"""A body on a link that the model does not have, or a link heavier or lighter than its model's."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from pprs_dynamics.physics.effects.added_body import AddedBody, Place
-from pprs_dynamics.physics.effects.effect import Card
 from pprs_dynamics.physics.mechanism.alike import alike_links
 from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
@@ -24,30 +17,37 @@ class LinkMass(AddedBody):
 
     On the rods of a 3-PPRS, all three alike, it is mass spread evenly over their length. The link
     that carries the tool is left to the payload.
+
+    Equation
+    --------
+    m_b -> m_b + m_+, of one link; of a 3-PPRS along all rods
+
+    Symptom
+    -------
+    Errors of the drives that carry the link, in the proportions of its weight and of its
+    accelerations, and none of the joints behind it. On a 3-PPRS the lifts have an offset by
+    the weight of one rod each, and a share changes with the angle of each rod.
+
+    Causes
+    ------
+    A description whose masses are guesses, or of another variant of the robot. A motor, cover,
+    hose, bolt or sensor on the link that the model does not have. Tubes taken as solid, or the
+    other way round.
+
+    Confirmation
+    ------------
+    Hang a known weight on the link, at its middle: the error must change by as much. Compare
+    with the data sheet, or weigh the link with all that swings with it.
+
+    References
+    ----------
+    Khalil, Dombre, Modeling, Identification and Control of Robots, 2002.
     """
 
     name = 'link_mass'
     acts_in = frozenset({PLATFORM, MECHANISM})
     is_of_one_place = True
     linear = ()
-    card = Card(
-        'm_b -> m_b + m_+, uniform along each rod',
-        'an offset of the lifts by the weight of one rod each, errors of the slides that follow '
-        'their own accelerations, and a share that changes with the angle of each rod',
-        'joints, bolts or sensors on the rods that were not counted, tubes taken as solid or '
-        'the other way round',
-        'weigh a rod with all that swings with it',
-        'Khalil, Dombre, Modeling, Identification and Control of Robots, 2002')
-    mechanism_card = Card(
-        'tau -> tau + what moves a body on the link: m_+ at c, with [I] about c, in its axes',
-        'errors of this joint and of those that carry it, as large as the weight of the link '
-        'times its distance from each axis, and in the same proportion to their accelerations; '
-        'none of the joints behind it',
-        'a URDF whose masses are guesses, or of another variant of the arm; a motor, cover, hose '
-        'or sensor on the link that the file does not have',
-        'hang a known weight on the link, at its middle: the error must change by as much; '
-        'compare with the data sheet, or weigh the link when it is taken apart',
-        'Khalil, Dombre, Modeling, Identification and Control of Robots, 2002')
 
     @classmethod
     def bound(cls, robot: Any) -> Any:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
 # Standard deviation of the load's exponent about 1: friction of a Hertzian contact grows with the
@@ -15,33 +15,40 @@ from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
 
 class LoadFriction(DriveEffect):
-    """Force against the motion in proportion to the guide's load: mu is not what was assumed."""
+    """Force against the motion in proportion to the guide's load: mu is not what was assumed.
+
+    Equation
+    --------
+    dmu N sgn(q_dot), N the load of the guide or gear
+
+    Symptom
+    -------
+    A step at each reversal, like coulomb_friction, but higher where guide or gear carry more:
+    with payload, at full reach, while the load accelerates.
+
+    Causes
+    ------
+    A friction coefficient from a catalogue, dry, worn or dirty guides, plain guides where
+    rolling ones were assumed. Teeth and bearings of every gear rub in proportion to what they
+    transmit: more than before means wear or lack of grease.
+
+    Confirmation
+    ------------
+    Run the drive slowly to and fro without payload, then with it, or with the arm hanging down
+    and stretched out. The step at reversal must grow with the load (if it does not:
+    coulomb_friction). Clean and lubricate, and repeat.
+
+    References
+    ----------
+    Hamon, Gautier, Garrec, Dynamic identification of robots with a dry friction model
+    depending on load and velocity, IROS, 2010.
+    """
 
     name = 'load_friction'
     is_friction = True
     at_one_load = 'coulomb_friction'
     linear = (Parameter('coefficient', 'dmu', '1', "friction coefficient beyond the model's",
                         -100.0, 100.0, scale=0.02),)
-    card = Card(
-        'dmu N sgn(q_dot), N the load of the guide',
-        'a step at each reversal, like coulomb_friction, but higher where the guide carries more: '
-        'with payload, at full reach, while the platform accelerates',
-        'a friction coefficient from a catalogue, dry, worn or dirty guides; plain guides where '
-        'rolling ones were assumed',
-        'run the drive slowly to and fro without payload, then with it: the step at reversal must '
-        'grow with the load (if it does not: coulomb_friction); clean and lubricate, and repeat',
-        'Hamon, Gautier, Garrec, Dynamic identification of robots with a dry friction model '
-        'depending on load and velocity, IROS, 2010')
-    mechanism_card = Card(
-        'dmu |tau| sgn(q_dot), tau what the gear transmits: without friction and the rotor',
-        'a step at each reversal that is higher where the joint carries more weight or accelerates '
-        'more',
-        'every gear has it: teeth and bearings of a harmonic or planetary gear rub in proportion '
-        'to what they transmit; more than before means wear or lack of grease',
-        'move one joint slowly to and fro, with the arm hanging down and stretched out: the step '
-        'at reversal must grow with the weight',
-        'Hamon, Gautier, Garrec, Dynamic identification of robots with a dry friction model '
-        'depending on load and velocity, IROS, 2010')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

@@ -8,11 +8,6 @@ the gear, b / 2 sgn(tau). The link falls from one flank to the other, while moto
 as before. With play, the link stays behind at reversals: the encoder first travels all of the play
 without it. No encoder measures the link meanwhile: its motion is taken as smooth between those
 before and after. `elastic_joint` is the effect of a gear that winds up.
-
-References
-----------
-M. Nordin, P.-O. Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38,
-2002.
 """
 
 from __future__ import annotations
@@ -25,7 +20,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 
 # On either side of the travel through the play, of its length: there the link may separate from the
@@ -38,7 +33,35 @@ USUAL = (5e-4, math.radians(1.0))
 
 
 class LostMotion(MeasurementEffect):
-    """Backlash or play of what is between an encoder and the link that it is to measure."""
+    """Backlash or play of what is between an encoder and the link that it is to measure.
+
+    Equation
+    --------
+    measured position = q + e, e = b sgn(tau) / 2, or b_r sgn(q_dot) / 2 once the encoder has
+    returned by b_r
+
+    Symptom
+    -------
+    Weight and inertia as of a drive that stands aside, to another side where the load changes
+    sign. With play a burst at each reversal, where the encoder moves fast and the drive does
+    not, which looks like a delay or like hysteresis.
+
+    Causes
+    ------
+    Worn teeth, a loose coupling, key or belt, a nut with clearance, between an encoder on the
+    motor and the link.
+
+    Confirmation
+    ------------
+    Lock the motor and move the link to and fro by hand with a dial gauge on it. What it moves
+    freely is backlash, what it gives per force is elastic_joint. Reverse slowly and watch when
+    the link follows the encoder.
+
+    References
+    ----------
+    Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38,
+    2002.
+    """
 
     name = 'lost_motion'
     acts_in = frozenset({PLATFORM, MECHANISM})
@@ -51,19 +74,6 @@ class LostMotion(MeasurementEffect):
                   -0.1, 0.1, 0.0, 5e-4, expected=USUAL, turning=(-0.5, 0.5)))
     variants = (('backlash',), ('play',))
     is_positive = True
-    card = Card(
-        'measured position = q + e, e = b sgn(tau) / 2, or b_r sgn(q_dot) / 2 once the encoder '
-        'has come back by b_r',
-        'weight and inertia as of a drive that stands aside, to another side where the load '
-        'changes sign; with play a burst at each reversal, where the encoder moves fast and the '
-        'drive does not, which looks like a delay or like hysteresis',
-        'worn teeth, a loose coupling, key or belt, a nut with clearance, between an encoder on '
-        'the motor and the link',
-        'lock the motor and move the link to and fro by hand with a dial gauge on it: what it '
-        'moves freely is backlash, what it gives per force is elastic_joint; reverse slowly and '
-        'watch when the link follows the encoder',
-        'Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica '
-        '38, 2002')
 
     def position_error(self, drives: Sequence[str], position: Array) -> Array:
         """Return how far encoders are ahead because of play, (N, D) [m, rad]."""

@@ -1,19 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""The centre of mass of platform and payload lies elsewhere than the model says.
-
-References
-----------
-J. Swevers, W. Verdonck, J. De Schutter, Dynamic model identification for industrial robots,
-IEEE Control Systems Magazine 27 (2007), on payload identification.
-"""
+"""The centre of mass of platform and payload lies elsewhere than the model says."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 
 
@@ -21,6 +15,29 @@ class PayloadOffset(BodyEffect):
     """The centre moved in `platform`, with the inertia about it as it was.
 
     The forces are quadratic in the offset, by its square in the moment of inertia about o.
+
+    Equation
+    --------
+    centre of mass -> centre of mass + (d_x, d_y, d_z), in platform
+
+    Symptom
+    -------
+    Offsets of the lifts that sum to nothing: one carries more and the others less. A height
+    d_z shows only when the platform tilts or accelerates sideways.
+
+    Causes
+    ------
+    A payload clamped off the middle, a tool that reaches out to one side, a mass that was
+    measured right and placed wrong.
+
+    Confirmation
+    ------------
+    Turn the payload by 180 degrees about the vertical and repeat: the offsets must change
+    their sign.
+
+    References
+    ----------
+    Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007.
     """
 
     name = 'payload_offset'
@@ -31,15 +48,6 @@ class PayloadOffset(BodyEffect):
                   -1.0, 1.0, scale=0.003)
         for axis in 'xyz')
     variants = (('x', 'y'), ('x', 'y', 'z'))
-    card = Card(
-        'centre of mass -> centre of mass + (d_x, d_y, d_z), in platform',
-        'offsets of the lifts that sum to nothing: one carries more and the others less. A '
-        'height d_z shows only when the platform tilts or accelerates sideways',
-        'a payload clamped off the middle, a tool that reaches out to one side, a mass that was '
-        'measured right and placed wrong',
-        'turn the payload by 180 degrees about the vertical and repeat: the offsets must change '
-        'their sign',
-        'Swevers, Verdonck, De Schutter, IEEE Control Systems Magazine 27, 2007')
 
     def changed(self, robot: Any) -> Any:
         """Return the robot with the other centre of mass."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.relaxed_position import FARTHEST
 
 # Where stops are tried, in strokes from either end. Over more of the stroke than the last it is a
@@ -20,7 +20,32 @@ REACHES = (0.03, 0.07, 0.13, 0.22)
 
 
 class StopContact(DriveEffect):
-    """One-sided stiffness from a position on: a bumper, a stop, a cable that gets taut."""
+    """One-sided stiffness from a position on: a bumper, a stop, a cable that gets taut.
+
+    Equation
+    --------
+    k_u (q - q_s) for q > q_s, k_l (q - q_s) for q < q_s
+
+    Symptom
+    -------
+    Nothing over most of the stroke, and beyond one position near an end a force that grows
+    with every millimetre, on the way there and back, at any speed: at each visit a peak.
+
+    Causes
+    ------
+    A bumper, a bellows or telescopic cover that is pressed together, a soft limit set beyond
+    the stop, a cable or hose that gets taut, a foreign body in the guide.
+
+    Confirmation
+    ------------
+    Creep towards that end with the effort on a plot and stop where it begins to rise: look
+    what touches there. Take off bumper or cable and repeat.
+
+    References
+    ----------
+    Hunt and Crossley, Coefficient of restitution interpreted as damping in vibroimpact, ASME
+    J. Applied Mechanics 42, 1975.
+    """
 
     name = 'stop_contact'
     linear = (Parameter('upper', 'k_u', 'N/m', 'stiffness above q_s', -1e9, 1e9, 0.0, scale=100.0),
@@ -29,16 +54,6 @@ class StopContact(DriveEffect):
                        FARTHEST, scale=0.01),)
     variants = (('upper',), ('lower',))
     is_positive = True
-    card = Card(
-        'k_u (q - q_s) for q > q_s, k_l (q - q_s) for q < q_s',
-        'nothing over most of the stroke, and beyond one position near an end a force that grows '
-        'with every millimetre, on the way there and back, at any speed: at each visit a peak',
-        'a bumper, a bellows or telescopic cover that is pressed together, a soft limit set '
-        'beyond the stop, a cable or hose that gets taut, a foreign body in the guide',
-        'creep towards that end with the effort on a plot and stop where it begins to rise: look '
-        'what touches there; take off bumper or cable and repeat',
-        'Hunt and Crossley, Coefficient of restitution interpreted as damping in vibroimpact, ASME '
-        'J. Applied Mechanics 42, 1975')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

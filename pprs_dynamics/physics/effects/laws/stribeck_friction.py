@@ -14,7 +14,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveRange, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 
 # Tried; below it friction turns over, and Stribeck's fall cannot be told.
 SLOWEST, SLOWEST_TURN = 1e-3, 1e-2  # [m/s], [rad/s]
@@ -23,7 +23,33 @@ EXPONENTS = (2.0, 1.0)
 
 
 class StribeckFriction(DriveEffect):
-    """Extra friction at low speed: boundary lubrication in greased guides and screws."""
+    """Extra friction at low speed: boundary lubrication in greased guides and screws.
+
+    Equation
+    --------
+    (F_s + mu_s N) exp(-|q_dot / v_s|^d) sgn(q_dot)
+
+    Symptom
+    -------
+    A peak on either side of each reversal and wherever the drive creeps, none at speed. Over
+    velocity, friction that first falls and then rises.
+
+    Causes
+    ------
+    Boundary lubrication: guides or nut run dry, the wrong or aged grease, plain guides under
+    load. It goes with stick-slip at creep.
+
+    Confirmation
+    ------------
+    Run the drive at constant speeds from creep upwards: force must fall with speed before it
+    rises. Lubricate and repeat: the peak must shrink.
+
+    References
+    ----------
+    Bo and Pavelescu, The friction-speed relation and its influence on the critical velocity of
+    stick-slip motion, Wear 82, 1982. Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica
+    30, 1994.
+    """
 
     name = 'stribeck_friction'
     is_friction = True
@@ -36,17 +62,6 @@ class StribeckFriction(DriveEffect):
              Parameter('exponent', 'd', '1', 'steepness: 2 Gaussian, 1 exponential', 0.5, 4.0,
                        default=2.0))
     variants = (('force',), ('coefficient',), ('force', 'coefficient'))
-    card = Card(
-        '(F_s + mu_s N) exp(-|q_dot / v_s|^d) sgn(q_dot)',
-        'a peak on either side of each reversal and wherever the drive creeps, none at speed; '
-        'over velocity, friction that first falls and then rises',
-        'boundary lubrication: guides or nut run dry, the wrong or aged grease, plain guides '
-        'under load; it goes with stick-slip at creep',
-        'run the drive at constant speeds from creep upwards: force must fall with speed before '
-        'it rises; lubricate and repeat: the peak must shrink',
-        'Bo and Pavelescu, The friction-speed relation and its influence on the critical velocity '
-        'of stick-slip motion, Wear 82, 1982; Armstrong-Helouvry, Dupont, Canudas de Wit, '
-        'Automatica 30, 1994')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:

@@ -1,13 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Effort that is measured late, or early: F(t - d).
-
-References
-----------
-G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems, 3rd ed., 1998,
-on delays of sampling and filtering.
-"""
+"""Effort that is measured late, or early: F(t - d)."""
 
 from __future__ import annotations
 
@@ -18,7 +12,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveRange, MeasurementEffect
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 
 # [s], always tried: filters and buses of drives delay by less. Longer delays (a logger of another
 # topic) are tried within `AROUND` of that with which the efforts are most alike.
@@ -28,7 +22,31 @@ SHORT = (STEP / 8, STEP / 4, STEP / 2)
 
 
 class TimeDelay(MeasurementEffect):
-    """The recorder's effort is not of the recorder's positions' time."""
+    """The recorder's effort is not of the recorder's positions' time.
+
+    Equation
+    --------
+    measured effort(t) = F(t - d)
+
+    Symptom
+    -------
+    An error in proportion to how fast the effort changes: largest where the drive reverses or
+    accelerates, with both signs, none while the effort is steady.
+
+    Causes
+    ------
+    A filter on the effort or current signal, a bus cycle between position and effort, stamps
+    taken on receipt instead of on measurement.
+
+    Confirmation
+    ------------
+    Command a step of force against a stop and look which of effort and position moves first.
+    Switch the effort filter off and repeat.
+
+    References
+    ----------
+    Franklin, Powell, Workman, Digital Control of Dynamic Systems, 1998.
+    """
 
     name = 'time_delay'
     assumed_at_start = 'the effort changed before the first sample as after it'
@@ -38,15 +56,6 @@ class TimeDelay(MeasurementEffect):
     linear = ()
     shape = (Parameter('delay', 'd', 's', 'by which effort is late; negative: early', -1.0, 1.0,
                        scale=0.001),)
-    card = Card(
-        'measured effort(t) = F(t - d)',
-        'an error in proportion to how fast the effort changes: largest where the drive '
-        'reverses or accelerates, with both signs, none while the effort is steady',
-        'a filter on the effort or current signal, a bus cycle between position and effort, '
-        'stamps taken on receipt instead of on measurement',
-        'command a step of force against a stop and look which of effort and position moves '
-        'first; switch the effort filter off and repeat',
-        'Franklin, Powell, Workman, Digital Control of Dynamic Systems, 1998')
 
     @classmethod
     def trials(cls, covered: DriveRange) -> Sequence[Mapping[str, float]]:

@@ -1,18 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""Drag on the tool, as on a platform: a force in proportion to its velocity.
-
-References
-----------
-F. M. White, Fluid Mechanics, on creeping flow.
-"""
+"""Drag on the tool, as on a platform: a force in proportion to its velocity."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.places import MECHANISM, PLATFORM
 from pprs_dynamics.physics.mechanism.state import MechanismState
@@ -20,7 +15,32 @@ from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 
 
 class ToolDrag(BodyEffect):
-    """Force c v against the velocity of the tool's origin, moment c_r omega against its turning."""
+    """Force c v against the velocity of the tool's origin, moment c_r omega against its turning.
+
+    Equation
+    --------
+    Q = [J]^T (c v, c_r omega)
+
+    Symptom
+    -------
+    Errors of several drives that follow the velocity of the tool or platform, in the
+    proportions of its Jacobian, and not that of one drive. A drive may feel it while it is at
+    rest.
+
+    Causes
+    ------
+    A tool that moves through a liquid, a curtain, brush or hose dragged along, an eddy current
+    brake.
+
+    Confirmation
+    ------------
+    Repeat with the tool out of the medium. Repeat at half the speed: the error must halve,
+    where dry friction would stay.
+
+    References
+    ----------
+    White, Fluid Mechanics.
+    """
 
     name = 'tool_drag'
     acts_in = frozenset({PLATFORM, MECHANISM})
@@ -32,20 +52,6 @@ class ToolDrag(BodyEffect):
         Parameter('rotational', 'c_r', 'N m s/rad', 'moment per angular velocity of the tool',
                   -1e6, 1e6, 0.0, scale=0.01))
     variants = (('coefficient',), ('coefficient', 'rotational'))
-    card = Card(
-        'Q = [J]^T (c v, c_r omega)',
-        'errors on several drives that follow the velocity of the platform and not that of one '
-        'drive: a drive may feel it while it stands still',
-        'a tool that moves through a liquid, a curtain, brush or hose dragged along, an eddy '
-        'current brake',
-        'repeat with the tool out of the medium; repeat at half the speed: the error must halve, '
-        'where dry friction would stay',
-        'White, Fluid Mechanics')
-    mechanism_card = Card(
-        'tau = J^T (c v, c_r omega)',
-        'errors on several drives that follow the velocity of the tool, in the proportions of its '
-        'Jacobian, and not that of one drive',
-        card.causes, card.confirm, card.reference)
 
     def load(self, state: MechanismState) -> StructureLoad:
         """Return (c v, c_r omega)."""

@@ -9,28 +9,43 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples
-from pprs_dynamics.physics.effects.effect import Card, Parameter
+from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.open_exponent import other_exponent
 
 DIRECTIONS = 0.1  # share by which real viscous friction differs by direction
 
 
 class ViscousFriction(DriveEffect):
-    """Force in proportion to velocity: lubricant, motor damping, a current loop's back-EMF."""
+    """Force in proportion to velocity: lubricant, motor damping, a current loop's back-EMF.
+
+    Equation
+    --------
+    c q_dot
+
+    Symptom
+    -------
+    A straight line through zero over velocity, the same forwards and backwards. Nothing at low
+    speed.
+
+    Causes
+    ------
+    Stiff or cold grease, too much grease, seals, eddy currents and back-EMF of the motor, a
+    damper or cable chain that drags.
+
+    Confirmation
+    ------------
+    Run the drive at several constant speeds, both ways: the force must rise in proportion.
+    Repeat warm, or with other grease: the slope must change.
+
+    References
+    ----------
+    Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models, analysis tools and
+    compensation methods for the control of machines with friction, Automatica 30, 1994.
+    """
 
     name = 'viscous_friction'
     is_friction = True
     linear = (Parameter('coefficient', 'c', 'N s/m', 'force per velocity', -1e6, 1e6, scale=5.0),)
-    card = Card(
-        'c q_dot',
-        'a straight line through zero over velocity, the same forwards and backwards; nothing '
-        'at low speed',
-        'stiff or cold grease, too much grease, seals, eddy currents and back-EMF of the motor, '
-        'a damper or cable chain that drags',
-        'run the drive at several constant speeds, both ways: the force must rise in proportion; '
-        'repeat warm, or with other grease: the slope must change',
-        'Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models, analysis tools and '
-        'compensation methods for the control of machines with friction, Automatica 30, 1994')
 
     @classmethod
     def columns(cls, drive: DriveSamples, **shape: float) -> tuple[Array, ...]:
