@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -43,16 +43,6 @@ class AmbiguousColumns(GuessError):
             for k, joint in enumerate(joints)) for reading in readings)
         super().__init__('two readings of the columns are as likely, write one of them: '
                          + ' or '.join(f'columns: {{{line}}}' for line in self.lines))
-
-
-class RateError(GuessError):
-    """A sampling rate that velocities contradict."""
-
-    def __init__(self, given: float, found: float) -> None:
-        self.lines = (f'rate: {found:g}', f'rate: {given:g}')
-        super().__init__(f'--rate {given:g}: the recorded velocities are the derivatives of the '
-                         f'positions at {found:g} samples per second: give --rate {found:g}, or '
-                         f'write rate: {given:g} and the velocity_scale of each joint')
 
 
 @dataclass(frozen=True)
@@ -132,7 +122,7 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
                      'a model was taken out')
     guess = Guess(None if time is None else time.column, columns, scales, time_scale, notes, rate,
                   table.EXTERNAL if outside else '')
-    return guess if quantity else _judge_velocities(guess, by_column, time, rate)
+    return guess if quantity else _judge_velocities(guess, by_column, time)
 
 
 def words_of(title: str) -> list[str]:
@@ -205,7 +195,7 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
     unnamed = []
     for one in series:
         words = words_of(one.title)
-        place = _joint_in(words, list(dict.fromkeys((*joints, *others))))
+        place = joint_in(words, list(dict.fromkeys((*joints, *others))))
         if place is None:
             unnamed.append(one)
         elif place[0] in joints:
@@ -263,7 +253,7 @@ def _fit(key: tuple[str, ...], members: dict[str, Column], quantity: str, given:
             float(bool({*key} & table.MEASURED)), -float(len(key)))
 
 
-def _joint_in(words: Sequence[str], joints: Sequence[str]) -> tuple[str, int, int] | None:
+def joint_in(words: Sequence[str], joints: Sequence[str]) -> tuple[str, int, int] | None:
     """Return the joint whose name is among the words, where, and how long it is."""
     best: tuple[str, int, int] | None = None
     for joint in joints:
@@ -349,35 +339,30 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
                 quantity: str | None, notes: list[str]) -> dict[tuple[str, str], Column]:
     """Return columns without names by what they are of each other, in any order."""
     count = len(joints)
-    values = np.column_stack([each.values for each in series])
     if quantity:
         return {(joint, quantity): each.column
                 for joint, each in zip(joints, series, strict=False)}
-    links = Links.of(values, time)
-    kinds = _chains(links, count) or _layout(values, time, count)
-    if not kinds:
+    values = np.column_stack([each.values for each in series])
+    candidates = [*_chains(values, time, count)] or [*_layouts(values, time, count)]
+    if not candidates:
         raise GuessError(
             f'there is no header, and {len(series)} columns beside time are no blocks of {count} '
             f'joints ({", ".join(joints)}), nor are there as many positions with their '
             f'velocities: write columns: {{time: 1, {joints[0]}: {{position: 2, effort: …}}}} '
             'with numbers from 1')
-    position = values[:, kinds[POSITION]]
-    used = {place for places in kinds.values() for place in places}
-    rest = [place for place in range(len(series)) if place not in used
-            and not _is_known(links, place, used)]
-    if EFFORT not in kinds and rest:
-        groups = [rest[k:k + count] for k in range(0, len(rest) - count + 1, count)]
-        shares = [_explained(values[:, group], position, time) for group in groups]
-        order = sorted(range(len(shares)), key=lambda k: -shares[k])
-        if len(order) > 1 and shares[order[0]] - shares[order[1]] < table.CLEAR and not _are_alike(
-                values, groups[order[0]], groups[order[1]]):
-            first, second = (groups[k] for k in order[:2])
-            raise AmbiguousColumns(joints, [
-                {**kinds, EFFORT: group} for group in (first, second)], series)
-        if order:
-            # Of what is the same but for its scale, as measured and asked efforts, the first.
-            kinds[EFFORT] = next(group for group in groups if group is groups[order[0]] or
-                                 _are_alike(values, group, groups[order[0]]))
+    scored = [(_explained(values[:, group], values[:, kinds[POSITION]], time), kinds, group)
+              for kinds, groups in candidates for group in groups]
+    # Of positions that explain as much the smoothest, as no effort is.
+    near = [each for each in scored if each[0] > max(scored)[0] - table.CLEAR]
+    kinds = min([each[1] for each in near] or [candidates[0][0]],
+                key=lambda kinds: _roughness(values[:, kinds[POSITION]]))
+    efforts = [group for _, other, group in near if other is kinds]
+    unlike = next((group for group in efforts if not _are_alike(values, efforts[0], group)), None)
+    if unlike:
+        raise AmbiguousColumns(joints, [{**kinds, EFFORT: group}
+                                        for group in (efforts[0], unlike)], series)
+    if efforts:  # of what is the same but for its scale, as measured and asked efforts, the first
+        kinds = {**kinds, EFFORT: efforts[0]}
     told = [f'{_span(series, places)} taken as {table.PLURALS[kind]}'
             for kind, places in kinds.items()]
     unused = [place for place in range(len(series))
@@ -403,8 +388,12 @@ def _span(series: Sequence[Series], places: Sequence[int]) -> str:
     return f'column{"s" * (len(columns) > 1)} {", ".join(columns)}'
 
 
-def _chains(links: Links, count: int) -> dict[str, list[int]]:
-    """Return positions and velocities by derivatives; empty where not each joint has both."""
+Candidate = tuple[dict[str, list[int]], list[list[int]]]  # positions, velocities; other blocks
+
+
+def _chains(values: Array, time: Array, count: int) -> Iterator[Candidate]:
+    """Yield positions and velocities by derivatives, where each joint has both."""
+    links = Links.of(values, time)
     with np.errstate(invalid='ignore'):
         derived = (links.correlation > table.ALIKE) & (links.slope > 0)
         # What has a velocity is followed by it best: an effort may resemble a position.
@@ -429,44 +418,32 @@ def _chains(links: Links, count: int) -> dict[str, list[int]]:
     pairs.sort()
     # Velocities of one robot are in one unit.
     slopes = [float(np.log(links.slope[pair])) for pair in pairs]
-    if (len(pairs) != count or len({j for _, j in pairs}) != count
-            or np.ptp(slopes) > table.SAME_UNIT):
-        return {}
-    return {POSITION: [i for i, _ in pairs], VELOCITY: [j for _, j in pairs]}
+    if (len(pairs) == count == len({j for _, j in pairs})
+            and np.ptp(slopes) <= table.SAME_UNIT):
+        used = [place for pair in pairs for place in pair]
+        rest = [place for place in range(values.shape[1])
+                if place not in used and not _is_known(links, place, used)]
+        yield {POSITION: [i for i, _ in pairs], VELOCITY: [j for _, j in pairs]}, [
+            rest[k:k + count] for k in range(0, len(rest) - count + 1, count)]
 
 
-def _layout(values: Array, time: Array, count: int) -> dict[str, list[int]]:
-    """Return the blocks, or every so many columns, that explain efforts best as positions."""
+def _layouts(values: Array, time: Array, count: int) -> Iterator[Candidate]:
+    """Yield positions, and velocities if there are any, in blocks or in every so many columns."""
     width = values.shape[1]
     if width % count or not width:
-        return {}
+        return
     number = width // count
-    if number == 1:
-        return {POSITION: [*range(count)]}
     layouts = [[[*range(b * count, (b + 1) * count)] for b in range(number)]]
-    if count > 1:
+    if count > 1 and number > 1:
         layouts.append([[*range(b, width, number)] for b in range(number)])
-    found = []
     for layout in layouts:
-        links = [[_linked(values, layout[a], layout[b], time) for b in range(number)]
-                 for a in range(number)]
-        for p in range(number):
-            for e in range(number):
-                if e != p and not links[p][e] and not any(links[a][p] for a in range(number)):
-                    found.append((_explained(values[:, layout[e]], values[:, layout[p]], time),
-                                  -p, layout, p, e, links[p]))
-    if not found:
-        return {}
-    # Of those that explain as much the one whose positions are smoothest, as no effort is.
-    most = max(found, key=lambda one: one[0])[0] - table.CLEAR
-    _, _, layout, p, e, of_p = min(
-        (one for one in found if one[0] >= most), key=lambda one: (
-            _roughness(values[:, one[2][one[3]]]), -one[1]))
-    kinds = {POSITION: layout[p]}
-    speeds = [b for b in range(number) if b not in (p, e) and of_p[b]]
-    if speeds:
-        kinds[VELOCITY] = layout[speeds[0]]
-    return {**kinds, EFFORT: layout[e]}
+        links = [[block is not other and _linked(values, block, other, time) for other in layout]
+                 for block in layout]
+        for block, is_rate in zip(layout, links, strict=True):
+            if not any(link[layout.index(block)] for link in links):
+                speeds = [other for other, yes in zip(layout, is_rate, strict=True) if yes]
+                yield {POSITION: block, **({VELOCITY: speeds[0]} if speeds else {})}, [
+                    other for other in layout if other is not block and other not in speeds]
 
 
 def _roughness(values: Array) -> float:
@@ -540,42 +517,24 @@ def _scale(title: str, quantity: str) -> float | None:
     return next((known[word] for word in words_of(title) if word in known), None)
 
 
-def _judge_velocities(guess: Guess, series: Mapping[Column, Series], time: Series | None,
-                      rate: float | None) -> Guess:
-    """Return a guess with the rate that velocities show, without those that are none.
-
-    Raises
-    ------
-    RateError
-        For a rate that they contradict.
-    """
-    slopes = {}
-    for joint, kind in guess.columns:
-        if kind != POSITION or (joint, VELOCITY) not in guess.columns:
+def _judge_velocities(guess: Guess, series: Mapping[Column, Series], time: Series | None) -> Guess:
+    """Return a guess with the rate that velocities show, without those that are none."""
+    rates = []
+    for joint in [joint for joint, kind in guess.columns if kind == VELOCITY]:
+        position, velocity = (guess.columns.get((joint, kind)) for kind in (POSITION, VELOCITY))
+        if position is None or velocity is None:
             continue
-        pair = np.column_stack([series[guess.columns[joint, each]].values
-                                for each in (POSITION, VELOCITY)])
-        stamps = time.values if time is not None else np.arange(len(pair)) / (rate or 1.0)
-        links = Links.of(pair, stamps[:len(pair)])
+        pair = np.column_stack([series[column].values for column in (position, velocity)])
+        links = Links.of(pair, np.arange(float(len(pair))) if time is None else time.values)
         if links.correlation[0, 1] > table.ALIKE:
-            slopes[joint] = float(links.slope[0, 1])
-        elif np.isfinite(links.correlation[0, 1]) and abs(links.correlation[0, 1]) < table.UNLIKE:
-            guess.notes.append(
-                f'{guess.columns[joint, VELOCITY]} is called a velocity, but is not the '
-                f'derivative of {guess.columns[joint, POSITION]} (correlation '
-                f'{links.correlation[0, 1]:.2f}): not used')
+            rates.append(float(links.slope[0, 1]))
+        elif abs(links.correlation[0, 1]) < table.UNLIKE:
+            guess.notes.append(f'{velocity} is called a velocity, but is not the derivative of '
+                               f'{position} (correlation {links.correlation[0, 1]:.2f}): not used')
             del guess.columns[joint, VELOCITY]
-    if not slopes:
+    if time is not None or guess.rate is not None or not rates:
         return guess
-    middle = float(np.median([*slopes.values()]))
-    if time is None:
-        if rate is None:
-            found = float(f'{middle:.3g}')
-            guess.notes.append(f'rate {found:g} Hz: the velocities are the derivatives of the '
-                               'positions at this rate')
-            return replace(guess, rate=found)
-        is_unit = any(abs(middle / factor - 1) < table.RATE_OFF for factor in (
-            1.0, *table.VELOCITY_FACTORS, *(1 / factor for factor in table.VELOCITY_FACTORS)))
-        if not is_unit:
-            raise RateError(rate, float(f'{rate * middle:.3g}'))
-    return guess
+    rate = float(f'{np.median(rates):.3g}')
+    guess.notes.append(f'rate {rate:g} Hz: the velocities are the derivatives of the positions at '
+                       'this rate')
+    return replace(guess, rate=rate)
