@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from pprs_dynamics.arrays import Array, Sample, Value
+from pprs_dynamics.arrays import Value
 from pprs_dynamics.physics.mechanism.vectors import (
     ChainVector,
     Vector,
@@ -32,7 +32,7 @@ from pprs_dynamics.physics.mechanism.vectors import (
     times,
 )
 from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
-from pprs_dynamics.physics.three_pprs.inverse_kinematics import read_chains, rod_direction
+from pprs_dynamics.physics.three_pprs.inverse_kinematics import rod_direction
 from pprs_dynamics.physics.three_pprs.kernel_parameters import GeometryParameters
 
 INVERSE_COLUMNS = 36
@@ -224,50 +224,3 @@ def condition_bound(inverse: Inverse, rows: ThreeRows, rods: Any, r: Any) -> Any
 def _size(wrench: Wrench, n: Any) -> Any:
     # The force of a unit reaction has length 1.
     return 1.0 + n * n * dot(wrench.moment, wrench.moment)
-
-
-def write_inverse(table: Array, s: Sample, inverse: Inverse) -> None:
-    """Write [B]^-1 at sample s to a table, row after row."""
-    for i in range(CHAINS):
-        _write_column(table, s, i, inverse.columns.slides[i])
-        _write_column(table, s, CHAINS + i, inverse.columns.lifts[i])
-
-
-def _write_column(table: Array, s: Sample, j: int, twist: Twist) -> None:
-    v, omega = twist.v, twist.omega
-    table[s, j], table[s, 6 + j], table[s, 12 + j] = v.x, v.y, v.z
-    table[s, 18 + j], table[s, 24 + j], table[s, 30 + j] = omega.x, omega.y, omega.z
-
-
-def read_inverse(table: Array, s: Sample) -> Inverse:
-    """Return [B]^-1 at sample s of a table, without its determinant."""
-    return Inverse(DriveValues(_read_columns(0, table, s),
-                               _read_columns(CHAINS, table, s)), 0.0)
-
-
-@each_chain
-def _read_columns(i: int, first: int, table: Array, s: Sample) -> Twist:
-    j = first + i
-    return Twist(Vector(table[s, j], table[s, 6 + j], table[s, 12 + j]),
-                 Vector(table[s, 18 + j], table[s, 24 + j], table[s, 30 + j]))
-
-
-class InverseParameters(NamedTuple):
-    """Parameters of `inverse_kernel`: the bound is the square of the condition number allowed."""
-
-    geometry: GeometryParameters
-    bound: Value
-    platform_radius: Value
-
-
-def inverse_kernel(
-    p: InverseParameters, s: Sample, chains: Array, inverse: Array, bound: Array,
-) -> Any:
-    """Fill tables of [B]^-1 and of `condition_bound` from one of chains."""
-    rods = read_chains(chains, s)
-    rows = rows_of_chains(p.geometry, rods)
-    B_inverse = invert(p.geometry, eliminate(p.geometry, rows, rods), rods)
-    write_inverse(inverse, s, B_inverse)
-    found = condition_bound(B_inverse, rows, rods, p.platform_radius)
-    bound[s, 0] = found
-    return (found <= p.bound) & (B_inverse.determinant != 0.0)
