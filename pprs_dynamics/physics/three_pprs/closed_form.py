@@ -18,7 +18,6 @@ from pprs_dynamics.physics.three_pprs.closure import (
     Twist,
     Wrench,
     condition_bound,
-    eliminate,
     invert,
     rows_of_chains,
 )
@@ -80,7 +79,7 @@ def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, load: Array, pa
     m, geometry = motion_sample(motion, s), p.robot.geometry
     rods = chain_motions(geometry, m)
     rows = rows_of_chains(geometry, rods)
-    inverse = invert(geometry, eliminate(geometry, rows, rods), rods)
+    inverse = invert(geometry, rows, rods)
     at = s if len(load) > 1 else 0
     wrench = Wrench(vector(load, at, 0), vector(load, at, 3))
     bodies = body_forces(p.robot, m, rods, inverse, wrench, vector(load, at, 6), p.printed)
@@ -102,8 +101,8 @@ def forces_kernel(p: ForcesParameters, s: Sample, motion: Array, load: Array, pa
             _write(parts, HV, s, i, f.H, f.V)
             _write(parts, WH_STAR, s, i, f.W, f.H_star)
             _write(parts, VW_STAR, s, i, f.V_star, f.W_star)
-            _write_twist(parts, s, i, 1.0, inverse.columns.slides[i])
-            _write_twist(parts, s, CHAINS + i, c.sin_u, inverse.columns.lifts[i])
+            _write_twist(parts, s, i, 1.0, inverse.slides[i])
+            _write_twist(parts, s, CHAINS + i, c.sin_u, inverse.lifts[i])
     bound = condition_bound(inverse, rows, rods, p.platform_radius)
     return are_within_reach(rods, p.minimum_sine) & (bound <= p.bound)
 

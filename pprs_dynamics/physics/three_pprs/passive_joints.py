@@ -14,7 +14,6 @@ from pprs_dynamics.physics.mechanism.vectors import ChainVector, in_base, plus, 
 from pprs_dynamics.physics.three_pprs.chains import each_chain
 from pprs_dynamics.physics.three_pprs.closure import (
     DriveValues,
-    Inverse,
     Wrench,
     power,
     rod_row,
@@ -96,7 +95,7 @@ def chain_resistances(
 
 
 def friction_forces(
-    geometry: GeometryParameters, rods: ThreeChains, inverse: Inverse, k: Any, printed: Any,
+    geometry: GeometryParameters, rods: ThreeChains, inverse: DriveValues, k: Any, printed: Any,
 ) -> DriveValues:
     """Return the drive forces that overcome resistances k_ri, k_si of the chains: [J]^T w."""
     a, b, c = chain_resistances(geometry, rods, k, printed)
@@ -106,10 +105,10 @@ def friction_forces(
 
 
 @each_chain
-def _slide_forces(i: int, w: Wrench, inverse: Inverse) -> Any:
-    return power(w, inverse.columns.slides[i])                                 # Eq. (11)
+def _slide_forces(i: int, w: Wrench, inverse: DriveValues) -> Any:
+    return power(w, inverse.slides[i])                                 # Eq. (11)
 
 
 @each_chain
-def _lift_forces(i: int, w: Wrench, inverse: Inverse, rods: ThreeChains) -> Any:
-    return rods[i].sin_u * power(w, inverse.columns.lifts[i])                  # Eq. (11)
+def _lift_forces(i: int, w: Wrench, inverse: DriveValues, rods: ThreeChains) -> Any:
+    return rods[i].sin_u * power(w, inverse.lifts[i])                  # Eq. (11)

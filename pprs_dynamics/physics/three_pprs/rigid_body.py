@@ -30,7 +30,7 @@ from pprs_dynamics.physics.mechanism.vectors import (
 )
 from pprs_dynamics.physics.three_pprs.chains import CHAINS, each_chain
 from pprs_dynamics.physics.three_pprs.closure import (
-    Inverse,
+    DriveValues,
     Wrench,
     power,
     unit_wrench,
@@ -150,7 +150,7 @@ ThreeForces = tuple[ChainForces, ChainForces, ChainForces]
 
 
 def body_forces(
-    p: RobotParameters, m: MotionSample, rods: ThreeChains, inverse: Inverse, load: Wrench,
+    p: RobotParameters, m: MotionSample, rods: ThreeChains, inverse: DriveValues, load: Wrench,
     hinges: Any, printed: Any,
 ) -> ThreeForces:
     """Return frictionless forces in the chains: the paper's four steps."""
@@ -169,8 +169,8 @@ def body_forces(
 @each_chain
 def _forces_of_chains(
     i: int, p: RobotParameters, rods: ThreeChains, specific: Any, W: Any, left: Wrench,
-    inverse: Inverse, printed: Any,
+    inverse: DriveValues, printed: Any,
 ) -> ChainForces:
-    H, V = power(left, inverse.columns.slides[i]), power(left, inverse.columns.lifts[i])  # Eq. (6)
+    H, V = power(left, inverse.slides[i]), power(left, inverse.lifts[i])  # Eq. (6)
     return chain_forces(p.masses[i], p.geometry.l, in_chain(p.geometry.chains[i], p.gravity),
                         rods[i], specific[i], H, V, W[i], printed)
