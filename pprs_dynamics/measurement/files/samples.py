@@ -51,7 +51,6 @@ POLICY = {
     'duplicate_stamps': 'the first sample of each stamp is kept',
     'position_spike': 'those samples are dropped',
     'position_jump': 'the recording is split there',
-    'changing_rate': 'the recording is split there',
     'gap': 'the recording is split there',
     'lost_samples': 'they stay within one segment, to be interpolated',
     'irregular_steps': 'the stamps are taken as true',
