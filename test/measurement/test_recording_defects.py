@@ -31,7 +31,7 @@ from made_up_recordings import (
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MotionError
 from pprs_dynamics.measurement.files.defects import Judgement
-from pprs_dynamics.measurement.files.recording import Recording, describe, read_recording
+from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.samples import Samples
 
 

@@ -16,7 +16,7 @@ from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.table import CURRENT, EFFORT, POSITION, VELOCITY
-from pprs_dynamics.measurement.files.contents import Series
+from pprs_dynamics.measurement.files.samples import Series
 from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
 
 

@@ -30,7 +30,7 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import MissingLibraryError, UnreadableFileError
-from pprs_dynamics.measurement.files.samples import QUANTITIES, Progress, Samples
+from pprs_dynamics.measurement.files.samples import QUANTITIES, Progress, Samples, Series
 from pprs_dynamics.system.csv_tables import write_table
 from pprs_dynamics.system.numbers import parse_number
 from pprs_dynamics.system.plain_text import counted
@@ -137,7 +137,11 @@ class CsvTable:
         UnreadableFileError
             If a column is missing, a row has another count of cells, or a cell is no number.
         """
-        used = [self._place(column) for column in wanted]
+        used = [place for column in wanted if (place := self.place(column)) is not None]
+        if len(used) < len(wanted):
+            missing = next(column for column in wanted if self.place(column) is None)
+            raise UnreadableFileError(self.path, f'no column {missing}; it holds '
+                                      f'{counted(self.count, "column")}')
         dates = {k for k in used if k < len(self.sample) and self.sample[k].strip()
                  and not _is_number(self.sample[k], self.decimal) and _is_date(self.sample[k])}
         size, is_packed = self.path.stat().st_size, self.path.suffix in ('.gz', *ZSTANDARD)
@@ -156,8 +160,8 @@ class CsvTable:
             raise UnreadableFileError(self.path, 'no samples below the header')
         return list(np.concatenate(blocks).T)
 
-    def head(self, most: int) -> list[Array]:
-        """Return the first rows of all columns, NaN for what is no number; broken rows left out."""
+    def series(self, most: int) -> Iterator[Series]:
+        """Yield the first numbers of all columns, NaN for what is none; broken rows left out."""
         found: list[list[float]] = []
         with _text_of(self.path) as (file, _):
             for _ in range(self.above):
@@ -168,7 +172,10 @@ class CsvTable:
                     found.append([self._any(cell) for cell in cells])
         if not found:
             raise UnreadableFileError(self.path, 'no samples below the header')
-        return list(np.array(found).T)
+        for k, values in enumerate(np.array(found).T):
+            if np.isfinite(values).any():
+                name = self.names[k] if self.names else ''
+                yield Series(name or k + 1, name, values)
 
     def _any(self, cell: str) -> float:
         try:
@@ -177,13 +184,11 @@ class CsvTable:
         except ValueError:
             return float('nan')
 
-    def _place(self, column: Column) -> int:
+    def place(self, column: Column) -> int | None:
+        """Return the place of a column from 0; None where there is none."""
         if isinstance(column, int):
-            if column > self.count:
-                raise UnreadableFileError(self.path, f'no column {column}; it holds '
-                                          f'{counted(self.count, "column")}')
-            return column - 1
-        return self.names.index(column)
+            return column - 1 if column <= self.count else None
+        return self.names.index(column) if column in self.names else None
 
     def title(self, place: int) -> str:
         """Return what a column is called."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import CHANNELS, DriveUnits
+from pprs_dynamics.drives import CHANNELS, Column, DriveUnits
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -189,6 +189,25 @@ class Samples:
     def unit_of(self, drive: int, unit: str) -> str:
         """Return the unit of a drive's quantity; see `DriveUnits.of`."""
         return self.units[drive].of(unit) if self.units else unit
+
+
+@dataclass(frozen=True)
+class Series:
+    """One column of a table, or one element of messages that are arrays.
+
+    Parameters
+    ----------
+    column : str or int
+        As a model file names it.
+    title : str
+        What it is called, for people; empty where it has no name.
+    values : (n,) array
+        Its first numbers.
+    """
+
+    column: Column
+    title: str
+    values: Array
 
 
 def whole_epoch(seconds: Array) -> int:

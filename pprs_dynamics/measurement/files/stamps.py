@@ -113,14 +113,14 @@ def gaps(time: Array, part: slice) -> tuple[Indices, Indices, int]:
     if is_irregular:  # steps that vary much are no gaps
         longest = max(longest, JITTER_STEPS * usual)
     gap = steps > longest * (1 + STAMP_ROUNDING)
-    off = np.abs(steps / step - np.rint(steps / step))
-    is_irregular |= bool(np.quantile(off, USUAL) > WHOLE)
+    # Damaged stamps may be as far off as numbers reach.
+    counts = np.minimum(steps, MOST_LOST * step) / step
+    is_irregular |= bool(np.quantile(np.abs(counts - np.rint(counts)), USUAL) > WHOLE)
     padded = np.concatenate(([step], steps, [step]))
     not_made_up = np.minimum(padded[:-2], padded[2:]) + steps > (LOST_STEPS + 1) * step
     lost = (steps > LOST_STEPS * step) & not_made_up & ~gap & (not is_irregular)
-    # Damaged stamps may be as far off as numbers reach.
-    count = int(np.sum(np.rint(np.minimum(steps[lost], MOST_LOST * step) / step) - 1))
-    return part.start + 1 + np.flatnonzero(gap), part.start + 1 + np.flatnonzero(lost), count
+    return (part.start + 1 + np.flatnonzero(gap), part.start + 1 + np.flatnonzero(lost),
+            int(np.sum(np.rint(counts[lost]) - 1)))
 
 
 def spread(time: Array, part: slice) -> tuple[float, float, float]:
