@@ -21,8 +21,8 @@ from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import MissingLibraryError, PprsError, UnreadableFileError
 from pprs_dynamics.measurement.files.samples import Progress, Series
 
-KINDS = {'.parquet': 'Parquet', '.pq': 'Parquet', '.mat': 'MAT', '.npz': 'NumPy', '.json': 'JSON',
-         '.jsonl': 'JSON', '.ndjson': 'JSON'}
+KINDS = {'.parquet': 'Parquet', '.pq': 'Parquet', '.mat': 'MAT', '.npz': 'NumPy', '.npy': 'NumPy',
+         '.json': 'JSON', '.jsonl': 'JSON', '.ndjson': 'JSON'}
 BYTES_PER_CHARACTER = 8  # of JSON in memory
 INFO = Path('meta') / 'info.json'  # of a LeRobot dataset
 DEEPEST = 6  # structures within structures of a MAT file
@@ -30,6 +30,7 @@ LARGEST = 2_000_000_000  # bytes of a file's arrays in memory: 1 000 Hz of 7 joi
 WIDEST = 64  # elements of a list that may be joints
 ELEMENT = re.compile(r'(.+)\[(\d+)\]')
 MOST = 12  # names that are listed
+MATRIX = 'array'  # what a NumPy file of one array calls it
 
 
 @dataclass(frozen=True)
@@ -127,9 +128,8 @@ class ArrayTable:
             elif values.ndim == 2 and values.shape[1] <= WIDEST:
                 labels = self.labels.get(name, ())
                 for k, column in enumerate(values.T):
-                    is_labelled = len(labels) == values.shape[1]
-                    yield Series(f'{name}[{k}]', f'{name} {labels[k]}' if is_labelled else
-                                 f'{name}[{k}]', column)
+                    label = f' {labels[k]}' if len(labels) == values.shape[1] else f'[{k}]'
+                    yield Series(f'{name}[{k}]', '' if name == MATRIX else f'{name}{label}', column)
 
 
 def is_lerobot(path: Path) -> bool:
@@ -274,6 +274,9 @@ def _fields(content: Mapping[str, Any], before: str = '', depth: int = 0,
 
 
 def _numpy(path: Path) -> dict[str, Any]:
+    if path.suffix == '.npy':
+        require_size(path, path.stat().st_size)
+        return {MATRIX: np.load(path, allow_pickle=False)}
     with ZipFile(path) as archive:
         require_size(path, sum(one.file_size for one in archive.infolist()))
     with np.load(path, allow_pickle=False) as content:

@@ -68,9 +68,9 @@ def look_into(path: Path) -> Contents:
             raise
         raise UnreadableFileError(path, error.strerror or str(error)) from None
     table = open_table(path)
-    if isinstance(table, CsvTable) and table.separator == ';' and any(
-            ',' in cell for cell in table.sample) and not any('.' in cell for cell in table.sample):
-        table = CsvTable.open(path, ',')
+    if isinstance(table, CsvTable) and not table.is_numeric:
+        with_commas = CsvTable.open(path, ',')
+        table = with_commas if with_commas.is_numeric else table
     return Contents(series=tuple(table.series(ROWS)), decimal=table.decimal,
                     has_header=bool(table.names))
 

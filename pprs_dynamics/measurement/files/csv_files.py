@@ -15,6 +15,7 @@ import gzip
 import os
 import re
 import zlib
+from codecs import getincrementaldecoder
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -43,7 +44,9 @@ LARGEST_UNPACKED = 2_000_000_000  # bytes
 BLOCK = 4 << 20  # characters read at a time
 NO_NUMBERS = ['', 'nan', 'NaN', 'NAN']
 PREAMBLE = 20  # lines that may stand above a table
-NO_TEXT = 'neither rosbag2 (MCAP, sqlite3) nor CSV text in UTF-8'
+NO_TEXT = 'neither rosbag2 (MCAP, sqlite3) nor CSV text'
+CONTROLS = re.compile(rb'[\x00-\x08\x0e-\x1f]')  # in no text
+BEGINNING = 1 << 16  # bytes by which the encoding is recognised
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,8 @@ class CsvTable:
         Lines above the first row.
     sample : list of str
         Cells of the first row; empty where there is none.
+    heads : frozenset of str
+        Lines of the header, which may come again where logs were joined.
     """
 
     path: Path
@@ -73,6 +78,7 @@ class CsvTable:
     count: int
     above: int
     sample: list[str]
+    heads: frozenset[str] = frozenset()
 
     @classmethod
     def open(cls, path: Path, decimal: str = '.', likely: Sequence[str] = ()) -> CsvTable:
@@ -92,8 +98,6 @@ class CsvTable:
             lines = list(islice(file, PREAMBLE))
         if not lines:
             raise UnreadableFileError(path, 'the file is empty')
-        if '\x00' in lines[0]:
-            raise UnreadableFileError(path, NO_TEXT)
         tables = [cls._with(path, lines, separator, decimal)
                   for separator in (*SEPARATORS, BLANK) if separator != decimal]
         most = max(table.count for table in tables[:-1])
@@ -127,7 +131,13 @@ class CsvTable:
         count = len(sample if sample and is_row(first) else rows[remarks])
         titles = [row for row in rows[max(first - 2, 0):first] if len(row) == count and any(row)]
         names = [' '.join(filter(None, cells)) for cells in zip(*titles, strict=True)]
-        return cls(path, separator, decimal, names, count, first, sample)
+        heads = frozenset(lines[max(first - 2, 0):first]) if names else frozenset()
+        return cls(path, separator, decimal, names, count, first, sample, heads)
+
+    @property
+    def is_numeric(self) -> bool:
+        """Whether the first row holds numbers and dates."""
+        return any(self.sample) and all(_is_value(cell, self.decimal) for cell in self.sample)
 
     def read(self, wanted: Sequence[Column], progress: Progress | None = None) -> list[Array]:
         """Return columns, (N,) each; times of ISO 8601 as seconds since 1970.
@@ -199,7 +209,8 @@ class CsvTable:
         """Return the used columns of lines, (n, columns used); blank lines are left out."""
         import pandas as pd  # takes a third of a second
 
-        numbered = [(number, line) for number, line in enumerate(lines, start) if line.strip()]
+        numbered = [(number, line) for number, line in enumerate(lines, start)
+                    if line.strip() and line not in self.heads]
         # pandas fills short rows, and takes a quote without its pair for the beginning of a cell.
         for number, line in numbered:
             count = (len(line.split()) if self.separator == BLANK else
@@ -296,7 +307,7 @@ def _text_of(path: Path) -> Iterator[tuple[TextIO, IO[bytes]]]:
     damages = (EOFError, zlib.error, *([zstd().ZstdError] if path.suffix in ZSTANDARD else []))
     try:
         with (path.open('rb') as raw, _unpacked(path, raw) as content,
-              TextIOWrapper(content, encoding='utf-8-sig') as file):
+              TextIOWrapper(content, encoding=_encoding(path, content)) as file):
             yield file, raw
     except UnreadableFileError:
         raise
@@ -306,6 +317,21 @@ def _text_of(path: Path) -> Iterator[tuple[TextIO, IO[bytes]]]:
         raise UnreadableFileError(path, NO_TEXT) from None
     except OSError as error:
         raise UnreadableFileError(path, error.strerror or str(error)) from None
+
+
+def _encoding(path: Path, content: IO[bytes]) -> str:
+    """Return how a text is encoded: UTF-8, UTF-16 with its mark, or as Windows does in Europe."""
+    start = content.read(BEGINNING)
+    content.seek(0)
+    if start.startswith((b'\xff\xfe', b'\xfe\xff')):
+        return 'utf-16'
+    if CONTROLS.search(start):
+        raise UnreadableFileError(path, NO_TEXT)
+    try:
+        getincrementaldecoder('utf-8')().decode(start)
+    except UnicodeDecodeError:
+        return 'cp1252'
+    return 'utf-8-sig'
 
 
 def _unpacked(path: Path, raw: IO[bytes]) -> IO[bytes]:

@@ -42,8 +42,8 @@ from pprs_dynamics.system.plain_text import counted
 # The second is what PlotJuggler writes.
 TIME_COLUMNS = ('time', '__time')
 # What other programs call it.
-TIME_LIKE = ('t', 'stamp', 'timestamp', 'times', 'seconds', 'sec', 'clock', 'rostime', 'date',
-             'datetime')
+TIME_LIKE = ('t', 'ts', 'stamp', 'stamps', 'timestamp', 'timestamps', 'times', 'seconds', 'sec',
+             'clock', 'rostime', 'date', 'datum', 'datetime', 'zeit', 'uhrzeit')
 # From here on a stamp counts no seconds since 1970, but a thousandth, a millionth, ... of them.
 LATEST_SECOND = 1e11
 PARTS = {3: 'milli', 6: 'micro', 9: 'nano'}
