@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.hidden.effort_noise import EffortNoise
 from benchmarks.hidden.recordings import (
     ROUNDS,
     driven,
@@ -39,15 +40,16 @@ from benchmarks.scores.cases import outcomes_of, read_outcomes, scoring_parser
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.experiments.fourier_path import FourierPath
-from pprs_dynamics.inference.experiments.motion_design import PlatformMotions, random_motions
+from pprs_dynamics.inference.experiments.motion_design import Motions
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import design_experiment
+from pprs_dynamics.inference.experiments.platform_series import platform_motion
 from pprs_dynamics.inference.experiments.question import Question, question_of
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 from pprs_dynamics.simulation.injection import CLIMATE, Choice, Injection, PlainRobot
-from pprs_dynamics.simulation.sensors import EffortNoise
+from pprs_dynamics.simulation.sensors import SensorSettings
 
 EFFECTS = ('external_wrench', 'base_tilt', 'payload_mass', 'payload_offset', 'link_mass',
            'effort_offset', 'drive_spring', 'effort_gain', 'homing_error', 'coulomb_friction',
@@ -56,7 +58,7 @@ EFFECTS = ('external_wrench', 'base_tilt', 'payload_mass', 'payload_offset', 'li
 RATE, TOLERANCE, NOISE, CORRELATION = 250.0, 0.04, 0.08, 0.81
 OLD, NEW = 10.0, 20.0  # [s]
 SCALES = (1.0, 0.35)  # of the effect as drawn, until it is ambiguous
-HEAVE, HEAVE_HARMONICS = 0.05, (1, 2, 3)  # [m]
+HEAVE, HEAVE_HARMONICS = 0.05, 3  # [m]
 
 
 class HiddenRobot:
@@ -85,7 +87,7 @@ class HiddenRobot:
         settings = noise_settings(CORRELATION, NOISE)
         noise = EffortNoise(settings, np.random.default_rng((self.seed, 4, run))).samples(
             len(motion))
-        return Recording.from_arrays(f'run {run}', run_along.time, settings.quantised(
+        return Recording.from_arrays(f'run {run}', run_along.time, SensorSettings().quantised(
             run_along.position), None, run_along.efforts + noise)
 
 
@@ -107,19 +109,19 @@ def times(duration: float) -> np.ndarray:
 
 def poor_motions(seed: int) -> dict[str, PlatformMotion]:
     """Return motions that tell little: up and down only, and slow and small."""
-    family = FourierPath.at_rest(OLD, np.tile(HEAVE_HARMONICS, (6, 1)), HOME)
-    parameters = np.zeros((6, family.size // 6))
-    parameters[2] = np.random.default_rng((seed, 5)).normal(size=family.size // 6)
+    parameters = np.zeros((6, JointSeries.size(HEAVE_HARMONICS)))
+    parameters[2] = np.random.default_rng((seed, 5)).normal(size=parameters.shape[1])
     parameters[2] *= HEAVE / np.abs(parameters[2]).max()
-    return {'heave': family.with_parameters(parameters.ravel()).motion(times(OLD)),
+    series = JointSeries(parameters, np.array((*HOME, 0.0, 0.0, 0.0)), OLD, HEAVE_HARMONICS)
+    return {'heave': platform_motion(series, times(OLD)),
             'slow': Excitation(duration=OLD, seed=seed, amplitude=0.025, tilt=0.05,
                                highest_frequency=0.25).motion(times(OLD))}
 
 
 def rivals_of(name: str, question: Question) -> list[str]:
     """Return what a question holds against an effect."""
-    return sorted({rival for contest in question.contests if name in contest.sides[0]
-                   for rival in contest.sides[1]})
+    return sorted({rival for contest in question.contests if name in contest.truth
+                   for rival in contest.rival})
 
 
 def ambiguous_start(name: str, seed: int) -> Start | None:
@@ -128,10 +130,11 @@ def ambiguous_start(name: str, seed: int) -> Start | None:
         for scale in SCALES:
             robot = HiddenRobot(name, seed, scale)
             old = robot.record(motion, 0)
-            question = question_of(robot.model, [old], lambda share: None)
+            question = question_of(robot.model, [old], Motions(robot.model, MotionLimits(), NEW),
+                                   lambda share: None)
             if rivals_of(name, question):
                 return Start(robot, how, motion, old, question)
-            if not question.subjects or question.kind == 'excite':
+            if not question.subjects or question.kind == 'commission':
                 break
     return None
 
@@ -154,11 +157,11 @@ def score(name: str, seed: int) -> dict[str, Any] | None:
     if start is None:
         return None
     robot, old, question = start.robot, start.recording, start.question
-    limits = MotionLimits(effort_reserve=4 * question.noise_floor)
+    motions = Motions(robot.model, MotionLimits(effort_reserve=4 * question.noise_floor), NEW)
     cpu, wall = time.process_time(), time.perf_counter()
-    experiment = design_experiment(question, limits, NEW, seed)
+    experiment = design_experiment(question, motions, seed)
     cost = {'design_cpu': time.process_time() - cpu, 'design_wall': time.perf_counter() - wall}
-    (random,) = random_motions(PlatformMotions(robot.model, limits, NEW), seed + 1000, 1)
+    (random,) = motions.drawn(seed + 1000, 1)
     result: dict[str, Any] = {
         'effect': name, 'seed': seed, 'scale': robot.scale, 'motion': start.how,
         'rivals': rivals_of(name, question),
@@ -169,7 +172,7 @@ def score(name: str, seed: int) -> dict[str, Any] | None:
         'largest_use': max(experiment.limits.values()), **cost}
     grid = times(NEW)
     result['designed'] = judged(robot, [old, robot.record(experiment.motion(grid), 1)])
-    result['random'] = judged(robot, [old, robot.record(random.motion(grid), 2)])
+    result['random'] = judged(robot, [old, robot.record(motions.sampled(random, grid), 2)])
     result['repeat'] = judged(robot, [old, *(robot.record(start.motion, run) for run in (3, 4))])
     return result
 

@@ -32,7 +32,6 @@ from pprs_dynamics.physics.effects.structure_effect import BodyEffect, PassiveJo
 from pprs_dynamics.physics.mechanism.evaluation import PLAIN, is_compiled
 from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.model.one_pass import forces_kernel
-from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
 
 ROUNDS = 25
 CALLS = 200  # of one sample, per round
@@ -100,7 +99,7 @@ def batches(
     found = _rounds({
         'model, with friction': lambda: model.drive_forces(PlatformMotion(*arrays)),
         **{peer.name: lambda peer=peer: peer.many(PlatformMotion(*arrays)) for peer in peers},
-        'forward kinematics': lambda: solve_forward_kinematics(model.robot.geometry, q),
+        'forward kinematics': lambda: model.robot.motion_of_drives(q, 0 * q, 0 * q),
     }, rounds)
     _print(f'batches of {BATCH}, per sample', found, 1e6 / BATCH)
     found = _rounds({'one core': on_one, 'two cores': on_threads}, rounds, time.perf_counter)

@@ -98,16 +98,6 @@ def test_the_command_writes_the_dictionary_and_prints_the_text(
     assert printed[:8] == [line.strip() for line in str(compared).splitlines()[:8]]
 
 
-def test_recordings_from_memory_and_from_files_are_one(
-    compared: ComparisonResult, folder: Path,
-) -> None:
-    model = DriveModel.load('config/paper.yaml')
-    again = compare(model, pprs_dynamics.read_recording(folder / 'run.csv'))
-    assert again.rms == pytest.approx(compared.rms, rel=1e-12)
-    assert 'RECORDING' in str(again)
-    assert str(folder / 'run.csv')[:40] in str(compared).replace('\n', '')
-
-
 def test_what_cannot_be_read_or_is_given_twice_is_refused(folder: Path) -> None:
     run = folder / 'run.csv'
     for given, validate in (([run, run], ()), ([run], [run])):

@@ -13,9 +13,6 @@ import numpy as np
 import pytest
 from pprs_command import pprs
 
-from pprs_dynamics.errors import UnreadableFileError
-from pprs_dynamics.system.output_files import write_text
-
 
 def png_size(file: Path) -> tuple[int, int]:
     header = file.read_bytes()[:24]
@@ -65,14 +62,3 @@ def test_the_curves_leave_a_gap_where_the_second_approach_is_not_defined(reprodu
     rms = [np.sqrt(np.mean(curves[f'{drive}Q'] ** 2)) for drive in (
         'slide_1', 'slide_2', 'slide_3', 'lift_1', 'lift_2', 'lift_3')]
     np.testing.assert_allclose(rms, [3.43, 3.93, 3.93, 13.41, 13.41, 13.41], atol=0.005)
-
-
-def test_a_file_that_cannot_be_written_leaves_the_old_one_whole(tmp_path: Path) -> None:
-    old = tmp_path / 'result.json'
-    write_text(old, 'old')
-    with pytest.raises(UnreadableFileError, match='cannot be written'):
-        write_text(tmp_path / 'result.json' / 'below', 'new')
-    with pytest.raises(UnicodeEncodeError):
-        write_text(old, 'new \ud800')
-    assert old.read_text() == 'old'
-    assert list(tmp_path.iterdir()) == [old]

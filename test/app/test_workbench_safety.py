@@ -5,23 +5,18 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
-import re
 import socket
 import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from ros_processes import executable
-from starlette.responses import PlainTextResponse
 from workbench_bench import write_hidden
 from workbench_server import Workbench, workbench
 
-from pprs_dynamics.app.workbench.server.access import AccessControl, Keys
 from pprs_dynamics.app.workbench.server.hub import MOST_UPLOADS
 from pprs_dynamics.app.workbench.server.offered import NotOfferedError, Offered
 
@@ -101,52 +96,6 @@ def test_another_page_may_neither_read_nor_change(bench: Workbench, origin: str)
         assert bench.send('POST', '/api/tick', body, **headers).status == 403
     assert bench.send('GET', '/api/screen', Origin=name).status == 403
     assert bench.screen()['revision'] == before
-
-
-# Each is the right request but for one thing, which one layer alone can refuse.
-LAYERS = {
-    'nothing': ('POST', {}, 200), 'nothing of a read': ('GET', {'origin': None}, 200),
-    'host': ('POST', {'host': 'evil.example:8000'}, 421),
-    'two hosts': ('POST', {'host': ['127.0.0.1:8000', 'evil.example']}, 421),
-    'no host': ('POST', {'host': None}, 421),
-    'origin': ('POST', {'origin': 'http://evil.example'}, 403),
-    'origin of a read': ('GET', {'origin': 'http://evil.example'}, 403),
-    'no origin': ('POST', {'origin': None}, 403),
-    'two origins': ('POST', {'origin': ['http://127.0.0.1:8000'] * 2}, 403),
-    'site': ('POST', {'sec-fetch-site': 'cross-site'}, 403),
-    'neighbour': ('GET', {'sec-fetch-site': 'same-site', 'origin': None}, 403),
-    'cookie': ('POST', {'cookie': 'pprs_workbench_8000=guess'}, 401),
-    'no cookie': ('POST', {'cookie': None}, 401),
-    'length': ('POST', {'content-length': '64001'}, 413),
-    'a length of many digits': ('POST', {'content-length': '9' * 5000}, 413),
-    'a length that is none': ('POST', {'content-length': '-1'}, 413)}
-
-
-@pytest.mark.parametrize('layer', LAYERS)
-def test_each_layer_refuses_by_itself(layer: str) -> None:
-    method, changed, status = LAYERS[layer]
-    keys = Keys('127.0.0.1', 8000)
-    cookie = keys.exchange(keys.address.rpartition('=')[2])
-    right = {'host': '127.0.0.1:8000', 'origin': 'http://127.0.0.1:8000',
-             'sec-fetch-site': 'same-origin', 'cookie': f'pprs_workbench_8000={cookie}',
-             'content-length': '2'}
-    sent: list[dict[str, Any]] = []
-
-    async def inside(scope: Any, receive: Any, send: Any) -> None:
-        await PlainTextResponse('reached')(scope, receive, send)
-
-    async def receive() -> dict[str, Any]:
-        return {'type': 'http.request', 'body': b'{}'}
-
-    async def send(message: dict[str, Any]) -> None:
-        sent.append(message)
-    headers = [(name.encode(), one.encode()) for name, value in {**right, **changed}.items()
-               for one in ([value] if isinstance(value, str) else value or [])]
-    scope = {'type': 'http', 'method': method, 'path': '/api/tick', 'query_string': b'',
-             'headers': headers, 'server': ('127.0.0.1', 8000), 'scheme': 'http'}
-    asyncio.run(AccessControl(inside, keys, {})(scope, receive, send))
-    assert sent[0]['status'] == status
-    assert (sent[1]['body'] == b'reached') is (status == 200)
 
 
 def test_a_change_says_where_it_comes_from_and_is_json(bench: Workbench) -> None:
@@ -271,15 +220,6 @@ def test_a_number_that_is_none_is_a_sentence(bench: Workbench, number: str) -> N
         assert answer.json['error']
 
 
-def test_an_upgrade_is_a_request_like_others(bench: Workbench) -> None:
-    upgrade = {'Upgrade': 'websocket', 'Connection': 'Upgrade', 'Sec_WebSocket_Version': '13',
-               'Sec_WebSocket_Key': 'dGhlIHNhbXBsZSBub25jZQ=='}
-    answer = bench.send('GET', '/api/events', cookie='a=b', **upgrade)
-    assert answer.status == 401
-    assert b'terminal' in answer.body
-    assert bench.send('GET', '/api/nothing', **upgrade).status == 404
-
-
 def test_a_second_browser_sees_the_same_session_and_cannot_corrupt_it(bench: Workbench) -> None:
     token = bench.post('/api/invite').json['address'].rpartition('=')[2]
     second = Workbench(bench.process, f'http://127.0.0.1:{bench.port}/?token={token}')
@@ -297,26 +237,6 @@ def test_a_second_browser_sees_the_same_session_and_cannot_corrupt_it(bench: Wor
     now = second.screen()['revision']
     assert second.post('/api/tick', effect='payload_mass', is_ticked=False,
                        revision=now).status == 200
-
-
-def test_changes_are_pushed(bench: Workbench) -> None:
-    with socket.create_connection(('127.0.0.1', bench.port), 30) as connection:
-        connection.sendall(f'GET /api/events HTTP/1.1\r\nHost: {bench.host}\r\n'
-                           f'Cookie: {bench.cookie}\r\n\r\n'.encode())
-        read, end = b'', time.monotonic() + 60.0
-
-        def receive() -> bytes:
-            assert time.monotonic() < end
-            return connection.recv(4096)
-
-        while b'data: 0' not in read:
-            read += receive()
-        count = bench.settled()['version']
-        bench.post('/api/tick', effect='payload_mass', revision=bench.screen()['revision'])
-        while not any(int(number) > count for number in re.findall(rb'data: (\d+)\n', read)):
-            read += receive()
-    bench.post('/api/tick', effect='payload_mass', is_ticked=False,
-               revision=bench.screen()['revision'])
 
 
 def test_nobody_else_on_the_network_is_listened_to(bench: Workbench) -> None:

@@ -8,8 +8,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -26,7 +24,7 @@ from pprs_dynamics.app.workbench.errors import SessionError, StaleError
 from pprs_dynamics.app.workbench.jobs import run_in_process
 from pprs_dynamics.app.workbench.session_file import SavedSession
 from pprs_dynamics.app.workbench.view_state import EXACT, FITTED, LINEAR
-from pprs_dynamics.errors import ModelError, PprsError, UnreadableFileError
+from pprs_dynamics.errors import ModelError, PprsError
 from pprs_dynamics.physics.model.ledger import read_steps
 from pprs_dynamics.system.worker_process import EndedError
 
@@ -199,30 +197,6 @@ def test_an_effect_is_adopted_refused_exported_and_taken_back(tmp_path: Path) ->
     assert dict(session.ticks.model.values) == given
 
 
-def test_a_recording_may_be_given_once(recording: Path, tmp_path: Path) -> None:
-    (tmp_path / 'again.csv').write_bytes(recording.read_bytes())
-    with pytest.raises(UnreadableFileError, match='may be given once'):
-        Session.open([recording, tmp_path / 'again.csv'])
-
-
-def test_a_job_is_cancelled_at_its_next_report() -> None:
-    shares = []
-
-    def work(report: Any) -> None:
-        for k in range(10_000_000):
-            report(k / 10_000_000)
-            shares.append(k)
-            if k == 3:
-                job.cancel()
-    job: Job[None] = Job('adopt', 'this', work)
-    job.start()
-    with pytest.raises(Cancelled):
-        job.result(10)
-    assert shares == [0, 1, 2, 3]
-    assert job.to_dict()['error'] == ''
-    assert not job.is_running
-
-
 def sleep(seconds: float, progress: Any) -> str:
     for _ in range(int(100 * seconds)):
         progress(0.5)
@@ -254,14 +228,6 @@ def test_work_apart_answers_fails_and_is_ended() -> None:
     with pytest.raises(Cancelled):
         job.result(20)
     assert time.monotonic() - began < 20
-
-
-def test_the_session_imports_neither_ros_nor_a_server() -> None:
-    code = ('import sys; from pprs_dynamics.app.workbench import Session; '
-            'print(" ".join({name.split(".")[0] for name in sys.modules}))')
-    loaded = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
-                            check=True, timeout=120).stdout.split()
-    assert not set(loaded) & {'rclpy', 'starlette', 'uvicorn', 'plotly', 'rich', 'matplotlib'}
 
 
 def ticked(session: Session) -> dict[str, Any]:

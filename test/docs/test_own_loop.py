@@ -47,14 +47,3 @@ def test_single_samples_with_a_state_are_the_samples_of_one_call(
         name: np.concatenate([getattr(motion, name) for motion in motions])
         for name in (*names, 'time')})
     np.testing.assert_allclose(np.array(sent), model.drive_forces(whole).total, atol=1e-9)
-
-
-def test_a_memory_goes_on_from_call_to_call(script: ModuleType) -> None:
-    model = DriveModel.from_parameters({
-        **DriveModel.load('config/paper.yaml').values, 'effects.active': ['hysteresis'],
-        'effects.hysteresis.lift_1.force': 0.5, 'effects.hysteresis.lift_1.distance': 1e-3})
-    motions = [script.one_sample(model, k / RATE) for k in range(20)]
-    state = model.initial_state()
-    on = [model.drive_forces(one, state=state).total[0] for one in motions]
-    afresh = [model.drive_forces(one).total[0] for one in motions]
-    assert np.abs(np.array(on) - np.array(afresh)).max() > 1e-3

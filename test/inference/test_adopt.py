@@ -12,9 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from node_bench import bench
 from pprs_command import pprs
-from ros_processes import environment, executable, node_process
 
 from benchmarks.scores import adoption
 from pprs_dynamics import DriveModel, PlatformMotion
@@ -189,41 +187,6 @@ def test_friction_that_would_push_is_refused_and_less_friction_is_not() -> None:
     answer = adopt(model, EffectRequest.of('load_friction'), [recording])
     assert answer.adopted, answer.reason
     assert answer.parameters['lift_1.coefficient'].value == pytest.approx(-0.1, rel=0.05)
-
-
-@pytest.mark.parametrize('damage', ['cut', 'ledger'])
-def test_a_damaged_model_file_is_left_alone(files: Files, tmp_path: Path, damage: str) -> None:
-    model = tmp_path / 'model.yaml'
-    text = files.new.read_text()
-    model.write_bytes({
-        'cut': text[:text.index('effect: coulomb') + 3].encode(),
-        'ledger': text.replace('forced: false', 'forced: perhaps', 1).encode()}[damage])
-    content = model.read_bytes()
-    commands = [['history', str(model), '--undo', '--output', str(tmp_path / 'new.yaml')]]
-    if damage == 'cut':
-        commands.append(['adopt', HIDDEN, str(files.first), '--model', str(model), '--output',
-                         str(tmp_path / 'new.yaml')])
-    for command in commands:
-        done = pprs(*command)
-        assert done.returncode == 2
-        assert str(model) in done.stderr or 'history.step_01' in done.stderr
-        assert 'Traceback' not in done.stderr
-    assert model.read_bytes() == content
-    assert list(tmp_path.iterdir()) == [model]
-
-
-@pytest.mark.nodes
-def test_the_node_starts_with_the_written_file(
-    files: Files, ros_domain: int, tmp_path: Path,
-) -> None:
-    with bench() as running, node_process(
-            [executable('feedforward'), '--ros-args', '--params-file', str(files.new)],
-            ros_domain, tmp_path / 'log', environment(ros_domain)) as process:
-        part = f'/feedforward/effort/{HIDDEN}'
-        assert running.spin_until(lambda: part in {
-            name for name, _ in running.probe.get_topic_names_and_types()}, 90), (
-                tmp_path / 'log').read_text()
-        assert process.poll() is None
 
 
 def test_a_recording_in_pieces_has_a_fingerprint_of_its_own(tmp_path: Path) -> None:

@@ -16,9 +16,10 @@ import pytest
 from pprs_dynamics import DriveModel, JointMotion
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
-from pprs_dynamics.inference.experiments.arm_excitation import ArmInformation, excite_arm
-from pprs_dynamics.inference.experiments.motion_design import ArmMotions, random_motions
+from pprs_dynamics.inference.experiments.arm_information import ArmInformation
+from pprs_dynamics.inference.experiments.motion_design import Motions, design
 from pprs_dynamics.inference.experiments.motion_limits import ArmLimits
+from pprs_dynamics.inference.experiments.next_experiment import commission_arm
 from pprs_dynamics.measurement.files.recording import read_recording, write_recording
 from pprs_dynamics.physics.model.model_writer import write_model
 
@@ -34,7 +35,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> DriveModel:
 
 @pytest.fixture(scope='module')
 def found(model: DriveModel):
-    return excite_arm(model, ArmLimits(), DURATION, seed=1)
+    return commission_arm(Motions(model, ArmLimits(), DURATION, (8,)), seed=1)
 
 
 def test_it_keeps_the_limits_with_their_margin(model: DriveModel, found) -> None:
@@ -57,11 +58,15 @@ def test_it_is_a_motion_from_rest_to_rest(found) -> None:
         assert np.gradient(before, time, axis=0)[1:-1] == pytest.approx(after[1:-1], abs=2e-3)
 
 
-def test_it_tells_more_than_motions_drawn_at_random(model: DriveModel, found) -> None:
-    motions = ArmMotions(model, ArmLimits(), DURATION, (8,), 1.0)
-    known, drawn = ArmInformation(motions), random_motions(motions, 99, 20)
-    told = [np.sum(np.log1p(known.of(one))) for one in (found.series, *drawn)]
-    assert told[0] > max(told[1:])
+def test_a_design_tells_more_than_motions_drawn_at_random(model: DriveModel) -> None:
+    motions, known = Motions(model, ArmLimits(), DURATION, (8,)), ArmInformation(
+        model, ArmLimits())
+
+    def told(series) -> float:
+        return float(np.sum(np.log1p(known.of(series))))
+
+    found = design(motions, motions.drawn(1), told, 1)
+    assert told(found) > max(map(told, motions.drawn(99, 20)))
 
 
 def test_the_command_writes_what_a_controller_can_play(tmp_path: Path) -> None:

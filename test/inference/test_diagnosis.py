@@ -16,7 +16,7 @@ from pprs_dynamics import DriveModel, simulate
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.diagnosis.diagnose import diagnose
 from pprs_dynamics.inference.diagnosis.diagnosis import Diagnosis
-from pprs_dynamics.inference.experiments.fourier_path import FourierPath
+from pprs_dynamics.inference.experiments.platform_series import platform_motion
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.residuals.measuring import measure_residuals
@@ -24,6 +24,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect
 from pprs_dynamics.physics.effects.laws.time_delay import TimeDelay
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
+from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 
 MODEL = DriveModel.load()
@@ -152,42 +153,19 @@ def test_the_catalogues_own_form_is_found_with_its_values_and_to_the_noise() -> 
     assert rms < found.effects[0].error_before / 3
 
 
-OFFSETS = dict(zip(DRIVES, (0.44, -0.32, 0.89, -0.63, -0.88, -0.43), strict=True))
-WRENCH = {'force_x': 0.66, 'force_y': 0.78, 'force_z': 0.1,
-          'moment_x': -0.05, 'moment_y': 0.04, 'moment_z': 0.02}
-
-
 def test_a_tilted_base_is_no_friction_on_drives_that_stand() -> None:
     true = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['base_tilt'],
                         'effects.base_tilt.x': 0.045, 'effects.base_tilt.y': -0.048})
-    family = FourierPath.at_rest(TIME[-1], np.tile((1, 2, 3), (6, 1)), HOME)
-    up_and_down = np.zeros((6, family.size // 6))
+    up_and_down = np.zeros((6, JointSeries.size(3)))
     up_and_down[2] = 0.03, -0.02, 0.04
-    motion = family.with_parameters(up_and_down.ravel())
-    found = diagnose(MODEL, [record(true, 0.08, motion=motion)])
+    series = JointSeries(up_and_down, np.array((*HOME, 0.0, 0.0, 0.0)), TIME[-1], 3)
+    found = diagnose(MODEL, [record(true, 0.08,
+                                    motion=lambda time: platform_motion(series, time))])
     assert [one.name for one in found.effects] == ['base_tilt']
     assert found.effects[0].parameters['x'].value == pytest.approx(0.045, abs=5e-4)
     assert found.effects[0].parameters['y'].value == pytest.approx(-0.048, abs=5e-4)
     assert any('slide_1, slide_2 and slide_3 hardly moved' in one for one in found.warnings)
     assert not any('independent samples' in one for one in found.warnings)
-
-
-def test_a_wrench_is_found_with_its_moments_and_no_offsets() -> None:
-    true = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['external_wrench'], **{
-        f'effects.external_wrench.{key}': value for key, value in WRENCH.items()}})
-    found = diagnose(MODEL, [record(true, 0.08)])
-    assert [one.name for one in found.effects] == ['external_wrench']
-    for key, value in WRENCH.items():
-        one = found.effects[0].parameters[key]
-        assert abs(one.value - value) < 4 * one.std < 0.2
-
-
-def test_offsets_on_all_drives_are_offsets_and_no_springs() -> None:
-    true = DriveModel.from_parameters({**MODEL.values, 'effects.active': ['effort_offset'], **{
-        f'effects.effort_offset.{key}.force': value for key, value in OFFSETS.items()}})
-    found = diagnose(MODEL, [record(true, 0.08)])
-    assert [one.name for one in found.effects] == ['effort_offset']
-    assert found.effects[0].drives == DRIVES
 
 
 def test_friction_fades_from_the_start_of_the_recording_not_of_what_is_kept() -> None:
@@ -262,7 +240,7 @@ def test_the_width_of_reversals_is_that_of_all_friction_on_a_drive() -> None:
         'effects.active': ['stribeck_friction'],
         effect + 'force': 0.8, effect + 'velocity': 0.02, effect + 'exponent': 2.0})
     recording = record(true, noise=0.05)
-    other = record(true, noise=0.05, seed=1, motion=Excitation(seed=2))
+    other = record(true, noise=0.05, seed=1, motion=Excitation(seed=2).motion)
     found = diagnose(MODEL, [recording], [other])
     # The model that is judged on the other motion is the one that is adopted, with its widths.
     (effect_found,) = found.effects

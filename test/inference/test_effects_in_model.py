@@ -127,7 +127,7 @@ def test_what_adopt_wrote_holds_on_the_same_and_on_other_recordings(
         assert 0 < read.values[f'uncertainties.{name}.{key}'] < 0.1 * truth[key]
     old = DriveModel.from_parameters({key: value for key, value in read.values.items()
                        if not key.startswith('uncertainties.')})
-    other = record(with_effects(MODEL, true), NOISE, seed=1, motion=Excitation(seed=3))
+    other = record(with_effects(MODEL, true), NOISE, seed=1, motion=Excitation(seed=3).motion)
     for given in (read, old):
         for recording in (first, other):
             found = diagnose(given, [recording])

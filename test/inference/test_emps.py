@@ -10,7 +10,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from pprs_command import pprs
 
@@ -43,39 +42,9 @@ def result_of(folder: Path, *arguments: str) -> dict[str, object]:
     return found
 
 
-def test_the_published_procedure_gives_the_published_numbers() -> None:
-    assert DATA is not None
-    run = emps.read_emps(DATA / emps.IDENTIFICATION)
-    *numbers, offset = real_drive.fit_published(run)
-    *published, published_offset = real_drive.PUBLISHED.values()
-    np.testing.assert_allclose(numbers, published, rtol=0.005)
-    assert offset == pytest.approx(published_offset, rel=0.02)
-    parameters = np.array([*numbers, offset])
-    assert real_drive.published_error(run, parameters) == pytest.approx(4.1, abs=0.1)
-    pulses = emps.read_emps(DATA / emps.PULSES)
-    assert real_drive.published_error(pulses, parameters) == pytest.approx(5.98, abs=0.1)
-
-
-def test_friction_by_direction_lowers_the_error_on_both_runs_as_published() -> None:
-    assert DATA is not None
-    run, pulses = (emps.read_emps(DATA / name) for name in (emps.IDENTIFICATION, emps.PULSES))
-    wide = real_drive.fit_published(run, asymmetric=True)
-    np.testing.assert_allclose(wide[1:3], list(real_drive.PUBLISHED_ASYMMETRIC.values()),
-                               rtol=0.02)
-    assert real_drive.published_error(run, wide) <= 3.2
-    assert real_drive.published_error(pulses, wide) <= 5.4
-
-
 def test_compare_tells_the_published_error(folder: Path) -> None:
     found = result_of(folder, 'compare', 'DATA_EMPS.csv')
     assert found['overall']['relative'] == pytest.approx(0.041, abs=0.001)  # type: ignore[index]
-
-
-def test_pulses_are_no_part_of_the_force() -> None:
-    assert DATA is not None
-    pulses = emps.read_emps(DATA / emps.PULSES)
-    content = emps.loadmat(DATA / emps.PULSES)
-    np.testing.assert_allclose(pulses.effort, 35.1507 * content['vir'], rtol=1e-5)
 
 
 def test_the_loop_lowers_the_error_on_a_run_that_it_never_saw() -> None:

@@ -23,7 +23,6 @@ from pprs_dynamics.measurement.files.recording import Recording
 RATE, DURATION = 200.0, 8.0  # [Hz, s]
 NOISE = 0.1  # [N]
 LATER = 4321.0  # [s] on the recording's clock
-# In units of effort: all of them are multiplied where the unit of effort is another.
 EFFORTS = 20.0, 40.0, 6.0, -2.0
 HIDDEN = {
     'nothing': {}, 'coulomb_friction': {'force': 1.2}, 'viscous_friction': {'coefficient': 12.0},
@@ -32,8 +31,8 @@ HIDDEN = {
 EFFECTS = [name for name in HIDDEN if name != 'nothing']
 
 
-def axis_model(scale: float = 1.0) -> DriveModel:
-    return DriveModel.from_parameters(axis_values(*(scale * one for one in EFFORTS)))
+def axis_model() -> DriveModel:
+    return DriveModel.from_parameters(axis_values(*EFFORTS))
 
 
 @cache
@@ -110,11 +109,20 @@ def test_the_answer_does_not_depend_on_the_origin_of_time(name: str) -> None:
 
 
 @pytest.mark.parametrize('name', HIDDEN)
-def test_the_answer_does_not_depend_on_the_unit_of_effort(name: str) -> None:
-    run, scale = recorded(name, 1), 1e3  # mN
-    found = diagnose(axis_model(scale), [replace(run, effort=scale * run.effort)])
-    assert answer(found) == answer(diagnosed(name, 1))
-    assert found.noise_floor == pytest.approx(scale * diagnosed(name, 1).noise_floor, rel=1e-3)
+@pytest.mark.parametrize(('s', 'k'), [(1.0, 1e3), (5.0, 100.0)], ids=['mN', 'large'])
+def test_the_answer_does_not_depend_on_units_or_size(name: str, s: float, k: float) -> None:
+    """Lengths times s, times times sqrt(s), forces times k, so that gravity stays (Froude)."""
+    given = axis_model().values
+    powers = {'links.mass': k, 'friction.viscous': k / s ** 0.5, 'friction.coulomb': k,
+              'friction.offset': k, 'friction.reversal_velocity': s ** 0.5}
+    model = DriveModel.from_parameters({
+        **given, **{key: np.multiply(given[key], by).tolist() for key, by in powers.items()}})
+    run, usual = recorded(name, 1), diagnosed(name, 1)
+    found = diagnose(model, [Recording.from_arrays(
+        'scaled', s ** 0.5 * run.time, s * run.position, None, k * run.effort, (AXIS,))])
+    assert answer(found) == answer(usual)
+    if s == 1:  # else means over 10 ms hold another number of samples
+        assert found.noise_floor == pytest.approx(k * usual.noise_floor, rel=1e-3)
 
 
 @pytest.mark.parametrize('name', ['coulomb_friction', 'effort_offset', 'time_delay'])

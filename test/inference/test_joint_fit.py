@@ -5,11 +5,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from scipy.linalg import block_diag, cho_factor, cho_solve, toeplitz
+from scipy.linalg import block_diag
 
 from pprs_dynamics.inference.regression.base_columns import BaseColumn
 from pprs_dynamics.inference.regression.joint_fit import CERTAIN, JointFit, Regression
@@ -164,36 +162,6 @@ def test_a_constant_under_slow_noise_is_worth_little_and_under_white_noise_much(
         gains.append(regression.gain(fit, regression.block({0: np.ones((1, 4000))})))
     assert gains[0] > 1000
     assert gains[1] < 10
-
-
-@pytest.mark.parametrize('seed', range(2))
-def test_gains_are_those_of_the_dense_covariance_in_time(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    time = PERIOD * np.arange(1500)
-    slow, steps = np.zeros(len(time)), 0.2 * rng.normal(size=len(time))
-    for k in range(1, len(time)):
-        slow[k] = 0.97 * slow[k - 1] + steps[k]
-    noise = slow + rng.normal(size=len(time))
-    velocity = np.cos(0.8 * np.pi * time) + 0.5 * np.cos(1.86 * np.pi * time + 1)
-    # Of a straight line much leaks to high frequencies, so that it gains less than it should.
-    for column, nearness, lost in ((np.sin(40 * np.cumsum(velocity) * PERIOD), 0.01, 1.0),
-                                   (np.tanh(velocity / 0.05), 0.02, 1.5),
-                                   (velocity, 0.08, 2.0), (time - time.mean(), 0.7, 4.0)):
-        measured = (noise + 0.4 * column)[:, None]
-        regression = Regression(Residuals(
-            ('a',), time, np.zeros(len(time), dtype=int), measured, np.zeros_like(measured), {},
-            {}, PERIOD))
-        fit, block = regression.fit(()), regression.block({0: column[None]})
-        spectrum = replace(regression.noise(fit)[0], constant=None)
-        index = regression.series[0].index
-        whitener = cho_factor(toeplitz(spectrum.covariance(len(index), PERIOD)))
-        dense = cho_solve(whitener, column[index])
-        information, L = float(dense @ column[index]), float(block.precision[0, 0])
-        gain = float(dense @ measured[index, 0]) ** 2 / (information + L) - np.log(
-            (information + L) / L)
-        assert regression.own_information(fit, block)[0, 0] == pytest.approx(
-            information, rel=nearness)
-        assert -1.0 < gain - regression.gain(fit, block) < lost
 
 
 def test_too_short_a_recording_is_a_sentence() -> None:

@@ -5,30 +5,21 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from pprs_command import pprs
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.inference.experiments.columns import ColumnPlan, FittedTerm
 from pprs_dynamics.inference.experiments.criteria import (
     Contest,
-    Explanation,
     Information,
-    Precision,
     whitened,
 )
-from pprs_dynamics.inference.experiments.fourier_path import FourierPath
 from pprs_dynamics.inference.experiments.motion_design import (
+    Motions,
     NoMotionError,
-    PlatformMotions,
-    limits_of,
-    random_motions,
 )
 from pprs_dynamics.inference.experiments.motion_design import (
     design as design_motion,
@@ -38,7 +29,7 @@ from pprs_dynamics.inference.experiments.next_experiment import (
     PurposeError,
     next_experiment,
 )
-from pprs_dynamics.inference.experiments.question import commissioning
+from pprs_dynamics.inference.experiments.platform_series import platform_motion
 from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
     PresentCoefficient,
@@ -50,14 +41,14 @@ from pprs_dynamics.inference.regression.joint_fit import Regression
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.effects.catalogue import CATALOGUE
+from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
-from pprs_dynamics.physics.mechanism.motion_files import read_poses
 from pprs_dynamics.physics.model.parameter_file import default_parameters
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 
 DURATION = 8.0
-HARMONICS = np.array([[1, 2, 4], [1, 3, 5], [2, 3, 4], [1, 2, 3], [1, 4, 5], [2, 4, 5]])
-FAMILY = FourierPath.at_rest(DURATION, HARMONICS, (0.0, 0.0, 0.5))
+HARMONICS = 5
+MIDDLE = np.array((0.0, 0.0, 0.5, 0.0, 0.0, 0.0))
 TOLERANT = {'tolerances.masses.payload': 0.05, 'tolerances.friction.drives.coulomb': 0.1}
 
 
@@ -67,10 +58,11 @@ def model() -> DriveModel:
 
 
 @pytest.fixture(scope='module')
-def parameters() -> np.ndarray:
+def series() -> JointSeries:
     rng = np.random.default_rng(3)
-    sizes = np.repeat((0.03, 0.08), FAMILY.size // 2)
-    return sizes * rng.uniform(-1, 1, FAMILY.size)
+    sizes = np.repeat((0.03, 0.08), 3)[:, None] / 2
+    return JointSeries(sizes * rng.uniform(-1, 1, (6, JointSeries.size(HARMONICS))), MIDDLE,
+                       DURATION, HARMONICS)
 
 
 def recorded(model: DriveModel, motion: PlatformMotion, seed: int, noise: float) -> Recording:
@@ -83,9 +75,9 @@ def recorded(model: DriveModel, motion: PlatformMotion, seed: int, noise: float)
 
 # Paths.
 
-def test_a_path_starts_and_ends_at_rest_in_the_same_pose(parameters: np.ndarray) -> None:
-    ends = FAMILY.with_parameters(parameters).motion(np.array([0.0, DURATION]))
-    middle = FAMILY.with_parameters(parameters).motion(np.linspace(1.0, DURATION - 1.0, 50))
+def test_a_path_starts_and_ends_at_rest_in_the_same_pose(series: JointSeries) -> None:
+    ends = platform_motion(series, np.array([0.0, DURATION]))
+    middle = platform_motion(series, np.linspace(1.0, DURATION - 1.0, 50))
     assert np.allclose(ends.position, (0.0, 0.0, 0.5), atol=1e-12)
     assert np.allclose(np.abs(ends.orientation), (0.0, 0.0, 0.0, 1.0), atol=1e-12)
     for name in ('linear_velocity', 'angular_velocity', 'linear_acceleration',
@@ -94,9 +86,9 @@ def test_a_path_starts_and_ends_at_rest_in_the_same_pose(parameters: np.ndarray)
         assert np.abs(getattr(middle, name)).max() > 0.01
 
 
-def test_velocities_and_accelerations_are_those_of_the_poses(parameters: np.ndarray) -> None:
+def test_velocities_and_accelerations_are_those_of_the_poses(series: JointSeries) -> None:
     time = np.linspace(0.0, DURATION, 4001)
-    exact = FAMILY.with_parameters(parameters).motion(time)
+    exact = platform_motion(series, time)
     spline = PlatformMotion.from_poses(time, exact.position, exact.orientation)
     inside = slice(20, -20)  # a spline is poor at its ends
     for name, tolerance in (('linear_velocity', 1e-7), ('angular_velocity', 1e-5),
@@ -129,29 +121,30 @@ EFFECTS = {'effects.active': ['viscous_friction', 'stribeck_friction', 'payload_
 
 
 @pytest.fixture(scope='module')
-def design(model: DriveModel, parameters: np.ndarray) -> Design:
+def design(model: DriveModel, series: JointSeries) -> Design:
     """Columns on a recording of a robot that has effects already."""
     model = DriveModel.from_parameters({**model.values, **EFFECTS})
-    motion = FAMILY.with_parameters(parameters).motion(np.arange(0.0, DURATION, 0.002))
+    motion = platform_motion(series, np.arange(0.0, DURATION, 0.002))
     return Design.of(model, [recorded(model, motion, 0, 0.0)])
 
 
 def test_what_a_motion_would_tell_is_what_its_recording_tells(
-    design: Design, parameters: np.ndarray,
+    design: Design, series: JointSeries,
 ) -> None:
     """The columns on a motion nobody made agree with those of the diagnosis on its recording."""
-    path = FAMILY.with_parameters(parameters)
     regression = Regression(design.residuals, design.base)
     white = np.zeros((6, len(regression.noise_shapes.corners) + 1))
     white[:, 0] = 0.05 ** 2
     fit = regression.at((), white)
-    plan = ColumnPlan.of_design(design, TERMS)
+    motion = platform_motion(series, design.recordings[0].time)
+    plan = ColumnPlan.of(design.given, design.model, design.model.drive_forces(motion),
+                         motion.time, TERMS)
     information = Information(plan, regression.noise(fit))
     known = information.of_recordings(design, regression, fit) - information.prior()
     # Smoothing drops half a window at either end, and the transform a few samples more.
     time = design.recordings[0].time[:5 * len(regression.series[0])]
-    columns = plan.on_motion(plan.model.drive_forces(path.motion(time)), time, 5)
-    told = information.of_motion(columns, len(time) * 0.002)
+    planned = plan.on_motion(plan.model.drive_forces(platform_motion(series, time)), time, 5)
+    told = information.of_motion(planned, len(time) * 0.002)
     scale = np.sqrt(np.diag(known))
     assert np.diag(told) == pytest.approx(np.diag(known), rel=0.05)
     assert np.abs((told - known) / np.outer(scale, scale)).max() < 0.05
@@ -168,26 +161,13 @@ def test_white_noise_counts_samples() -> None:
 
 # Criteria.
 
-def _explained(name: str, index: tuple[int, ...], truth: list[float]) -> Explanation:
-    return Explanation((name,), (), index, index, np.array(truth))
-
-
 def test_misfit_is_what_least_squares_leaves() -> None:
     rng = np.random.default_rng(1)
     columns = rng.normal(size=(200, 5))
-    truth, rival = _explained('a', (2, 3), [1.0, -2.0]), _explained('b', (4,), [1.0])
     force = columns[:, [2, 3]] @ (1.0, -2.0)
     rest = force - columns[:, [0, 1, 4]] @ np.linalg.lstsq(columns[:, [0, 1, 4]], force)[0]
-    contest = Contest(truth, rival, (0, 1, 4))
+    contest = Contest(('a',), ('b',), np.array((0.0, 0.0, 1.0, -2.0, 0.0)), (0, 1, 4))
     assert contest.misfit(columns.T @ columns) == pytest.approx(rest @ rest, rel=1e-6)
-
-
-def test_precision_is_the_scatter_of_estimates() -> None:
-    rng = np.random.default_rng(2)
-    columns = rng.normal(size=(40, 3)) @ np.array([[1, 0.5, 0], [0, 1, 0.3], [0, 0, 1]])
-    covariance = np.linalg.inv(columns.T @ columns)
-    found = Precision((1, 2), (0,), np.array([0.1, 10.0])).deviations(columns.T @ columns)
-    assert found == pytest.approx(np.sqrt(np.diag(covariance))[1:], rel=1e-6)
 
 
 # Limits and search.
@@ -199,17 +179,17 @@ def test_a_design_keeps_tight_limits_and_repeats_with_its_seed(model: DriveModel
         **model.values, 'limits.lift_stroke': (0.12, 0.30),
         'limits.effort': (9.0,) * 3 + (18.0,) * 3, 'limits.condition_number': 2.2,
         'limits.rod_sine': 0.45})
-    motions = PlatformMotions(tight, MotionLimits(velocity=0.1, acceleration=0.5, tilt=0.1),
-                              DURATION)
+    motions = Motions(tight, MotionLimits(velocity=0.1, acceleration=0.5, tilt=0.1), DURATION)
 
-    def size(path: FourierPath) -> float:
-        return float(np.abs(path.parameters).sum())
+    def size(series: JointSeries) -> float:
+        return float(np.abs(series.coefficients).sum())
 
-    found = design_motion(motions, size, 1)
-    assert 0.8 < max(limits_of(motions, found).values()) <= 1.0
-    assert size(found) > max(map(size, random_motions(motions, 1, 40)))
+    drawn = motions.drawn(1)
+    found = design_motion(motions, drawn, size, 1)
+    assert 0.8 < max(motions.uses(found).values()) <= 1.0
+    assert size(found) > max(map(size, drawn))
     time = np.linspace(0, DURATION, 8001)
-    forces = tight.drive_forces(found.motion(time))
+    forces = motions.forces(found, time)
     assert np.abs(forces.mechanism.velocity).max() <= 0.09 + 1e-6
     assert np.abs(forces.mechanism.acceleration).max() <= 0.45 + 1e-5
     assert forces.mechanism.motion.tilt.max() <= 0.09 + 1e-6
@@ -218,16 +198,15 @@ def test_a_design_keeps_tight_limits_and_repeats_with_its_seed(model: DriveModel
     assert number.max() <= 0.9 * 2.2 + 1e-3
     assert np.abs(forces.mechanism.links.chains.sin_u).min() >= 0.5
     tight.limits.check_efforts(forces.total)
-    first, again, other = (random_motions(motions, seed, 1)[0] for seed in (1, 1, 2))
-    assert np.array_equal(first.parameters, again.parameters)
-    assert not np.array_equal(first.harmonics, other.harmonics)
+    first, again, other = (motions.drawn(seed, 1)[0].coefficients for seed in (1, 1, 2))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
 
 
 def test_no_room_is_said(model: DriveModel) -> None:
-    question = commissioning(replace(model, limits=model.limits.with_efforts(
-        (1.0,) * 6)), [], 0.05)
+    weak = replace(model, limits=model.limits.with_efforts((1.0,) * 6))
     with pytest.raises(NoMotionError, match=r'no motion is allowed.*effort of lift'):
-        PlatformMotions(question.model, MotionLimits(), DURATION)
+        Motions(weak, MotionLimits(), DURATION)
 
 
 def test_a_recording_is_needed_to_know_what_to_tell_apart(model: DriveModel) -> None:
@@ -236,31 +215,3 @@ def test_a_recording_is_needed_to_know_what_to_tell_apart(model: DriveModel) -> 
 
 
 # The command.
-
-@pytest.mark.slow
-def test_commission_writes_poses_json_and_page(tmp_path: Path) -> None:
-    done = pprs('next-experiment', '--purpose', 'commission', '--output', 'first.csv',
-                '--json', 'first.json', '--report', 'first.html', cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    motion = read_poses(tmp_path / 'first.csv', 100.0)
-    assert motion.time is not None
-    assert motion.time[-1] == pytest.approx(20.0)
-    assert motion.is_closed()
-    forces = DriveModel.load().drive_forces(motion)
-    assert np.abs(forces.mechanism.velocity).max() <= 0.45 + 1e-6
-    result = json.loads((tmp_path / 'first.json').read_text())
-    assert result['separates'] == []
-    assert result['question'] == 'commission'
-    assert max(result['limits'].values()) <= 1.0
-    assert {f'drive_inertia.{drive}.mass' for drive in DRIVES} <= {
-        one['label'] for one in result['accuracy']}
-    for one in result['accuracy']:
-        assert one['std_after'] <= (one['std_before'] or np.inf) * (1 + 1e-6)
-    known = {one['label']: one for one in result['accuracy']}
-    # Platform and payload weigh alike: their sum is told, their shares are not.
-    assert known['masses.payload']['std_after'] > 0.5 * known['masses.payload']['std_before']
-    assert known['masses.lifts[1]']['std_before'] == pytest.approx(0.5 * 0.1 / 2.5)
-    assert known['payload_mass.mass']['std_after'] < 0.1
-    page = (tmp_path / 'first.html').read_text()
-    assert 'The next experiment' in page
-    assert 'http' not in page.split('plotly')[0]

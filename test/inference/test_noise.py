@@ -12,11 +12,11 @@ import pytest
 from scipy.optimize import minimize
 from scipy.signal import lfilter
 
+from benchmarks.hidden.effort_noise import EffortNoise, NoiseSettings
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
 from pprs_dynamics.inference.residuals.noise import NoiseShapes, NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 PERIOD = 0.01
 
@@ -120,16 +120,6 @@ def test_a_constant_takes_no_part_in_the_fit() -> None:
     assert beside.deviance > without.deviance + 1000
 
 
-@pytest.mark.parametrize('phi', [0.0, 0.9, 0.97])
-def test_effective_samples_of_ar1_noise_follow_its_correlation(phi: float) -> None:
-    rng = np.random.default_rng(7)
-    found = []
-    for _ in range(3):
-        regression, fit = fitted(np.stack([ar1(phi, 8000, rng) for _ in range(3)], axis=1))
-        found += [one.effective_samples(8000) for one in regression.noise(fit).values()]
-    assert np.median(found) == pytest.approx(8000 * (1 - phi) / (1 + phi), rel=0.3)
-
-
 def test_covariance_and_rms_are_those_of_the_spectrum() -> None:
     noise = NoiseSpectrum(np.array([0.5, 4.0]), np.array([0.3, 40.0, 2.0]), PERIOD)
     frequency = (np.arange(200_000) + 0.5) / 200_000 * 0.5 / PERIOD
@@ -154,19 +144,6 @@ def test_a_regression_spends_leverage_and_does_not_hide_noise_by_it() -> None:
         found.append(regression.noise(fit)[0].rms)
     # Without leverage it would be sqrt(1 - 200 / 1000) = 0.89.
     assert np.mean(found) == pytest.approx(1.0, abs=0.03)
-
-
-def test_the_transform_keeps_squares_and_can_be_inverted() -> None:
-    rng = np.random.default_rng(9)
-    noise = rng.normal(size=(2000, 1))
-    series = DriveSeries(recording(noise), 0, FrequencyBands.of(20.0, PERIOD))
-    coefficients = series.transform(noise[:, 0])
-    assert coefficients @ coefficients == pytest.approx(series.error @ series.error)
-    np.testing.assert_allclose(series.inverse(coefficients), series.error, atol=1e-12)
-    a, b = rng.normal(size=(2, 3, len(series)))
-    np.testing.assert_allclose(series.products(a, b).sum(axis=0), a @ b.T, atol=1e-9)
-    assert series.sums(a).sum(axis=-1) == pytest.approx(a.sum(axis=-1))
-    assert series.counts.sum() == len(series)
 
 
 def with_rests(noise: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -222,16 +199,25 @@ def test_the_noise_is_that_of_the_samples_that_were_measured(every: int) -> None
 
 
 @pytest.mark.parametrize(('settings', 'most'), [
-    (SensorSettings(white_noise=0.08, coloured_noise=0.0), 0.0),
-    (SensorSettings(white_noise=0.04, coloured_noise=0.07, noise_correlation=0.999), 0.04),
-    (SensorSettings(white_noise=0.0, coloured_noise=0.0, pink_noise=0.08), 0.12)])
-def test_a_constant_of_noise_seldom_stands_out(settings: SensorSettings, most: float) -> None:
+    (NoiseSettings(white=0.08, coloured=0.0), 0.0),
+    (NoiseSettings(white=0.04, coloured=0.07, correlation=0.999), 0.04),
+    (NoiseSettings(white=0.0, coloured=0.0, pink=0.08), 0.12)])
+def test_a_constant_of_noise_seldom_stands_out(settings: NoiseSettings, most: float) -> None:
     beyond = []
     for seed in range(8):
         noise = EffortNoise(settings, np.random.default_rng((seed, 31))).samples(20_000)
         _, fit = fitted(noise.reshape(4000, 5, 6).mean(axis=1))
         beyond += list(fit.squares[:, 0] > 9 * fit.spectra[:, 0])
     assert np.mean(beyond) <= most
+
+
+def test_noise_of_the_benchmarks_has_the_stated_covariance() -> None:
+    lags = np.array([0, 1, 3, 10])
+    source = EffortNoise(NoiseSettings(0.05, 0.06, 0.8, pink=0.02), np.random.default_rng(5))
+    samples = source.samples(200_000)
+    samples -= samples.mean(axis=0)
+    found = [np.mean(samples[lag:] * samples[:len(samples) - lag]) for lag in lags]
+    np.testing.assert_allclose(found, source.autocovariance(lags), atol=2e-4)
 
 
 def test_a_drive_without_any_noise_has_finite_noise() -> None:

@@ -28,11 +28,7 @@ from pprs_dynamics.measurement.motion.drive_motion import smooth_drives
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
-from pprs_dynamics.physics.three_pprs.forward_motion import (
-    find_pose_jumps,
-    solve_forward_motion,
-)
+from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.physics.three_pprs.inverse_kinematics import solve_inverse_kinematics
 
 RATE, RESOLUTION, DURATION = 500.0, 1e-6, 8.0  # [Hz, m, s]
@@ -126,11 +122,11 @@ def test_platform_rates_are_differences_of_forward_kinematics(elbow):
     class Path:
 
         def motion(self, time):
-            found = solve_forward_kinematics(geometry, drives(time))
-            return PlatformMotion.at_rest(found.position, found.orientation)
+            q = drives(time)
+            return solve_forward_motion(geometry, q, 0 * q, 0 * q)
 
     expected = motion_from_poses(Path(), t)
-    found = solve_forward_motion(geometry, drives(t), drives(t, 1), drives(t, 2)).motion
+    found = solve_forward_motion(geometry, drives(t), drives(t, 1), drives(t, 2))
     # Poses are known to 1e-13; over h^2 = 1e-6 that is 1e-7. Truncation: h^4 of 5 rad/s.
     for name, tolerance in (('position', 1e-12), ('linear_velocity', 1e-9),
                             ('angular_velocity', 1e-8), ('linear_acceleration', 1e-6),
@@ -146,20 +142,6 @@ def test_drives_that_cannot_close_are_named_with_sample_and_time():
     with pytest.raises(ConvergenceError, match=r'at \d\.\d+ s no pose') as caught:
         reconstruct(MODEL, recording_of(real, position=encoder(q)))
     assert 2000 < caught.value.sample < len(q)
-
-
-def test_a_jump_of_the_pose_is_found_where_it_is_and_nowhere_else():
-    motion = motion_from_poses(Excitation(3.0), np.arange(0.2, 2.5, STEP))
-    assert not find_pose_jumps(motion).any()
-    moved = motion.position.copy()
-    moved[400:] += [0, 1e-3, 0]
-    turned = (Rotation.from_rotvec([0, 0, 0.01]) * Rotation.from_quat(
-        np.array(motion.orientation[700:]))).as_quat()
-    jumping = PlatformMotion(
-        moved, np.concatenate((motion.orientation[:700], turned)), motion.linear_velocity,
-        motion.angular_velocity, motion.linear_acceleration, motion.angular_acceleration,
-        motion.time)
-    assert np.flatnonzero(find_pose_jumps(jumping)).tolist() == [400, 700]
 
 
 # Differentiation -----------------------------------------------------------------------------
@@ -205,17 +187,6 @@ def test_reconstruction_alone_costs_less_than_5_mN_on_every_drive(motion):
     error = rms(force_error(recording_of(real)))
     print(f'{motion}: {1e3 * error.max():.2f} mN of {rms(real.force).min():.1f} N')
     assert np.all(error < FORCE_ERROR)
-
-
-def test_smoothed_motion_is_the_true_one():
-    real = truth(3.0, 0.03, 0.08)
-    found = reconstruct(MODEL, recording_of(real))
-    assert_allclose(found.position, real.drives.position[found.index], rtol=0, atol=1e-6)
-    # Friction turns over within 1 mm/s: a fiftieth of that does not move a reversal.
-    assert rms(found.velocity - real.drives.velocity[found.index]).max() < 2e-5
-    assert rms(found.acceleration - real.drives.acceleration[found.index]).max() < 3e-3
-    assert not found.near_branch.any()
-    assert not len(found.jumps)
 
 
 # Treatment -----------------------------------------------------------------------------------

@@ -31,7 +31,6 @@ from pprs_dynamics.inference.diagnosis.quantities import (
     with_uncertainty,
 )
 from pprs_dynamics.inference.diagnosis.sentences import word_diagnosis
-from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 
 
 def one_effect(**changes: Any) -> Diagnosis:
@@ -42,10 +41,6 @@ def ambiguous() -> Diagnosis:
     return made_up_diagnosis(
         'ambiguous', effects=(found_effect('base_tilt', None),),
         indistinguishable=(('base_tilt', 'external_wrench'),))
-
-
-def unknown() -> Diagnosis:
-    return made_up_diagnosis('unknown', depends_on=(statement(),))
 
 
 def everything() -> Diagnosis:
@@ -59,21 +54,6 @@ def everything() -> Diagnosis:
         calibrated=(calibration(),), warnings=('effort of slide_1 looks filtered',))
 
 
-def test_an_effect_is_told_with_drive_values_errors_and_its_card() -> None:
-    words = word_diagnosis(one_effect())
-    assert words.headline == ('The model lacks coulomb_friction on lift_2. With it the error falls '
-                              'from 0.25 N to 0.0502 N, which is the noise.')
-    finding = words.effects[0]
-    assert '(F) 0.600 ± 0.020 N' in finding.what
-    assert 'from 0.25 N to 0.051 N' in finding.why
-    assert 'Evidence 120' in finding.why
-    card = CATALOGUE['coulomb_friction'].card
-    assert finding.cause[1:-1] == card.causes[1:]
-    assert finding.confirm[1:-1] == card.confirm[1:]
-    assert words.command == ('pprs adopt coulomb_friction RECORDING --output '
-                             'with_coulomb_friction.yaml')
-
-
 def test_a_held_out_error_that_rises_stands_in_the_headline_and_forbids_adoption() -> None:
     worse = made_up_diagnosis('adequate', unconfirmed=(
         found_effect('hysteresis', held_out_after=0.3,
@@ -84,32 +64,6 @@ def test_a_held_out_error_that_rises_stands_in_the_headline_and_forbids_adoption
     assert not words.effects
     assert words.following.startswith('Do not add hysteresis')
     assert 'adopt' not in words.command
-
-
-def test_ambiguous_names_all_and_says_how_to_tell_them_apart() -> None:
-    words = word_diagnosis(ambiguous())
-    assert 'base_tilt or external_wrench (the data do not separate these)' in words.headline
-    assert 'from external_wrench' in words.effects[0].remarks[0]
-    assert words.command == 'pprs next-experiment RECORDING --output next.csv'
-
-
-def test_adequate_claims_no_more_than_the_noise_allows() -> None:
-    words = word_diagnosis(made_up_diagnosis('adequate'))
-    assert words.headline.startswith('No effect is missing: the error is the noise, 0.05 N rms.')
-    assert 'cannot be seen' in words.headline
-    assert words.effects == words.unexplained == ()
-
-
-def test_unknown_names_drive_variable_shape_and_share_and_nothing_of_the_catalogue() -> None:
-    words = word_diagnosis(unknown())
-    assert words.headline == ('An error remains that no effect of the catalogue explains: on '
-                              'slide_1, depending on position.')
-    finding = words.unexplained[0]
-    for part in ('slide_1', 'position', 'a shift within a range', '41%'):
-        assert part in finding.what
-    assert not any(name in finding.what for name in CATALOGUE)
-    assert finding.cause
-    assert finding.confirm
 
 
 @pytest.mark.parametrize(('value', 'std', 'unit', 'text'), [

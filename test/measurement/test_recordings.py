@@ -132,16 +132,6 @@ def test_a_csv_keeps_every_bit(tmp_path: Path, values: list[float], steps: float
                  'effort': effort})
 
 
-@pytest.mark.parametrize('suffix', SUFFIXES)
-def test_a_single_axis_is_read_by_its_own_drive(suffix: str, tmp_path: Path) -> None:
-    arrays = measured(200, ('axis',))
-    write_recording(tmp_path / f'x{suffix}', Recording.from_arrays('x', **arrays, drives=('axis',)))
-    recording = read_recording(tmp_path / f'x{suffix}', drives=('axis',))
-    assert_same(recording, arrays)
-    with pytest.raises(UnreadableFileError, match=r'slide_1.*axis'):
-        read_recording(tmp_path / f'x{suffix}')
-
-
 # ------------------------------------------------------------------------------------- bags
 
 

@@ -63,34 +63,8 @@ def test_recordings_of_a_robot_at_rest_are_alike_and_no_repeats() -> None:
     assert shared_samples(one, other) == 0
 
 
-REFUSED = {
-    ('compare', 'run.csv', 'copy.csv'): 'every recording may be given once',
-    ('diagnose', 'run.csv', '--validate', 'run.csv'): 'held out must be another recording',
-    ('adopt', 'viscous_friction', 'run.csv', '--validate', 'other.csv', '--validate', 'other.csv',
-     '--output', 'x.yaml'): 'held out must be another recording'}
-
-
-@pytest.mark.parametrize('arguments', REFUSED, ids=' '.join)
-def test_what_is_given_twice_is_refused(folder: Path, arguments: tuple[str, ...]) -> None:
-    done = pprs(*arguments, cwd=folder)
-    assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1
-    assert 'all of its 1000 samples are those of ' in done.stderr
-    assert REFUSED[arguments] in done.stderr
-
-
 def test_info_says_what_repeats(folder: Path) -> None:
     done = pprs('info', 'run.csv', 'same.db3', cwd=folder)
     assert done.returncode == 0
     assert ('! same.db3: all of its 1000 samples are those of run.csv, too'
             in ' '.join(done.stdout.split()))
-
-
-def test_what_is_read_is_never_written_over(folder: Path) -> None:
-    before = (folder / 'run.csv').read_bytes()
-    for arguments in (('next-experiment', 'run.csv', '--output', 'run.csv'),
-                      ('simulate', '--path', 'run.csv', '--output', 'run.csv')):
-        done = pprs(*arguments, cwd=folder)
-        assert done.returncode == 2
-        assert 'at once, must be another file' in done.stderr
-    assert (folder / 'run.csv').read_bytes() == before

@@ -213,17 +213,6 @@ def test_force_is_the_sum_of_coefficients_times_columns(effect):
     assert_allclose(effect({'axis': values}).force(axes)[:, 0], expected, rtol=1e-12, atol=1e-12)
 
 
-@every_effect
-def test_parameters_come_back_from_their_coefficients(effect):
-    rng = np.random.default_rng(65)
-    for _ in range(20):
-        values = random_values(effect, rng)
-        back = effect.from_coefficients(effect.to_coefficients(values))
-        assert set(back) == {p.name for p in effect.linear}
-        assert_allclose([back[name] for name in back], [values[name] for name in back],
-                        rtol=1e-12, atol=1e-14)
-
-
 @given(st.data())
 @every_effect
 def test_any_coefficients_fitted_make_an_allowed_effect_of_the_same_force(effect, data):

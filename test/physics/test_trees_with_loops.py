@@ -23,7 +23,6 @@ from pprs_dynamics.errors import PprsError, SingularityError, WorkspaceError
 from pprs_dynamics.physics.mechanism import tree_evaluation
 from pprs_dynamics.physics.mechanism.passive_joints import friction_rows
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.physics.mechanism.tree_tables import Data
 
 SAMPLES = 30
 ROBOTS = {'hexapod': robots.hexapod, 'delta': robots.delta, 'five_bar': robots.five_bar}
@@ -224,55 +223,6 @@ def test_a_loop_that_opens_in_motion_is_refused_although_it_closed_at_home(tmp_p
     tips = [end.p + end.R @ np.array([x, 0, 0])
             for end, x in zip(ends, (0.3, 0.2), strict=True)]
     assert tips[0] == pytest.approx(tips[1], abs=1e-9)
-
-
-def energy(model: DriveModel, moved: Data) -> np.ndarray:
-    """Return kinetic and potential energy from masses, centres and inertia alone, (N,) [J]."""
-    robot, total = model.robot, 0.0
-    for row, one in zip(robot.bodies, robot.inertial, strict=True):
-        mass, h = one[0], one[1:4]
-        xx, xy, yy, xz, yz, zz = one[4:]
-        I = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])  # noqa: E741
-        R, u = moved.R[:, row], moved.u[:, row]
-        w = np.einsum('nji,nj->ni', R, moved.w[:, row])
-        own = np.einsum('nji,nj->ni', R, u)
-        total = total + (0.5 * mass * np.sum(own ** 2, axis=1)
-                         + np.einsum('ni,ni->n', own, np.cross(w, h))
-                         + 0.5 * np.einsum('ni,ij,nj->n', w, I, w)
-                         - (mass * moved.p[:, row] + R @ h) @ np.array(robot.gravity))
-    return total
-
-
-@pytest.mark.parametrize('name', ['hexapod', 'delta'])
-def test_power_of_the_drives_is_energy_and_what_joints_rub(tmp_path: Path, name: str) -> None:
-    """The drives' power against friction is that of every joint at its own rate."""
-    text = ROBOTS[name]()
-    plain = DriveModel.load(text.write(tmp_path))
-    rubbing = {one: {'viscous': 0.2} for one in friction_rows(plain.robot.structure)}
-    model = DriveModel.load(text.write(tmp_path, {'joints': rubbing}))
-    home = plain.robot.structure.home[plain.robot.structure.tables.drives]
-    h = 1e-3
-    time = np.arange(-4, 5) * h
-    w = np.linspace(1.0, 2.0, len(home))
-    swing = SIZES[name][0] * np.sin(np.outer(time, w) + np.arange(len(home)))
-    rate = SIZES[name][0] * w * np.cos(np.outer(time, w) + np.arange(len(home)))
-    motion = JointMotion(home + swing, rate, -w ** 2 * swing)
-    m = plain.mechanism(motion).links.motion
-    stored = energy(plain, m)
-    weights = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280]) / h
-    forces = model.drive_forces(motion)
-    power = forces.parts['rigid_body'][4] @ motion.velocity[4]
-    assert power == pytest.approx(float(weights @ stored), abs=1e-8)
-    s, dissipated = plain.robot.structure, 0.0
-    for row, loop in friction_rows(s).values():
-        if row >= 0:
-            dissipated += 0.2 * (s.tables.ratio[row] * m.v[4, s.tables.coordinate[row]]) ** 2
-        else:
-            a, b = s.tables.loop_a[loop], s.tables.loop_b[loop]
-            dissipated += 0.2 * np.sum((m.w[4, b] - m.w[4, a]) ** 2)
-    assert forces.parts['passive_friction'][4] @ motion.velocity[4] == pytest.approx(
-        dissipated, abs=1e-8)
-    assert dissipated > 1e-4
 
 
 def broken(name: str, change: Callable[[robots.RobotText], None], tmp_path: Path) -> str:

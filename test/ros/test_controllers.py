@@ -62,18 +62,6 @@ def forwarded(
     return drives.message(request.start, conversions.PAPER)
 
 
-@pytest.mark.parametrize(('points', 'ahead', 'said'), [
-    (1, 0.0, 'ends in the past'), (2, 0.0, 'ends in the past'),
-    (1, 0.02, ''), (10, 0.0, ''), (10, 0.02, '')])
-def test_a_stream_is_taken_where_it_ends_after_its_arrival(
-    points: int, ahead: float, said: str,
-) -> None:
-    moving = replace(settings(), allow_nonzero_velocity_at_trajectory_end=True)
-    assert objection(forwarded(points, ahead, stop_time=0.0), moving, NOW + WAY) == said
-    # A last point at rest lies later still.
-    assert objection(forwarded(points, ahead), settings(), NOW + WAY) == ''
-
-
 @pytest.mark.parametrize('rate', [50.0, 1000.0])
 def test_a_stream_is_taken_with_reserve_by_the_defaults(rate: float) -> None:
     given = {one.name: one.default for one in play_trajectory.PARAMETERS}
@@ -89,12 +77,6 @@ def test_a_piece_in_motion_needs_an_end_at_rest() -> None:
     assert not settings().allow_nonzero_velocity_at_trajectory_end
     assert 'last point' in objection(forwarded(10, 0.02, stop_time=0.0), plain, NOW + WAY)
     assert objection(forwarded(10, 0.02), plain, NOW + WAY) == ''
-
-
-def test_efforts_need_the_effort_interface() -> None:
-    positions = ControllerSettings(DRIVES, ('position',),
-                                   allow_nonzero_velocity_at_trajectory_end=True)
-    assert 'effort' in objection(forwarded(10, 0.02), positions, NOW + WAY)
 
 
 ALONG = np.linspace(0.0, HelicalPath.duration, 48)  # [s] of a path from rest to rest
@@ -157,55 +139,6 @@ class TestTrajectoryProxy:
                 assert said in bench.status[-1]['message']
             assert taken == []
 
-    @pytest.mark.nodes
-    def test_a_controller_that_is_found_a_moment_later_gets_the_goal(self, action: Any) -> None:
-        from rclpy.action import ActionClient, ActionServer
-        from rclpy.parameter import Parameter
-
-        from pprs_dynamics.ros.trajectory_proxy import TrajectoryProxyNode
-
-        with bench() as running:
-            running.add(TrajectoryProxyNode, parameter_overrides=[
-                Parameter('demo', value=True),
-                Parameter('action', value='/arm/follow_joint_trajectory')])
-            client = ActionClient(running.probe, action,
-                                  '/trajectory_proxy/follow_joint_trajectory')
-            assert running.spin_until(client.server_is_ready)
-            sent = client.send_goal_async(resting_goal(action))
-            assert running.spin_until(sent.done)
-            result = sent.result().get_result_async()
-            running.spin_for(0.8)
-            assert not result.done()
-
-            held = running.listen(JointTrajectory, '/arm/joint_trajectory')
-            states = JointStates(running, resting_goal(action).trajectory.points[0].positions)
-
-            async def execute(handle: Any) -> Any:
-                await after(running, duration_of(handle.request.trajectory))
-                handle.succeed()
-                return action.Result()
-
-            running.spin_for(0.3)
-            server = ActionServer(running.probe, action, '/arm/follow_joint_trajectory', execute)
-            assert running.spin_until(result.done)
-            assert result.result().result.error_code == 0, result.result().result.error_string
-            running.spin_for(0.3)
-            # A controller that has just become active would go over to the hold, and call the
-            # goal reached; the goal brings its own gravity.
-            assert held == []
-            states.stop()
-            server.destroy()
-            client.destroy()
-
-    @pytest.mark.nodes
-    def test_a_goal_that_something_else_replaced_is_not_told_as_reached(self, action: Any) -> None:
-        with controller(action, share=0.5) as (bench, client, _):
-            publisher = bench.probe.create_publisher(JointTrajectory, '/arm/joint_trajectory', 1)
-            result = answered(bench, client, resting_goal(action, 2.0)).result
-            assert result.error_code == action.Result.PATH_TOLERANCE_VIOLATED
-            assert result.error_string.startswith('CONTROLLER: the controller reports the goal')
-            assert '/probe, /trajectory_proxy' in result.error_string
-            bench.probe.destroy_publisher(publisher)
 
     @pytest.mark.nodes
     @pytest.mark.parametrize('ending', ['abort', 'succeed'])
@@ -229,32 +162,6 @@ class TestTrajectoryProxy:
                     given.positions, expected.mechanism.position[0], atol=1e-9)
                 assert not any(given.velocities)
                 assert objection(message, settings(), NOW) == ''
-            states.stop()
-
-
-class TestFeedforwardOfAController:
-    """Where control_msgs is installed."""
-
-    @pytest.mark.nodes
-    def test_a_controller_that_drops_all_is_told(self) -> None:
-        pytest.importorskip('control_msgs.msg', reason='control_msgs comes with a ROS 2 '
-                            'installation only')
-        from feedforward_bench import feedforward_bench, message_of
-
-        path = HelicalPath()
-        here = DriveModel.load().drive_forces(path.motion([0.0]).held())
-        # Its joint_trajectory is feedforward's own, where the bench listens.
-        with feedforward_bench() as node:
-            states = JointStates(node.bench, here.mechanism.position[0], '/feedforward')
-            for k in range(400):
-                node.publisher.publish(message_of(path.motion(
-                    [0.5 + 0.01 * k, 0.51 + 0.01 * k])))
-                node.bench.spin_for(0.01)
-                if node.bench.status[-1]['code'] == 'CONTROLLER':
-                    break
-            said = node.wait_for_status(code='CONTROLLER', level='ERROR')['message']
-            assert 'does not follow' in said
-            assert 'trajectories end 10 ms after' in said or 'trajectories end 9 ms after' in said
             states.stop()
 
 

@@ -56,12 +56,6 @@ def test_a_clock_that_is_set_back_begins_a_new_stream() -> None:
     assert [one.stamp[0] for one in found] == [EPOCH - 3600 * SECOND]
 
 
-def test_never_takes_no_memory() -> None:
-    windows = StreamWindows(0.0, 10.0)
-    assert pushed(windows, 20.0, 20.0, EPOCH) == []
-    assert not windows._ring
-
-
 def test_the_process_answers_and_is_started_anew_where_it_was_killed() -> None:
     model = DriveModel.load()
     motion = Excitation(15.0, seed=1).motion(np.arange(0, 15.0, 0.01))

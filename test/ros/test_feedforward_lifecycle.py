@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import gc
 import signal
 import time
 from collections.abc import Iterator
@@ -13,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
+from feedforward_bench import EQUAL, FeedforwardBench, message_of, random_motion
 from lifecycle_msgs.msg import Transition
 from node_bench import bench, overrides
 from ros_processes import executable, node_process
@@ -22,7 +21,6 @@ from supervisor import Supervisor
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from pprs_dynamics import DriveModel, PlatformMotion
-from pprs_dynamics.ros.feedforward import FeedforwardNode
 
 pytestmark = pytest.mark.nodes
 
@@ -110,42 +108,3 @@ def test_a_signal_during_the_start_ends_it_too(ros_domain: int, tmp_path: Path) 
             process.send_signal(signal.SIGTERM)
             process.wait(10)
         assert 'Traceback' not in (tmp_path / 'log').read_text()
-
-
-def test_two_namespaces_do_not_disturb_each_other() -> None:
-    with bench() as running:
-        nodes = [running.add(
-            FeedforwardNode, namespace=name, parameter_overrides=overrides(
-                masses__payload=payload, command_timeout=0.0, max_age=0.0, **{
-                    f'qos_overrides./{name}/feedforward/trajectory.subscription.depth': 100}))
-            for name, payload in (('left', 0.5), ('right', 3.0))]
-        answers = [running.listen(Float64MultiArray, f'/{name}/feedforward/commands')
-                   for name in ('left', 'right')]
-        publishers = [running.probe.create_publisher(
-            MultiDOFJointTrajectory, f'/{name}/feedforward/trajectory', 100)
-            for name in ('left', 'right')]
-        assert running.spin_until(lambda: all(p.get_subscription_count() for p in publishers))
-        assert running.connected()
-        bad = message_of(MOTION)
-        bad.joint_names = ['gripper']
-        for _ in range(10):
-            publishers[0].publish(MESSAGE)
-            publishers[1].publish(bad)
-            publishers[1].publish(MESSAGE)
-        assert running.spin_until(lambda: all(len(answer) == 10 for answer in answers))
-        assert nodes[0]._counters['NAMES'] == 0
-        assert nodes[1]._counters['NAMES'] == 10
-        sums = [np.abs(answer[-1].data).sum() for answer in answers]
-        assert sums[0] < sums[1]
-
-
-def test_a_destroyed_node_leaves_the_graph_also_where_nothing_is_collected() -> None:
-    """Of objects that are frozen, as a node freezes its own, no circle is ever found."""
-    with bench() as watching:
-        with feedforward_bench() as node:
-            def is_seen() -> bool:
-                return 'feedforward' in watching.probe.get_node_names()
-            gc.freeze()
-            assert watching.spin_until(is_seen, 20)
-            assert node.bench.spin_until(lambda: node.bench.status)
-        assert watching.spin_until(lambda: not is_seen(), 20)

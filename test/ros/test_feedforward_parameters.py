@@ -18,7 +18,6 @@ from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
     SetParameters,
-    SetParametersAtomically,
 )
 from rclpy.parameter import Parameter
 from ros_processes import executable, node_process
@@ -53,13 +52,6 @@ class Caller:
         kind = Parameter.Type.STRING_ARRAY if name == 'effects.active' else None
         message = Parameter(name, kind, value).to_parameter_msg()
         return self.call(SetParameters, 'set_parameters', parameters=[message]).results[0]
-
-    def set_at_once(self, values: dict[str, Any]) -> SetParametersResult:
-        """Set all or none."""
-        return self.call(
-            SetParametersAtomically, 'set_parameters_atomically', parameters=[
-                Parameter(name, value=value).to_parameter_msg()
-                for name, value in values.items()]).result
 
 
 @pytest.fixture

@@ -188,17 +188,6 @@ def test_warnings_come_before_the_rejection() -> None:
         assert node.counters['SINGULAR'] == 1
 
 
-def test_late_messages_are_rejected_and_do_not_keep_alive() -> None:
-    with feedforward_bench(max_age=0.2, command_timeout=TIMEOUT) as node:
-        now = node.node.get_clock().now().nanoseconds
-        node.answer(message_of(MOTION, conversions.time(now)))
-        for _ in range(5):
-            node.send(message_of(MOTION, conversions.time(now - 10**9)))
-            node.bench.spin_for(TIMEOUT / 3)
-        assert node.counters['TIME'] == 5
-        assert node.counters['stale'] == 1
-
-
 def test_of_setpoints_that_wait_the_latest_are_executed_and_the_others_are_told() -> None:
     motion = random_motion(np.random.default_rng(2), 30)
     with feedforward_bench(lag_warning=0.02) as node:

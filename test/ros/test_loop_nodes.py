@@ -12,10 +12,8 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Duration
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of
-from node_bench import bench, overrides
 from rclpy.parameter import Parameter
 from scipy.spatial.transform import Rotation
-from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import (
     JointTrajectory,
     JointTrajectoryPoint,
@@ -25,8 +23,6 @@ from trajectory_msgs.msg import (
 from pprs_dynamics import DriveModel, JointMotion, PlatformMotion
 from pprs_dynamics.errors import WorkspaceError
 from pprs_dynamics.physics.model.parameter_file import find_file, read_parameters
-from pprs_dynamics.ros.messages import conversions
-from pprs_dynamics.ros.monitor import MonitorNode
 
 pytestmark = pytest.mark.nodes
 
@@ -111,31 +107,3 @@ def test_poses_of_the_tool_are_answered_or_refused_as_those_of_a_platform() -> N
         node.bench.spin_for(0.02)  # margins are computed 100 times a second
         node.send(message_of(PlatformMotion.at_rest(at_home, near)))
         assert node.wait_for_status(code='NEAR_SINGULAR')['singularity_margin'] < 0.99
-
-
-def test_the_platform_is_on_tf_while_somebody_draws_the_robot() -> None:
-    tf = pytest.importorskip('tf2_msgs.msg', reason='tf2_msgs comes with a ROS 2 installation only')
-    model, motion = DriveModel.load(FILE), poses(np.random.default_rng(5))
-    position = model.drive_forces(motion).mechanism.position[0]
-    with bench() as running:
-        running.add(MonitorNode, parameter_overrides=overrides(**parameters()))
-        heard = running.listen(tf.TFMessage, '/tf', 10)
-        running.listen(JointState, '/monitor/joint_states_full', 10)
-        states = running.probe.create_publisher(JointState, '/joint_states', 10)
-        assert running.connected()
-        message = conversions.joint_positions(1_000_000_000, model.drives, position)
-        message.effort = [float('nan')] * 6  # not measured
-
-        def drawn() -> bool:
-            states.publish(message)
-            running.spin_for(0.05)
-            return bool(heard)
-
-        assert running.spin_until(drawn)
-        found, = heard[0].transforms
-        assert (found.header.frame_id, found.child_frame_id) == ('base', 'platform')
-        assert found.header.stamp == message.header.stamp
-        at, turn = found.transform.translation, found.transform.rotation
-        np.testing.assert_allclose([at.x, at.y, at.z], motion.position[0], atol=1e-6)
-        told = np.array([turn.x, turn.y, turn.z, turn.w])
-        assert abs(told @ motion.orientation[0]) == pytest.approx(1.0, abs=1e-9)

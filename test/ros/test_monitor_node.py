@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lifecycle_msgs.msg import Transition
 from monitor_bench import RATE, START, MonitorBench
 from node_bench import bench
 from rclpy.parameter import Parameter
@@ -19,7 +18,6 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-from supervisor import Supervisor
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.drives import DRIVES
@@ -135,34 +133,6 @@ def test_all_joints_are_published_while_somebody_draws_them(monitor: MonitorBenc
     assert {'hinge_1', 'hinge_2', 'hinge_3', 'ball_1_x', *DRIVES} <= set(found)
     row = (stamps(joints)[-1] - START) * RATE // 1_000_000_000
     assert [found[drive] for drive in DRIVES] == pytest.approx(monitor.position[row])
-
-
-def test_a_supervisor_leads_it_through_its_states() -> None:
-    with bench() as running:
-        monitor, supervisor = MonitorBench(running, autostart=False), Supervisor(running, 'monitor')
-        assert supervisor.state() == 'unconfigured'
-        assert not running.probe.count_subscribers('/joint_states')
-        for _ in range(2):
-            assert supervisor.change(Transition.TRANSITION_CONFIGURE)
-            monitor.connect()
-            # Inactive, it takes nothing, and answers nothing of it later.
-            heard, monitor.node._counters['received'] = len(monitor.residual), 0
-            monitor.publisher.publish(JointState())
-            running.spin_for(0.2)
-            assert monitor.node._counters['received'] == 0
-            assert supervisor.change(Transition.TRANSITION_ACTIVATE)
-            assert running.spin_until(lambda: running.status[-1]['code'] == 'WAITING')
-            monitor.sent = 0
-            monitor.send(500)  # stamps of before: another stream
-            assert len(monitor.residual) > heard + 300
-            assert max(monitor.error[-1].data) < RECONSTRUCTION
-            assert supervisor.change(Transition.TRANSITION_DEACTIVATE)
-            assert running.spin_until(lambda: running.status[-1]['code'] == 'INACTIVE')
-            assert supervisor.change(Transition.TRANSITION_CLEANUP)
-            assert running.spin_until(
-                lambda: not monitor.publisher.get_subscription_count())
-        assert supervisor.change(Transition.TRANSITION_UNCONFIGURED_SHUTDOWN)
-        assert running.spin_until(lambda: running.status[-1]['code'] == 'FINALIZED')
 
 
 @pytest.mark.parametrize(('reliability', 'stamped', 'code'), [

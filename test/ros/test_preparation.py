@@ -16,12 +16,10 @@ from rcl_interfaces.srv import ListParameters
 from ros_processes import environment, executable, node_process
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import (
-    JointTrajectory,
-    JointTrajectoryPoint,
     MultiDOFJointTrajectory,
 )
 
-from pprs_dynamics import DriveModel, JointMotion
+from pprs_dynamics import DriveModel
 
 MOTION = random_motion(np.random.default_rng(8), 1)
 
@@ -53,38 +51,6 @@ def test_a_node_without_compiled_kernels_answers_messages_and_services(
         # Stopped in the middle of it, it ends as ever.
         cache = tmp_path / 'cache'
         assert running.spin_until(lambda: cache.is_dir() and os.listdir(cache), 30)
-        process.terminate()
-        assert process.wait(10) == 0
-    assert 'Traceback' not in log.read_text()
-
-
-@pytest.mark.nodes
-@pytest.mark.slow
-def test_a_robot_with_loops_is_answered_at_once_and_compiled_beside(
-    ros_domain: int, tmp_path: Path,
-) -> None:
-    pytest.importorskip('numba')
-    log, model = tmp_path / 'log', DriveModel.load('config/hexapod.yaml')
-    cold = {**environment(ros_domain), 'NUMBA_CACHE_DIR': str(tmp_path / 'cache'),
-            'PPRS_DYNAMICS_PLAIN': '0'}
-    command = [executable('feedforward'), '--ros-args', '--params-file', model.source, '-p',
-               'max_age:=0.0', '-p', 'command_timeout:=0.0']
-    home = model.robot.structure.home[model.robot.structure.tables.drives]
-    asked = JointTrajectory(joint_names=list(model.drives), points=[JointTrajectoryPoint(
-        positions=(home + 0.01).tolist(), velocities=[0.0] * 6, accelerations=[0.0] * 6)])
-    rest = np.zeros((1, 6))
-    expected = model.drive_forces(JointMotion(home[None] + 0.01, rest, rest)).total[0]
-    with bench() as running, node_process(command, ros_domain, log, cold) as process:
-        commands = running.listen(Float64MultiArray, '/feedforward/commands')
-        running.follow_status('/feedforward/status')
-        publisher = running.probe.create_publisher(
-            JointTrajectory, '/feedforward/trajectory', 100)
-        assert running.spin_until(publisher.get_subscription_count, 20), log.read_text()
-        assert running.connected()
-        publisher.publish(asked)
-        assert running.spin_until(lambda: commands and running.status, 20), log.read_text()
-        assert running.status[-1]['preparing'] is True
-        np.testing.assert_allclose(commands[0].data, expected, rtol=0, atol=1e-9)
         process.terminate()
         assert process.wait(10) == 0
     assert 'Traceback' not in log.read_text()

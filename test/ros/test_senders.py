@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pprs_dynamics.ros.node.senders import TURNS, Senders, namesakes
+from pprs_dynamics.ros.node.senders import TURNS, Senders
 
 
 class Clock:
@@ -40,24 +40,3 @@ def test_a_publisher_that_is_started_again_does_not_take_turns_with_the_old_one(
     assert senders.take_turns
     clock.now += TURNS
     assert not senders.take_turns
-
-
-def test_others_of_its_name_are_counted_also_before_the_graph_knows_it() -> None:
-    class Graph:
-        def __init__(self) -> None:
-            self.nodes: list[tuple[str, str]] = []
-
-        def get_name(self) -> str:
-            return 'feedforward'
-
-        def get_namespace(self) -> str:
-            return '/left'
-
-        def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
-            return self.nodes
-
-    node: Any = Graph()
-    others = [('feedforward', '/right'), ('monitor', '/left')]
-    for alike, expected in ((0, 0), (1, 0), (2, 1), (3, 2)):
-        node.nodes = others + [('feedforward', '/left')] * alike
-        assert namesakes(node) == expected

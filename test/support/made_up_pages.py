@@ -93,9 +93,9 @@ def _experiment() -> Page:
     experiment = Experiment(
         'separate', ('coulomb_friction', 'load_friction'),
         (ExpectedEvidence('coulomb_friction', 'load_friction', 9.9, 120.0, 0.99),),
-        (Accuracy('masses.payload', 'kg', 0.02, 0.01, 0.002),), 120.0, (),
+        (Accuracy('masses.payload', 'kg', 0.02, 0.01, 0.002),),
         {f'velocity of {name}': 0.1 * k + 0.3 for k, name in enumerate(DRIVES)}, 4.0, path.motion,
-        lambda time: model.drive_forces(path.motion(time)), model)
+        model)
     return experiment_page(experiment, path.motion(np.arange(0.0, 4.0, 0.01)))
 
 

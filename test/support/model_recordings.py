@@ -5,13 +5,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from pprs_dynamics import DriveModel
-from pprs_dynamics.inference.experiments.fourier_path import FourierPath
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.paths import Excitation
 
 TIME = np.arange(6000) * 0.002
@@ -19,9 +20,9 @@ EXCITATION = Excitation()
 
 
 def record(model: DriveModel, noise: float = 0.0, seed: int = 0,
-           motion: Excitation | FourierPath = EXCITATION) -> Recording:
-    """Return a recording of what a model says about a motion."""
-    forces = model.drive_forces(motion.motion(TIME).with_time(TIME))
+           motion: Callable[[np.ndarray], PlatformMotion] = EXCITATION.motion) -> Recording:
+    """Return a recording of what a model says about a motion of times [s]."""
+    forces = model.drive_forces(motion(TIME).with_time(TIME))
     said = model.measured(forces)
     rng = np.random.default_rng(seed)
     return Recording.from_arrays(

@@ -12,15 +12,12 @@ from __future__ import annotations
 
 import io
 import os
-import tempfile
 import warnings
 from collections.abc import Iterator
 from contextlib import chdir, contextmanager, nullcontext, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
-from cached import COMMANDS, cached
 
 from pprs_dynamics.app.commands.pprs import main
 from pprs_dynamics.physics.mechanism import evaluation
@@ -55,20 +52,6 @@ def pprs(
         texts.append(stream.buffer.getvalue().decode(encoding, 'surrogateescape'))  # type: ignore[attr-defined]
     assert isinstance(status, int), status
     return Ended(status, *texts)
-
-
-def simulate_into(folder: Path, *arguments: str) -> None:
-    """Write the files of `pprs simulate` into a folder, from the cache of all tests."""
-    for name, content in cached(simulated_files, *arguments, sources=COMMANDS).items():
-        (folder / name).write_bytes(content)
-
-
-def simulated_files(*arguments: str) -> dict[str, bytes]:
-    """Return the files that `pprs simulate` writes, by name."""
-    with tempfile.TemporaryDirectory() as folder:
-        done = pprs('simulate', *arguments, cwd=folder)
-        assert done.returncode == 0, done.stderr
-        return {path.name: path.read_bytes() for path in Path(folder).iterdir()}
 
 
 @contextmanager

@@ -15,7 +15,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from ros_processes import executable
 
 PATIENCE = 120.0  # [s], on a busy machine
@@ -36,16 +35,6 @@ class Answer:
         """Of a binary answer."""
         length = int.from_bytes(self.body[:4], 'little')
         found: dict[str, Any] = json.loads(self.body[4:4 + length])
-        return found
-
-    @property
-    def arrays(self) -> dict[str, Any]:
-        """Of a binary answer."""
-        at, found = 4 + int.from_bytes(self.body[:4], 'little'), {}
-        for one in self.header['arrays']:
-            size = int(np.prod(one['shape']))
-            found[one['name']] = np.frombuffer(self.body, '<f4', size, at).reshape(one['shape'])
-            at += 4 * size
         return found
 
 

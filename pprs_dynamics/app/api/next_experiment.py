@@ -20,7 +20,6 @@ from pprs_dynamics.app.api.inputs import (
     stage,
 )
 from pprs_dynamics.app.api.result import Result, data_frame
-from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation, excite_arm
 from pprs_dynamics.inference.experiments.motion_limits import ArmLimits, MotionLimits
 from pprs_dynamics.inference.experiments.next_experiment import Experiment, check_purpose
 from pprs_dynamics.inference.experiments.next_experiment import next_experiment as design
@@ -42,7 +41,7 @@ class ExperimentResult(Result):
     ----------
     inputs : Inputs
         Model and recordings.
-    design : Experiment or ArmExcitation
+    design : Experiment
         The motion at any time, and what it promises.
     motion : PlatformMotion or JointMotion
         Sampled.
@@ -54,7 +53,7 @@ class ExperimentResult(Result):
     """
 
     inputs: Inputs
-    design: Experiment | ArmExcitation
+    design: Experiment
     motion: PlatformMotion | JointMotion
     purpose: str
     seed: int
@@ -77,26 +76,19 @@ class ExperimentResult(Result):
 
     def view(self, details: bool = False) -> Any:
         """Return what the terminal shows."""
-        from pprs_dynamics.app.report.experiment_report import excitation_view, experiment_view
+        from pprs_dynamics.app.report.experiment_report import experiment_view
 
-        if isinstance(self.design, ArmExcitation):
-            return excitation_view(self.design)
         return experiment_view(self.design)
 
     def page(self) -> Page:
         """Return a page: expected evidence, curves, and use of the limits."""
-        from pprs_dynamics.app.report.experiment_report import excitation_page, experiment_page
+        from pprs_dynamics.app.report.experiment_report import experiment_page
 
-        if isinstance(self.design, ArmExcitation):
-            return excitation_page(self.design)
         return experiment_page(self.design, self.motion)
 
     def table(self) -> DataFrame:
         """Return a row per pair of effects: what a diagnosis would say if the first were true."""
-        if isinstance(self.design, ArmExcitation):
-            return data_frame([{'limit': name, 'use': share}
-                               for name, share in self.design.limits.items()])
-        return data_frame([contest.to_dict() for contest in self.design.contests])
+        return data_frame([vars(contest) for contest in self.design.contests])
 
     def plot(self) -> Figure:
         """Return a picture: where the platform or every joint goes."""
@@ -157,17 +149,11 @@ def next_experiment(
     check_purpose(purpose, inputs.fitted)
     found = inputs.model
     share_done = stage(progress, 'designing')
-    designed: Experiment | ArmExcitation
     kind = ArmLimits if found.moves_joints else MotionLimits
     if limits is not None and not isinstance(limits, kind):
         raise InputError(f'limits are {type(limits).__name__}, must be {kind.__name__} for '
                          f'{found.title}')
-    if found.moves_joints and purpose == 'commission':
-        designed = excite_arm(found, limits if isinstance(limits, ArmLimits) else ArmLimits(),
-                              duration, seed, share_done)
-    else:
-        designed = design(found, inputs.fitted, purpose, limits, duration, seed, noise,
-                          share_done)
+    designed = design(found, inputs.fitted, purpose, limits, duration, seed, noise, share_done)
     count = int(duration * rate + 1e-9) + 1
     return ExperimentResult(inputs, designed, designed.motion(np.arange(count) / rate), purpose,
                             seed, rate)

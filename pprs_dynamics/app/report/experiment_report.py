@@ -12,7 +12,6 @@ from pprs_dynamics.app.report.page import Page
 from pprs_dynamics.app.report.terminal import PlainTable, escape, stacked, titled_table
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import common_unit
-from pprs_dynamics.inference.experiments.arm_excitation import ArmExcitation
 from pprs_dynamics.inference.experiments.next_experiment import Experiment
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
@@ -26,7 +25,8 @@ HIGH = 0.5  # use of a limit, from which on it is shown
 def contests_table(experiment: Experiment) -> PlainTable:
     """Return pairs of effects with their evidence, now and expected."""
     return ('if the truth is', 'and the rival', 'evidence now', 'expected', 'chance'), [
-        (contest.truth, contest.rival, f'{contest.now:.0f}', f'{contest.expected:.0f}',
+        (contest.truth, contest.rival, f'{contest.evidence_now:.0f}',
+         f'{contest.expected_evidence:.0f}',
          f'{contest.probability:.0%}')
         for contest in experiment.contests]
 
@@ -34,7 +34,7 @@ def contests_table(experiment: Experiment) -> PlainTable:
 def accuracies_table(experiment: Experiment) -> PlainTable:
     """Return numbers with their standard deviations, before and after."""
     return ('number', 'before', 'after', 'matters from', 'unit'), [
-        (accuracy.label, _number(accuracy.before), _number(accuracy.after),
+        (accuracy.label, _number(accuracy.std_before), _number(accuracy.std_after),
          f'{accuracy.scale:.3g}', accuracy.unit)
         for accuracy in experiment.accuracies]
 
@@ -63,12 +63,6 @@ def experiment_view(experiment: Experiment) -> Any:
     parts.append('use of the limits, less their margin: ' + ', '.join(
         f'{name} {share}' for name, share in used[:6]) + '; all others less')
     return stacked(*parts)
-
-
-def excitation_view(excitation: ArmExcitation) -> Any:
-    """Return what an arm's first motion is for, and which limits it uses."""
-    return stacked(escape(excitation.text), 'use of the limits, less their margin: ' + ', '.join(
-        f'{name} {share:.0%}' for name, share in excitation.limits.items()))
 
 
 def experiment_page(experiment: Experiment, motion: Motion) -> Page:
@@ -102,15 +96,6 @@ def experiment_page(experiment: Experiment, motion: Motion) -> Page:
                        'deviations. Each uncertain effect is fitted alone with the model. A number '
                        'matters from the size in the fourth column, which is the tolerance for '
                        'numbers of the model.')
-    return page
-
-
-def excitation_page(excitation: ArmExcitation) -> Page:
-    """Return the page of an arm's first motion."""
-    page = Page('The next experiment')
-    page.text(excitation.text, 'lead')
-    page.table(('limit', 'use'), [(name, f'{share:.0%}')
-                                  for name, share in excitation.limits.items()])
     return page
 
 

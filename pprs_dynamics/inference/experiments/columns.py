@@ -3,15 +3,15 @@
 
 """Columns of the regression on a motion that nobody has made yet.
 
-They are those of `regression.design`, in the same order and scale, so that what a new motion
-adds is added to the information of the recordings.
+They are those of `regression.design`, so that the information of a motion and that of the
+recordings add up.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 
@@ -21,39 +21,24 @@ from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
     PresentCoefficient,
     PresentShape,
-    ReversalShape,
 )
 from pprs_dynamics.inference.regression.design import Design
-from pprs_dynamics.inference.regression.sensitivities import (
-    DRIVE_WIDTHS,
-    HOMING,
-    INERTIA,
-    NUMBERS,
-    OF_DRIVES,
-    OF_JOINTS,
-    PRESENT,
-    Sensitivities,
-)
-from pprs_dynamics.inference.regression.terms import FullRate, Rows, Term
-from pprs_dynamics.inference.residuals.residuals import Residuals
+from pprs_dynamics.inference.regression.sensitivities import Sensitivities
+from pprs_dynamics.inference.regression.terms import Rows
 from pprs_dynamics.inference.search.body_centres import about_centre
-from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
-from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
 
-HOMING_SAMPLES = 100  # of a motion, at which columns of wrong zeros are computed; they are slow
-Columns = Mapping[int, tuple[np.typing.NDArray[np.int_], Array]]
-"""By drive: places of the columns that it feels, (p,), and these in time, (p, M) [N]."""
+HOMING_SAMPLES = 100  # of a motion, at which the slow columns of wrong zeros are computed
 
 
 @dataclass(frozen=True, eq=False)
 class FittedTerm:
     """An effect on a drive or in the structure, with values.
 
-    Its columns are those of its coefficients (of one that is 1 where the shape says it all), then
-    the derivatives by its shape parameters, per amount of movement.
+    Its columns are those of its coefficients (one of coefficient 1 where the shape is all), then
+    the derivatives by its shape parameters.
 
     Parameters
     ----------
@@ -63,7 +48,7 @@ class FittedTerm:
     names : tuple of str
         Coefficients that are fitted.
     values : (k,) array
-        Theirs; 1 where the shape says it all.
+        Of the coefficients; 1 where the shape is all.
     centre : tuple of float
         Of an added body, about which its columns are; see `Component`.
     """
@@ -75,43 +60,20 @@ class FittedTerm:
     values: Array
     centre: tuple[float, ...] = ()
 
-    @classmethod
-    def at_scale(cls, effect: type[CatalogueEffect], drive: int | None,
-                 shape: Mapping[str, float]) -> FittedTerm:
-        """Return an effect with its coefficients at the sizes at which they matter."""
-        return cls(effect, drive, shape, tuple(c.name for c in effect.coefficients),
-                   np.array([c.scale for c in effect.coefficients] or [1.0]))
-
-    @classmethod
-    def at_places(cls, effect: type[CatalogueEffect]) -> list[FittedTerm]:
-        """Return an effect in the structure, once for each of its places, with all that it has."""
-        scale = {c.name: c.scale for c in effect.coefficients}
-        most: dict[tuple[tuple[str, ...], ...], tuple[str, ...]] = {}
-        for names in effect.variants:
-            place = effect.places_of(names)
-            most[place] = max(most.get(place, ()), names, key=len)
-        return [cls(effect, None, {}, names, np.array([scale[name] for name in names]))
-                for names in most.values()]
-
     @property
     def size(self) -> int:
         """Number of columns."""
         return len(self.values) + len(self.shape)
 
     @property
-    def free(self) -> slice:
-        """Columns whose coefficients are fitted."""
-        return slice(len(self.values) - len(self.names), None)
-
-    @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Of the free columns: coefficients, then shape parameters."""
+        """Of the fitted columns: coefficients, then shape parameters."""
         known = {c.name: c for c in self.effect.coefficients}
         return (*(known[name] for name in self.names), *self.effect.shape)
 
     @property
     def scales(self) -> Array:
-        """Sizes at which the coefficients of the free columns matter; shapes by a factor of e."""
+        """Sizes at which the fitted coefficients matter; shapes by a factor of e."""
         return np.array([p.scale for p in self.parameters[:len(self.names)]]
                         + [1.0] * len(self.shape))
 
@@ -132,14 +94,14 @@ class FittedTerm:
 
 @dataclass(frozen=True)
 class ColumnPlan:
-    """Which columns are wanted, and how they are computed.
+    """Columns of which information is computed: base columns, then those of terms.
 
     Parameters
     ----------
     given, model : DriveModel
         As the user has it; and around which forces are linear.
     base : tuple of BaseColumn
-        As the design has them; their rows are those of the recordings, if any.
+        Every base column that a motion may excite.
     terms : tuple of FittedTerm
     """
 
@@ -149,20 +111,15 @@ class ColumnPlan:
     terms: tuple[FittedTerm, ...]
 
     @classmethod
-    def of_design(cls, design: Design, terms: Sequence[FittedTerm]) -> ColumnPlan:
-        """Return the plan of a design's base columns and more.
-
-        A drive that stood has no columns of its reversals in the design, but may turn over in a
-        motion.
-        """
-        moved = {one.drive for one in design.base if isinstance(one, ReversalShape)}
-        stood = [drive for drive in range(len(design.drives)) if drive not in moved]
-        return cls(design.given, design.model, (*design.base, *reversal_shapes(stood)),
+    def of(cls, given: DriveModel, model: DriveModel, forces: Forces, time: Array,
+           terms: Sequence[FittedTerm]) -> ColumnPlan:
+        """Return the plan of the base columns of any motion, with terms."""
+        return cls(given, model, cls(given, model, (), tuple(terms)).on_motion(forces, time).base,
                    tuple(terms))
 
     @property
     def size(self) -> int:
-        """Number of all columns, base columns first."""
+        """Number of all columns."""
         return len(self.base) + sum(term.size for term in self.terms)
 
     @property
@@ -170,23 +127,32 @@ class ColumnPlan:
         """Places of the model's own numbers."""
         return tuple(k for k, one in enumerate(self.base) if isinstance(one, ModelNumber))
 
-    @property
-    def others(self) -> tuple[int, ...]:
-        """Places of the other base columns."""
-        return tuple(k for k in range(len(self.base)) if k not in self.numbers)
+    def places(self, terms: Sequence[FittedTerm], only_fitted: bool = True) -> tuple[int, ...]:
+        """Return the places of the columns of terms that are fitted, or of their coefficients."""
+        ends = dict(zip(self.terms, len(self.base) + np.cumsum(
+            [term.size for term in self.terms]), strict=True))
+        return tuple(int(ends[term]) - term.size + k for term in terms for k in (
+            range(len(term.values) - len(term.names), term.size) if only_fitted
+            else range(len(term.values))))
 
-    def places(self) -> dict[FittedTerm, slice]:
-        """Return where each term's columns stand."""
-        ends = len(self.base) + np.cumsum([term.size for term in self.terms])
-        return {term: slice(int(end) - term.size, int(end))
-                for end, term in zip(ends, self.terms, strict=True)}
+    def force(self, terms: Sequence[FittedTerm]) -> Array:
+        """Return the coefficients of the force of terms, (P,)."""
+        found = np.zeros(self.size)
+        found[list(self.places(terms, False))] = np.concatenate([term.values for term in terms])
+        return found
 
-    def on_recordings(self, design: Design) -> Columns:
-        """Return all columns on the recordings of the design that the plan is of."""
-        return self._by_drive([one.rows for one in self.base], design)
+    def columns(self, design: Design) -> Iterator[tuple[int, Array]]:
+        """Yield all columns of each drive on recordings or on a motion, (P, M) [N]."""
+        known = {_key(column): column.rows for column in design.base}
+        base = [known.get(_key(column), {}) for column in self.base]
+        terms = [(term.size, term.rows(design)) for term in self.terms]
+        none = np.zeros((1, len(design.residuals)))
+        for d in range(len(design.drives)):
+            yield d, np.concatenate([none[:0], *(rows.get(d, none[0])[None] for rows in base), *(
+                rows.get(d, np.repeat(none, size, axis=0)) for size, rows in terms)])
 
-    def on_motion(self, forces: Forces, time: Array, block: int = 1) -> Columns:
-        """Return the columns of a motion.
+    def on_motion(self, forces: Forces, time: Array, block: int = 1) -> Design:
+        """Return the design of a motion.
 
         Parameters
         ----------
@@ -196,85 +162,19 @@ class ColumnPlan:
         block : int
             Samples that are averaged.
         """
-        samples = len(time)
-        found = self._whole_columns(forces, samples)
-        shared = dict(zip(self.numbers, found[NUMBERS], strict=True))
-        for k, column in enumerate(self.base):
-            if isinstance(column, ReversalShape):
-                shared[k] = found[OF_JOINTS if column.drive is None else OF_DRIVES][column.number]
-        treat = Treatment(np.arange(0, samples - samples % block or samples, block), samples)
+        self._sensitivities.homing_stride = max(1, len(time) // HOMING_SAMPLES)
+        return Design.planned(self._sensitivities, forces, time, block)
 
-        def by_drive(column: Array) -> dict[int, Array]:
-            return dict(enumerate(treat(column).T))
-
-        design = replace(
-            self._motion_design(forces, time, treat, block), structure=tuple(
-                Term(effect, None, {}, {d: treat(found[effect.name][:, :, d].T).T
-                                        for d in range(len(self.model.drives))})
-                for effect in self._wanted if issubclass(effect, StructureEffect)),
-            homing=tuple(map(by_drive, found.get(HOMING, ()))),
-            inertia=tuple(map(by_drive, found.get(INERTIA, ()))))
-        base = [design.present_rows(column) if isinstance(
-                    column, (PresentCoefficient, PresentShape))
-                else _felt(column, by_drive(shared[k])) for k, column in enumerate(self.base)]
-        return self._by_drive(base, design)
-
-    @property
-    def _wanted(self) -> set[type[CatalogueEffect]]:
-        """Effects that columns are of."""
-        return {one.effect for one in (*self.terms, *self.base) if isinstance(
-            one, (FittedTerm, PresentCoefficient, PresentShape))}
-
-    def _whole_columns(self, forces: Any, samples: int) -> dict[str, Array]:
-        """Return the columns of a motion at full rate that do not need its design.
-
-        By name as `Sensitivities.columns`, those of an effect by its own, whether it is in the
-        model or not.
-        """
-        sensitivities = Sensitivities(self.model, self.given)
-        known = {effect.name for effect in self.given.effects}
-        sensitivities.searched = tuple(effect for effect in self._wanted if issubclass(
-            effect, StructureEffect) and effect.name not in known)
-        sensitivities.of_zeros = any(effect.shifts_positions() for effect in self._wanted)
-        sensitivities.homing_stride = max(1, samples // HOMING_SAMPLES)
-        return {name.removeprefix(PRESENT): column
-                for name, column in sensitivities.columns(forces).items()}
-
-    def _motion_design(self, forces: Forces, time: Array, treat: Treatment, block: int) -> Design:
-        s, total = forces.mechanism, forces.total
-        full = FullRate(time, s.position, s.velocity, s.acceleration, s.direction,
-                        s.friction_load, s.transmitted, total, total, (slice(0, len(time)),),
-                        treat, float(time[0]), {})
-        means = treat(total)
-        residuals = Residuals(self.model.drives, treat(time), np.zeros(len(means), dtype=int),
-                              means, means, period=float(time[1] - time[0]) * block)
-        return Design(self.given, self.model, residuals, (full,), (), (), (), (), (), (),
-                      means)
-
-    def _by_drive(self, base: Sequence[Rows], design: Design) -> Columns:
-        """Return base columns and those of the terms, drive by drive."""
-        terms = [(place, term.rows(design)) for term, place in self.places().items()]
-        found = {}
-        for d in range(len(self.model.drives)):
-            index = [k for k, rows in enumerate(base) if d in rows]
-            parts = [base[k][d][None] for k in index]
-            for place, rows in terms:
-                if d in rows:
-                    index += range(place.start, place.stop)
-                    parts.append(rows[d])
-            found[d] = (np.array(index, dtype=int), np.concatenate(parts))
+    @cached_property
+    def _sensitivities(self) -> Sensitivities:
+        found = Sensitivities(self.model, self.given)
+        found.restrict({column.effect for column in (*self.terms, *self.base) if isinstance(
+            column, (FittedTerm, PresentCoefficient, PresentShape))}
+            | {type(effect) for effect in self.given.effects
+               if isinstance(effect, CatalogueEffect)})
         return found
 
 
-def _felt(column: BaseColumn, rows: Rows) -> Rows:
-    """Return the rows of a column on the drives that may feel it."""
-    if isinstance(column, ReversalShape) and column.drive is not None:
-        return {column.drive: rows[column.drive]}
-    return rows
-
-
-def reversal_shapes(drives: Sequence[int]) -> list[ReversalShape]:
-    """Return the columns of reversals of drives, without rows."""
-    # One for every width, and one for friction that differs by direction while it turns over.
-    return [ReversalShape({}, 1.0, drive, number)
-            for number, _ in enumerate((*DRIVE_WIDTHS, None)) for drive in drives]
+def _key(column: BaseColumn) -> str:
+    """Return what identifies a base column in any design."""
+    return repr(replace(column, rows={}))

@@ -17,7 +17,7 @@ K. Chaloner, I. Verdinelli, Bayesian experimental design: a review, Statistical 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +25,7 @@ from scipy import fft
 from scipy.linalg import cho_factor, cho_solve
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.inference.experiments.columns import ColumnPlan, Columns, FittedTerm
+from pprs_dynamics.inference.experiments.columns import ColumnPlan
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.residuals.noise import NoiseSpectrum
@@ -50,32 +50,28 @@ class Information:
     plan: ColumnPlan
     noise: Mapping[int, NoiseSpectrum]
 
-    def of_recordings(self, design: Design, regression: Regression, fit: JointFit) -> Array:
-        """Return the information of recordings and the prior of the base columns."""
-        white = {}
-        for d, (index, rows) in self.plan.on_recordings(design).items():
-            if d in self.noise:
-                series = regression.series[d]
-                factor = series.spread(np.sqrt(regression.weights(fit, d)))
-                white[d] = index, series.transform(rows) * factor
-        return self._gram(white) + self.prior()
-
     def prior(self) -> Array:
         """Return what is known of the base columns beforehand."""
         known = np.zeros(self.plan.size)
         known[:len(self.plan.base)] = [column.precision for column in self.plan.base]
         return np.diag(known)
 
-    def of_motion(self, columns: Columns, duration: float) -> Array:
-        """Return the information of a motion of some duration [s], at any sampling rate."""
-        return self._gram({d: (index, whitened(rows, self.noise[d], duration))
-                           for d, (index, rows) in columns.items() if d in self.noise})
-
-    def _gram(self, white: Columns) -> Array:
-        gram = np.zeros((self.plan.size, self.plan.size))
-        for index, rows in white.values():
-            gram[np.ix_(index, index)] += rows @ rows.T
+    def of_recordings(self, design: Design, regression: Regression, fit: JointFit) -> Array:
+        """Return the information of recordings and the prior of the base columns."""
+        gram = self.prior()
+        for d, rows in self.plan.columns(design):
+            if d in self.noise:
+                series = regression.series[d]
+                white = series.transform(rows) * series.spread(
+                    np.sqrt(regression.weights(fit, d)))
+                gram += white @ white.T
         return gram
+
+    def of_motion(self, design: Design, duration: float) -> Array:
+        """Return the information of a motion of some duration [s], at any sampling rate."""
+        white = [whitened(rows, self.noise[d], duration)
+                 for d, rows in self.plan.columns(design) if d in self.noise]
+        return sum((rows @ rows.T for rows in white), np.zeros((self.plan.size,) * 2))
 
 
 def whitened(rows: Array, noise: NoiseSpectrum, duration: float) -> Array:
@@ -90,98 +86,32 @@ def whitened(rows: Array, noise: NoiseSpectrum, duration: float) -> Array:
 
 
 @dataclass(frozen=True)
-class Explanation:
-    """Effects that may be there.
-
-    Parameters
-    ----------
-    names : tuple of str
-    terms : tuple of FittedTerm
-    free : tuple of int
-        Places of the columns that are fitted.
-    index : tuple of int
-        Places of the columns that make up its force.
-    truth : (k,) array
-        Their coefficients where it is there as the recordings say.
-    prior_cost : float
-        Against nothing: of its choice and of its coefficients.
-    """
-
-    names: tuple[str, ...]
-    terms: tuple[FittedTerm, ...]
-    free: tuple[int, ...]
-    index: tuple[int, ...]
-    truth: Array
-    prior_cost: float = 0.0
-
-    @property
-    def name(self) -> str:
-        """Of all its effects."""
-        return ' and '.join(self.names)
-
-
-@dataclass(frozen=True)
 class Contest:
     """Expected discrimination of a rival from the true model.
 
     Parameters
     ----------
-    truth, rival : Explanation
+    truth, rival : tuple of str
+        Effects that only the truth has, and those that only the rival has.
+    missing : (P,) array
+        Coefficients of the true force, less what the rival has for certain.
     refitted : tuple of int
         Places of all columns that are fitted with the rival.
     now : float
         By how much the rival costs more on the recordings that there are.
     """
 
-    truth: Explanation
-    rival: Explanation
+    truth: tuple[str, ...]
+    rival: tuple[str, ...]
+    missing: Array
     refitted: tuple[int, ...]
     now: float = 0.0
 
-    @property
-    def sides(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Effects that only the truth has, and those that only the rival has."""
-        truth, rival = self.truth.names, self.rival.names
-        return (tuple(one for one in truth if one not in rival),
-                tuple(one for one in rival if one not in truth))
-
-    def unexplained(self, size: int) -> Array:
-        """Return coefficients of the true force less what the rival has for certain, (size,)."""
-        force = np.zeros(size)
-        force[list(self.truth.index)] += self.truth.truth
-        for k, value in zip(self.rival.index, self.rival.truth, strict=True):
-            if k not in self.rival.free:
-                force[k] -= value
-        return force
-
     def misfit(self, gram: Array) -> float:
         """Return the whitened squared residual of the refitted rival."""
-        return misfits_of((self,), gram)[0]
-
-    def evidence(self, known: Array, after: Array) -> float:
-        """Return the evidence against the rival that recordings and motion together promise."""
-        return self.now + self.gained(known, after)
-
-    def gained(self, known: Array, after: Array) -> float:
-        """Return the share of it that the motion adds."""
-        return max(self.misfit(after) - self.misfit(known), 0.0)
-
-
-def misfits_of(contests: Sequence[Contest], gram: Array) -> list[float]:
-    """Return the misfit of every contest; those of one rival share a factorisation."""
-    by_rival: dict[tuple[int, ...], list[int]] = {}
-    for k, contest in enumerate(contests):
-        by_rival.setdefault(contest.refitted, []).append(k)
-    misfits = [0.0] * len(contests)
-    for refitted, members in by_rival.items():
-        R = list(refitted)
-        forces = np.stack([contests[k].unexplained(len(gram)) for k in members], axis=1)
-        whole = gram @ forces
-        explained = np.sum(whole[R] * solve(gram[np.ix_(R, R)], whole[R]), axis=0)
-        left = np.sum(forces * whole, axis=0) - explained
-        for k, misfit in zip(members, left, strict=True):
-            misfits[k] = max(float(misfit), 0.0)
-    return misfits
+        R, whole = list(self.refitted), gram @ self.missing
+        return max(float(self.missing @ whole - whole[R] @ solve(gram[np.ix_(R, R)], whole[R])),
+                   0.0)
 
 
 @dataclass(frozen=True)
@@ -192,7 +122,7 @@ class Separation:
 
     def value(self, gram: Array) -> float:
         """Return minus ln of the mean of 1/misfit: nearly ln of the smallest."""
-        misfits = np.array(misfits_of(self.contests, gram))
+        misfits = np.array([contest.misfit(gram) for contest in self.contests])
         return -float(np.log(np.mean(1 / (misfits + EVIDENCE_FLOOR))))
 
 
@@ -202,10 +132,8 @@ class Precision:
 
     Parameters
     ----------
-    index : tuple of int
-        Theirs.
-    others : tuple of int
-        What is estimated with them.
+    index, others : tuple of int
+        Places of the coefficients, and of what is estimated with them.
     scales : (k,) array
         Sizes at which the coefficients matter: known to that beforehand.
     """
@@ -239,18 +167,8 @@ class Precision:
 
 def solve(matrix: Array, side: Array) -> Array:
     """Return the solution of a symmetric system whose rows may be nearly dependent."""
-    diagonal = np.diag(matrix) * (1 + WEAK) + 1e-12
-    scale = 1 / np.sqrt(diagonal)
+    scale = 1 / np.sqrt(np.diag(matrix) * (1 + WEAK) + 1e-12)
     scaled = matrix * np.outer(scale, scale)
     scaled[np.diag_indices(len(scaled))] = 1 + WEAK
-    factor = cho_factor(scaled)
-    if side.ndim == 1:
-        result: Array = scale * cho_solve(factor, scale * side)
-    else:
-        result = scale[:, None] * cho_solve(factor, scale[:, None] * side)
-    return result
-
-
-def free_of(explanations: Sequence[Explanation]) -> tuple[int, ...]:
-    """Return the places of all columns that are fitted in explanations."""
-    return tuple(k for one in explanations for k in one.free)
+    found: Array = (scale * cho_solve(cho_factor(scaled), (scale * side.T).T).T).T
+    return found

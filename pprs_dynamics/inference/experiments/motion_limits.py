@@ -1,20 +1,24 @@
 # SPDX-FileCopyrightText: 2026 The pprs_dynamics founders
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a designed motion may do: the model file's limits and the drives', with margins."""
+"""What a designed motion may do: the limits of the model file and of the user, with margins."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.forces import Forces
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.passive_friction import IndependentChainsFriction
+
+REACH = np.repeat((0.08, 0.25), 3)  # [m, rad], excursions of the platform to start from
+WIDEST = np.pi  # [rad, m], excursion of a joint, whatever its range
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,22 @@ class MotionLimits:
         if not 0 <= self.margin <= 0.9:
             raise ModelError('margin', self.margin, 'lie between 0 and 0.9')
 
-    def uses(self, model: DriveModel, forces: Forces) -> dict[str, float]:
+    def middle(self, model: DriveModel) -> Array:
+        """Return the coordinates about which the platform moves: the middle of its strokes."""
+        geometry = model.robot.geometry
+        lean = (geometry.base_radius - geometry.platform_radius * float(np.mean(np.cos(
+            np.subtract(geometry.platform_angles, geometry.chain_angles))))) / geometry.rod_length
+        rise = geometry.rod_length * float(np.sqrt(max(1 - lean ** 2, 0.0)))
+        height = float(sum(end[-1] for end in model.strokes)) / 2 + geometry.elbow_sign * rise
+        return np.array((0.0, 0.0, height, 0.0, 0.0, 0.0))
+
+    def excursions(self, model: DriveModel, position: Array, velocity: Array,
+                   acceleration: Array) -> Array:
+        """Return the largest excursion of each coordinate over what it starts from."""
+        found: Array = np.abs(position - self.middle(model)).max(axis=0) / REACH
+        return found
+
+    def uses(self, model: DriveModel, forces: Any) -> dict[str, float]:
         """Return how much of each limit, its margin taken off, a motion uses: 1 is all of it."""
         state, bounds, left = forces.mechanism, model.robot.bounds, 1 - self.margin
         limits, chains = model.limits, state.links.chains
@@ -78,7 +97,7 @@ class MotionLimits:
 
 @dataclass(frozen=True)
 class ArmLimits:
-    """Limits of a motion in addition to those of the URDF.
+    """Limits of a motion in addition to those of the URDF. Collisions of links are not checked.
 
     Parameters
     ----------
@@ -94,3 +113,36 @@ class ArmLimits:
     acceleration: float = 5.0
     margin: float = 0.1
     effort_reserve: float = 0.0
+
+    def middle(self, model: DriveModel) -> Array:
+        """Return the positions about which the joints move."""
+        middle: Array = model.robot.structure.room(WIDEST)[0]
+        return middle
+
+    def efforts(self, model: DriveModel) -> Array:
+        """Return the largest efforts, (D,)."""
+        left: Array = (1 - self.margin) * model.robot.structure.effort - self.effort_reserve
+        return np.maximum(left, 1e-12)
+
+    def excursions(self, model: DriveModel, position: Array, velocity: Array,
+                   acceleration: Array) -> Array:
+        """Return the largest use of range, speed and acceleration of each joint."""
+        found: Array = np.max([*self._motion_uses(
+            model, position, velocity, acceleration).values()], axis=0)
+        return found
+
+    def uses(self, model: DriveModel, forces: Any) -> dict[str, float]:
+        """Return how much of each limit, its margin taken off, a motion uses: 1 is all of it."""
+        state = forces.mechanism
+        shares = {**self._motion_uses(model, state.position, state.velocity, state.acceleration),
+                  'effort': np.abs(forces.total).max(axis=0) / self.efforts(model)}
+        return {name: float(share.max()) for name, share in shares.items()}
+
+    def _motion_uses(self, model: DriveModel, position: Array, velocity: Array,
+                     acceleration: Array) -> dict[str, Array]:
+        tree, left = model.robot.structure, 1 - self.margin
+        middle, reach = tree.room(WIDEST)
+        return {name: np.abs(values).max(axis=0) / (left * bound) for name, values, bound in (
+            ('range', position - middle, np.maximum(reach, 1e-12)),
+            ('speed', velocity, np.minimum(tree.speed, self.velocity)),
+            ('acceleration', acceleration, self.acceleration))}

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import Any
 
@@ -16,17 +16,15 @@ from scipy.special import ndtr
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DriveUnits
 from pprs_dynamics.errors import PprsError
+from pprs_dynamics.inference.experiments.arm_information import ArmInformation
 from pprs_dynamics.inference.experiments.columns import FittedTerm
-from pprs_dynamics.inference.experiments.criteria import Contest, Precision, misfits_of
-from pprs_dynamics.inference.experiments.motion_design import (
-    ArmMotions,
-    Motion,
-    PlatformMotions,
-    design,
-    limits_of,
-)
+from pprs_dynamics.inference.experiments.criteria import Precision
+from pprs_dynamics.inference.experiments.motion_design import Motions, design
 from pprs_dynamics.inference.experiments.motion_limits import ArmLimits, MotionLimits
 from pprs_dynamics.inference.experiments.question import (
+    COMMISSION,
+    ESTIMATE,
+    SEPARATE,
     Question,
     commissioning,
     precision_of,
@@ -35,10 +33,13 @@ from pprs_dynamics.inference.experiments.question import (
 from pprs_dynamics.inference.regression.base_columns import ModelNumber
 from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
+from pprs_dynamics.physics.mechanism.joint_series import JointSeries
+from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.forces import Forces
 
-PURPOSES = ('separate', 'commission')
+PURPOSES = (SEPARATE, COMMISSION)
 SURE = 0.9  # probability from which a design counts as separating
 SHORTEST, LONGEST = 5.0, 120.0  # [s]
 # Effects of which the same motion with a known mass more shows at once which of them it is: one
@@ -51,6 +52,7 @@ TOLD_BY_LOAD = tuple(map(frozenset, (
     ('effort_gain', 'drive_inertia'))))
 LOAD_SHARE = 0.1  # of all that moves, that such a mass is about
 RESERVE = 4.0  # standard deviations of noise that efforts are kept below their limits by
+ARM_HARMONICS = 8  # of the duration, of the first motion of an arm
 
 
 class PurposeError(PprsError, ValueError):
@@ -64,7 +66,7 @@ class ExpectedEvidence:
     Parameters
     ----------
     truth, rival : str
-    now, expected : float
+    evidence_now, expected_evidence : float
         By how much the rival costs more in a diagnosis: of the recordings, and with the motion.
     probability : float
         That the rival falls behind by what a diagnosis asks for.
@@ -72,14 +74,9 @@ class ExpectedEvidence:
 
     truth: str
     rival: str
-    now: float
-    expected: float
+    evidence_now: float
+    expected_evidence: float
     probability: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it for JSON."""
-        return {'truth': self.truth, 'rival': self.rival, 'evidence_now': self.now,
-                'expected_evidence': self.expected, 'probability': self.probability}
 
 
 @dataclass(frozen=True)
@@ -88,24 +85,18 @@ class Accuracy:
 
     Parameters
     ----------
-    label : str
-    unit : str
+    label, unit : str
     scale : float
         Size at which it matters, or the tolerance's standard deviation.
-    before, after : float
+    std_before, std_after : float
         Standard deviations.
     """
 
     label: str
     unit: str
     scale: float
-    before: float
-    after: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it for JSON."""
-        return {'label': self.label, 'unit': self.unit, 'scale': self.scale,
-                'std_before': self.before, 'std_after': self.after}
+    std_before: float
+    std_after: float
 
 
 @dataclass(frozen=True)
@@ -114,55 +105,62 @@ class Experiment:
 
     Parameters
     ----------
-    kind : {'separate', 'estimate', 'excite', 'commission'}
+    kind : {'separate', 'estimate', 'commission'}
     subjects : tuple of str
         Effects in question.
     contests : tuple of ExpectedEvidence
     accuracies : tuple of Accuracy
-    expected_evidence : float
-        The least of all contests that it decides; without contests, of all effects in question
-        against their absence.
-    hidden : tuple of str
-        Effects in question that would not show at the size at which they matter.
     limits : dict of str to float
         Use of each limit, its margin taken off: at most 1.
     duration : float
         [s]
     motion : callable
         Times [s] -> PlatformMotion, or JointMotion of an arm.
-    forces : callable
-        Times [s] -> Forces.
     model : DriveModel
+    determined : (int, int), optional
+        Of the first motion of an arm: combinations of parameters of links, rotors and friction that
+        it determines better than the description, and all.
     """
 
     kind: str
     subjects: tuple[str, ...]
     contests: tuple[ExpectedEvidence, ...]
     accuracies: tuple[Accuracy, ...]
-    expected_evidence: float
-    hidden: tuple[str, ...]
     limits: dict[str, float]
     duration: float
-    motion: Callable[[Array], Any]
-    forces: Callable[[Array], Forces]
-    model: DriveModel
+    motion: Callable[[Array], PlatformMotion | JointMotion]
+    model: DriveModel = field(repr=False)
+    determined: tuple[int, int] | None = None
+
+    def forces(self, time: Array) -> Forces:
+        """Return what the model says of the motion at times [s]."""
+        return self.model.drive_forces(self.motion(time))
 
     @property
-    def pairs(self) -> tuple[tuple[str, str], ...]:
-        """All pairs in question."""
-        return tuple(dict.fromkeys(tuple(sorted((one.truth, one.rival)))  # type: ignore[misc]
-                                   for one in self.contests))
+    def expected_evidence(self) -> float:
+        """The least of all contests that it decides; of all where it decides none."""
+        decided = [c for c in self.contests if c.probability >= SURE] or self.contests
+        return min((contest.expected_evidence for contest in decided), default=0.0)
+
+    @property
+    def pairs(self) -> dict[tuple[str, str], bool]:
+        """All pairs in question, and whether it separates them, whichever of the two is true."""
+        pairs: dict[tuple[str, str], bool] = {}
+        for contest in self.contests:
+            first, second = sorted((contest.truth, contest.rival))
+            pairs[first, second] = (pairs.get((first, second), True)
+                                    and contest.probability >= SURE)
+        return pairs
 
     @property
     def separates(self) -> tuple[tuple[str, str], ...]:
-        """Pairs that it separates, whichever of the two is true."""
-        return tuple(pair for pair in self.pairs if all(
-            one.probability >= SURE for one in self.contests if {one.truth, one.rival} == {*pair}))
+        """Pairs that it separates."""
+        return tuple(pair for pair, is_separated in self.pairs.items() if is_separated)
 
     @property
     def fails(self) -> tuple[tuple[str, str], ...]:
         """Pairs that it does not, or not in every case."""
-        return tuple(pair for pair in self.pairs if pair not in self.separates)
+        return tuple(pair for pair, is_separated in self.pairs.items() if not is_separated)
 
     @property
     def told_by_load(self) -> tuple[tuple[str, str], ...]:
@@ -172,49 +170,45 @@ class Experiment:
     @property
     def load(self) -> float | None:
         """Mass that the tool should carry more in a second recording [kg]; None: no need."""
-        if not self.told_by_load:
-            return None
-        return float(f'{LOAD_SHARE * self.model.moved_mass:.1g}')
+        return float(f'{LOAD_SHARE * self.model.moved_mass:.1g}') if self.told_by_load else None
 
     @property
     def text(self) -> str:
-        """What it is for, and whether it will do, in one or two sentences."""
-        if self.kind == 'separate':
-            found = []
-            if self.separates:
-                found.append(f'This motion separates {_listed(self.separates)}: evidence of '
-                             f'{self.expected_evidence:.0f} is expected.')
-            if self.fails:
-                found.append(f'It will hardly separate {_listed(self.fails)}: no motion that was '
-                             'tried within these limits does so for sure.')
-            if self.load:
-                found.append(f'For {_listed(self.told_by_load)} record the same motion once more '
-                             f'with {self.load:g} kg more at the tool, and diagnose that recording '
-                             'with this payload in the model.')
-            return ' '.join(found)
-        last = (f' At the size at which they matter it would not show {", ".join(self.hidden)}: '
-                'a longer motion or wider limits would.' if self.hidden else '')
-        return {
-            'estimate': f'One explanation is left: {", ".join(self.subjects)}. This motion '
-                        'measures its parameters best.',
-            'excite': 'Nothing is missing as far as the recordings show. This motion shows what '
-                      f'they hardly excite: {", ".join(self.subjects)}.' if self.subjects else
-                      'Nothing is missing, and all is excited. This motion measures the model\'s '
-                      'own numbers best.',
-            'commission': 'This motion measures the model\'s numbers and shows all common '
-                          'effects.'}[self.kind] + last
+        """What it is for, and whether it will do, in a few sentences."""
+        if self.determined is not None:
+            return (f'A motion of {self.duration:g} s that determines {self.determined[0]} of '
+                    f'{self.determined[1]} parameters of links, rotors and friction better than '
+                    'the URDF. Collisions of links are not checked.')
+        if self.kind == ESTIMATE:
+            return (f'One explanation is left: {", ".join(self.subjects)}. This motion measures '
+                    'its parameters best.')
+        if self.kind == COMMISSION:
+            return ('This motion measures the numbers of the model and shows all common effects.')
+        found = []
+        if self.separates:
+            found.append(f'This motion separates {_listed(self.separates)}: evidence of '
+                         f'{self.expected_evidence:.0f} is expected.')
+        if self.fails:
+            found.append(f'It will hardly separate {_listed(self.fails)}: no motion that was '
+                         'tried within these limits does so for sure.')
+        if self.load:
+            found.append(f'For {_listed(self.told_by_load)} record the same motion once more '
+                         f'with {self.load:g} kg more at the tool, and diagnose that recording '
+                         'with this payload in the model.')
+        return ' '.join(found)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON of the interface, and what the documentation adds to it."""
-        return {'separates': [list(pair) for pair in self.separates],
-                'does_not_separate': [list(pair) for pair in self.fails],
-                'expected_evidence': self.expected_evidence,
-                'load': self.load, 'told_by_load': [list(pair) for pair in self.told_by_load],
-                'question': self.kind, 'subjects': list(self.subjects),
-                'hidden': list(self.hidden), 'text': self.text,
-                'contests': [one.to_dict() for one in self.contests],
-                'accuracy': [one.to_dict() for one in self.accuracies],
-                'limits': self.limits, 'duration': self.duration}
+        found = {'separates': [list(pair) for pair in self.separates],
+                 'does_not_separate': [list(pair) for pair in self.fails],
+                 'expected_evidence': self.expected_evidence,
+                 'load': self.load, 'told_by_load': [list(pair) for pair in self.told_by_load],
+                 'question': self.kind, 'subjects': list(self.subjects), 'text': self.text,
+                 'contests': [vars(contest) for contest in self.contests],
+                 'accuracy': [vars(accuracy) for accuracy in self.accuracies],
+                 'limits': self.limits, 'duration': self.duration}
+        return found if self.determined is None else {
+            **found, 'determined': self.determined[0], 'total': self.determined[1]}
 
 
 def _listed(pairs: Sequence[tuple[str, str]]) -> str:
@@ -232,8 +226,6 @@ def next_experiment(
 ) -> Experiment:
     """Return the motion that decides most; see `pprs_dynamics.next_experiment`.
 
-    Of an arm for 'separate' only; `arm_excitation` designs its first motion.
-
     Raises
     ------
     PurposeError
@@ -246,53 +238,54 @@ def next_experiment(
     report = progress or (lambda share: None)
     check_purpose(purpose, recordings)
     check_duration(duration)
-    question = (commissioning(model, recordings, noise, decisions)
-                if purpose == 'commission' and not model.moves_joints else
-                question_of(model, recordings, lambda share: report(0.2 * share), decisions))
     limits = limits or (ArmLimits() if model.moves_joints else MotionLimits())
-    limits = replace(limits, effort_reserve=max(
-        limits.effort_reserve, RESERVE * question.noise_floor))
-    return design_experiment(question, limits, duration, seed,
-                             lambda share: report(0.2 + 0.8 * share))
+    motions = Motions(model, limits, duration)
+    if purpose == COMMISSION and model.moves_joints:
+        return commission_arm(replace(motions, harmonics=(ARM_HARMONICS,)), seed, report)
+    question = (commissioning(model, recordings, motions, noise, decisions)
+                if purpose == COMMISSION else
+                question_of(model, recordings, motions, lambda share: report(0.2 * share),
+                            decisions))
+    motions = replace(motions, limits=replace(limits, effort_reserve=max(
+        limits.effort_reserve, RESERVE * question.noise_floor)))
+    return design_experiment(question, motions, seed, lambda share: report(0.2 + 0.8 * share))
 
 
-def design_experiment(
-    question: Question, limits: MotionLimits | ArmLimits, duration: float, seed: int,
-    progress: Callable[[float], None] = lambda share: None,
-) -> Experiment:
+def design_experiment(question: Question, motions: Motions, seed: int,
+                      progress: Callable[[float], None] = lambda share: None) -> Experiment:
     """Return the motion that answers a question best."""
-    motions = (ArmMotions(question.model, limits, duration) if isinstance(limits, ArmLimits)
-               else PlatformMotions(question.model, limits, duration))
-    asked = question
+    drawn = motions.drawn(seed)
+    if question.contests:
+        question = question.without_hopeless([question.gram(motions, one) for one in drawn])
+    best = design(motions, drawn, lambda series: question.worth(question.gram(motions, series)),
+                  seed, progress)
+    after = question.known + question.gram(motions, best)
+    return Experiment(
+        question.kind, tuple(dict.fromkeys(term.effect.name for terms in question.subjects
+                                           for term in terms)),
+        _expected(question, after), tuple(_accuracies(question, after)), motions.uses(best),
+        best.duration, lambda time: motions.sampled(best, time), question.plan.model)
 
-    def screened(drawn: list[Any]) -> Callable[[Any], float]:
-        nonlocal asked
-        asked = without_hopeless(question, [question.gram(motion) for motion in drawn])
-        return lambda motion: asked.worth(asked.gram(motion))
 
-    best = design(motions, lambda motion: 0.0, seed, progress, screened)
-    progress(1.0)
-    return experiment_of(asked, best, limits_of(motions, best))
+def commission_arm(motions: Motions, seed: int,
+                   progress: Callable[[float], None] = lambda share: None) -> Experiment:
+    """Return the motion that determines most about the links, rotors and friction of an arm."""
+    known = ArmInformation(motions.model, motions.limits)
 
+    def worth(series: JointSeries) -> float:
+        return float(np.sum(np.log1p(known.of(series))))
 
-def without_hopeless(question: Question, grams: Sequence[Array]) -> Question:
-    """Return a question without the contests that none of some motions would decide."""
-    contests = question.contests
-    if not contests:
-        return question
-    known = question.known
-    gained = np.max([misfits_of(contests, known + gram) for gram in grams],
-                    axis=0) - misfits_of(contests, known)
-    hopeful = [contest for contest, more in zip(contests, gained, strict=True)
-               if contest.now + more > question.decisions.rival_margin]
-    return question.with_contests(hopeful) if hopeful else question
+    best = design(motions, motions.drawn(seed), worth, seed, progress)
+    gains = known.of(best)
+    return Experiment(COMMISSION, (), (), (), motions.uses(best), best.duration, best.motion,
+                      motions.model, (int(np.sum(gains > 1)), len(gains)))
 
 
 def check_purpose(purpose: str, recordings: Sequence[object]) -> None:
     """Raise PurposeError for a purpose that needs recordings where there are none."""
     if purpose not in PURPOSES:
         raise PurposeError(f'purpose is {purpose!r}, must be one of {", ".join(PURPOSES)}')
-    if purpose == 'separate' and not recordings:
+    if purpose == SEPARATE and not recordings:
         raise PurposeError('purpose separate: no recording is given, but it reads from recordings '
                            'what is to be told apart; a new robot starts with --purpose '
                            'commission')
@@ -305,71 +298,42 @@ def check_duration(duration: float) -> None:
                            f'{LONGEST:g} s')
 
 
-def experiment_of(question: Question, motion: Motion, limits: dict[str, float]) -> Experiment:
-    """Return a motion with what it promises for a question; `limits`: its use of them."""
-    known, after = question.known, question.known + question.gram(motion)
-    contests = tuple(found for one in question.contests for found in _expected(
-        one, known, after, question.decisions.rival_margin))
-    decided = [one.expected for one in contests if one.probability >= SURE]
-    evidences = _evidences(question, after)
-    if contests:
-        expected = min(decided or [one.expected for one in contests])
-    else:
-        expected = min(evidences.values(), default=0.0)
-    return Experiment(
-        question.kind, tuple(dict.fromkeys(one.name for one in question.subjects)), contests,
-        tuple(_accuracies(question, known, after)), expected,
-        () if contests else tuple(name for name, one in evidences.items() if one <= 0),
-        limits, motion.duration, motion.motion,
-        lambda time: question.model.drive_forces(motion.motion(time)), question.model)
+def _expected(question: Question, after: Array) -> tuple[ExpectedEvidence, ...]:
+    """Return what a motion promises for every pair of effects of the contests."""
+    found = []
+    for contest in question.contests:
+        gained = max(contest.misfit(after) - contest.misfit(question.known), 0.0)
+        expected = contest.now + gained
+        # Twice a log-likelihood ratio scatters by twice the root of its mean.
+        sure = float(ndtr((expected - question.decisions.rival_margin)
+                          / (2 * np.sqrt(gained) + 1e-9)))
+        found += [ExpectedEvidence(truth, rival, contest.now, expected, sure)
+                  for truth, rival in product(contest.truth, contest.rival)]
+    return tuple(found)
 
 
-def _expected(contest: Contest, known: Array, after: Array, margin: float,
-              ) -> list[ExpectedEvidence]:
-    """Return what a motion promises for every pair of effects of a contest."""
-    expected, gained = contest.evidence(known, after), contest.gained(known, after)
-    # Twice a log-likelihood ratio scatters by twice the root of its mean.
-    sure = float(ndtr((expected - margin) / (2 * np.sqrt(gained) + 1e-9)))
-    return [ExpectedEvidence(truth, rival, contest.now, expected, sure)
-            for truth, rival in product(*contest.sides)]
-
-
-def _evidences(question: Question, after: Array) -> dict[str, float]:
-    """Return the evidence of each subject against its absence, the least of its drives."""
-    base = tuple(range(len(question.plan.base)))
-    found: dict[str, float] = {}
-    for one in question.subjects:
-        own = Precision(one.index, base, np.ones(len(one.index))).own(after)
-        evidence = float(one.truth @ own @ one.truth) - one.prior_cost
-        found[one.name] = min(evidence, found.get(one.name, np.inf))
-    return found
-
-
-def _accuracies(question: Question, known: Array, after: Array) -> list[Accuracy]:
-    """Return how well numbers and effects would be known; effects that may be there each alone."""
+def _accuracies(question: Question, after: Array) -> list[Accuracy]:
+    """Return how well numbers and effects would be known; of common effects each alone."""
     if question.contests:
         return []
-    plan, found = question.plan, []
-    if question.kind == 'commission' or not question.subjects:
+    plan, model = question.plan, question.plan.model
+    groups: list[tuple[list[tuple[str, str, float]], Precision]] = []
+    if question.kind == COMMISSION:
         numbers = [one.number for one in plan.base if isinstance(one, ModelNumber)]
         # Their columns are per standard deviation of what is known beforehand.
-        found += _known_to([(one.label, one.unit, one.deviation) for one in numbers],
-                           precision_of(plan, ()), known, after)
-    groups = ([question.subjects] if question.kind == 'estimate' else
-              [(one,) for one in question.subjects])
-    for group in groups:
-        found += _known_to([label for one in group for term in one.terms
-                            for label in _labels(term, question.model)],
-                           precision_of(plan, group), known, after)
+        groups.append(([(one.label, one.unit, one.deviation) for one in numbers],
+                       precision_of(plan, (), plan.numbers)))
+    together = ([[term for subject in question.subjects for term in subject]]
+                if question.kind == ESTIMATE else map(list, question.subjects))
+    groups += [([label for term in terms for label in _labels(term, model)],
+                precision_of(plan, terms)) for terms in together]
+    found = []
+    for labels, precision in groups:
+        before, later = (precision.deviations(gram) / precision.scales
+                         for gram in (question.known, after))
+        found += [Accuracy(label, unit, scale, scale * float(a), scale * float(b))
+                  for (label, unit, scale), a, b in zip(labels, before, later, strict=True)]
     return found
-
-
-def _known_to(labels: list[tuple[str, str, float]], precision: Precision, known: Array,
-              after: Array) -> list[Accuracy]:
-    """Return accuracies by name, unit and what one scale of the precision is in that unit."""
-    before, later = (precision.deviations(gram) / precision.scales for gram in (known, after))
-    return [Accuracy(label, unit, scale, scale * float(a), scale * float(b))
-            for (label, unit, scale), a, b in zip(labels, before, later, strict=True)]
 
 
 def _labels(term: FittedTerm, model: DriveModel) -> list[tuple[str, str, float]]:

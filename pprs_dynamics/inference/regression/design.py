@@ -35,6 +35,7 @@ from pprs_dynamics.inference.regression.base_columns import (
 from pprs_dynamics.inference.regression.drive_ranges import SecondEncoders, drive_range
 from pprs_dynamics.inference.regression.sensitivities import (
     BARE,
+    DRIVE_WIDTHS,
     HOMING,
     INERTIA,
     NUMBERS,
@@ -55,6 +56,7 @@ from pprs_dynamics.inference.residuals.reconstruction import (
 )
 from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
+from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.added_body import AddedBody
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.effects.drive_effect import (
@@ -69,6 +71,7 @@ from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction
 from pprs_dynamics.physics.effects.structure_effect import StructureEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
 from pprs_dynamics.physics.model.drive_model import DriveModel
+from pprs_dynamics.physics.model.forces import Forces
 from pprs_dynamics.physics.model.uncertainties import effect_uncertainties
 from pprs_dynamics.physics.three_pprs.active_friction import ActiveFriction
 
@@ -277,7 +280,51 @@ class Design:
             full.append(collector.full_rate(reconstruction))
             notes += reconstruction.notes
         stacked = stacked_columns(tables)
-        residuals = join_tables(model, tables)
+        return cls._assembled(sensitivities, stacked, join_tables(model, tables), tuple(full),
+                              tuple(notes), reconstructions, reversals)
+
+    @classmethod
+    def planned(cls, sensitivities: Sensitivities, forces: Forces, time: Array,
+                block: int = 1) -> Design:
+        """Return the design of a motion that nobody has made yet.
+
+        All widths of reversal are open, since a drive that stood in a recording may move here.
+
+        Parameters
+        ----------
+        sensitivities : Sensitivities
+            Of the model.
+        forces : Forces
+            Of the model on the motion, before its sensors.
+        time : (N,) array
+            [s]
+        block : int
+            Samples that are averaged.
+        """
+        s, samples = forces.mechanism, len(time)
+        treat = Treatment(np.arange(0, samples - samples % block or samples, block), samples)
+        stacked = {name: treat(column.transpose(1, 0, 2)).transpose(1, 2, 0)
+                   for name, column in sensitivities.columns(forces).items()}
+        full = FullRate(time, s.position, s.velocity, s.acceleration, s.direction, s.friction_load,
+                        s.transmitted, forces.total, forces.total, (slice(0, samples),), treat,
+                        float(time[0]), {})
+        means = treat(forces.total)
+        residuals = Residuals(sensitivities.model.drives, treat(time),
+                              np.zeros(len(means), dtype=int), means, means,
+                              period=float(time[1] - time[0]) * block)
+        widths = {(drive, number) for number in range(len(DRIVE_WIDTHS) + 1)
+                  for drive in (None, *range(len(sensitivities.model.drives)))}
+        return cls._assembled(sensitivities, stacked, residuals, (full,), reversals=widths)
+
+    @classmethod
+    def _assembled(
+        cls, sensitivities: Sensitivities, stacked: Mapping[str, Array], residuals: Residuals,
+        full: tuple[FullRate, ...], notes: tuple[str, ...] = (),
+        reconstructions: tuple[Reconstruction, ...] = (),
+        reversals: Container[tuple[int | None, int]] | None = None,
+    ) -> Design:
+        """Return the design of treated columns, (k, D, M) by name as `Sensitivities.columns`."""
+        model, given = sensitivities.model, sensitivities.given
         count = len(model.drives)
         there = [(PRESENT + effect.name, type(effect)) for effect in given.effects
                  if isinstance(effect, StructureEffect)]
@@ -288,8 +335,7 @@ class Design:
                 *((effect.name, effect) for effect in sensitivities.searched), *there))
         homing, inertia = (tuple(dict(enumerate(column)) for column in stacked.get(name, ()))
                            for name in (HOMING, INERTIA))
-        design = cls(given, model, residuals, tuple(full), (), structure, homing, inertia,
-                     tuple(notes),
+        design = cls(given, model, residuals, full, (), structure, homing, inertia, notes,
                      reconstructions, residuals.model)
         base: list[BaseColumn] = [
             ModelNumber(_rows(column), 1.0, number)

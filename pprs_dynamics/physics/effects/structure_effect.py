@@ -63,7 +63,10 @@ class BodyEffect(StructureEffect):
 
     def apply(self, state: MechanismState) -> Any:
         """Return the state with the effect in its bodies."""
-        return state.with_load(self.changed(state.robot), self.load(state))
+        load, shape = self.load(state), (len(state.velocity), 6)
+        if load is not None and load.wrench.shape != shape:
+            raise ValueError(f'the wrench has shape {load.wrench.shape}, must be {shape}')
+        return state.with_load(self.changed(state.robot), load)
 
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the change of the rigid body's drive forces [N, N m], (N, D)."""

@@ -340,8 +340,7 @@ class DriveModel:
     def at_drives(self, state: MechanismState) -> MechanismState:
         """Return the state in which the links follow drives that move as in another."""
         motion = self.robot.motion_of_drives(
-            state.position, state.velocity, state.acceleration,
-            None if state.motion is None else state.motion[:1]).with_channels(state.channels)
+            state.position, state.velocity, state.acceleration).with_channels(state.channels)
         return self.mechanism(motion if state.time is None else motion.with_time(state.time))
 
     def drive_forces(self, motion: Any, state: ModelState | None = None) -> Forces:

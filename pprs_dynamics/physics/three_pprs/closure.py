@@ -144,19 +144,6 @@ def eliminate(geometry: GeometryParameters, rows: ThreeRows, rods: Any) -> Elimi
         determinant)
 
 
-def solve_closure(
-    geometry: GeometryParameters, e: Elimination, rods: Any, right: DriveValues,
-) -> Twist:
-    """Return the twist for right sides of Eq. (4)."""
-    k1, k2, k3 = geometry.chains
-    a, b, c = right.slides
-    h_x = k1.left_x * a + k2.left_x * b + k3.left_x * c
-    h_y = k1.left_y * a + k2.left_y * b + k3.left_y * c
-    f0 = k1.balance * a + k2.balance * b + k3.balance * c
-    f1, f2, f3 = _horizontal_shares(geometry, rods, h_x, h_y)
-    return _twist(e, h_x, h_y, f0, right.lifts[0] + f1, right.lifts[1] + f2, right.lifts[2] + f3)
-
-
 def _twist(
     e: Elimination, h_x: Value, h_y: Value, f0: Value, f1: Value, f2: Value, f3: Value,
 ) -> Twist:
@@ -216,18 +203,6 @@ def rod_row(chain: Any, length: Value, arm: ChainVector, s_u: Value) -> Wrench:
 def power(wrench: Wrench, twist: Twist) -> Value:
     """Return the power of a wrench on a twist."""
     return dot(wrench.force, twist.v) + dot(wrench.moment, twist.omega)
-
-
-def platform_twist(inverse: Inverse, right: DriveValues) -> Twist:
-    """Return the twist for right sides of Eq. (4), [B]^-1 times them."""
-    a, b, c = right.slides
-    d, e, f = right.lifts
-    slide_1, slide_2, slide_3 = inverse.columns.slides
-    lift_1, lift_2, lift_3 = inverse.columns.lifts
-    return Twist(plus(combine(a, slide_1.v, b, slide_2.v, c, slide_3.v),
-                      combine(d, lift_1.v, e, lift_2.v, f, lift_3.v)),
-                 plus(combine(a, slide_1.omega, b, slide_2.omega, c, slide_3.omega),
-                      combine(d, lift_1.omega, e, lift_2.omega, f, lift_3.omega)))
 
 
 def square(twist: Twist, r: Any) -> Any:

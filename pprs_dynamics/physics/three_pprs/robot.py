@@ -18,13 +18,14 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import COUNT, DRIVES
 from pprs_dynamics.errors import ModelError
 from pprs_dynamics.physics.mechanism.evaluation import KernelParameters
+from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.places import PLATFORM, BodyPlace, PassiveJoint
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.vectors import Vector
-from pprs_dynamics.physics.three_pprs.forward_motion import platform_rates, solve_forward_motion
+from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
 from pprs_dynamics.physics.three_pprs.jacobians import condition_number
 from pprs_dynamics.physics.three_pprs.kernel_parameters import (
@@ -37,6 +38,7 @@ from pprs_dynamics.physics.three_pprs.kernel_parameters import (
 )
 from pprs_dynamics.physics.three_pprs.kinematics import PlatformKinematics
 from pprs_dynamics.physics.three_pprs.rigid_body import RigidBody, solve_bodies
+from pprs_dynamics.physics.three_pprs.tree import tree_structure
 
 RODS = 'rods'
 HOME_HEIGHT = 0.5  # [m], of the platform at home
@@ -169,12 +171,20 @@ class ThreePprs:
             self.geometry.kernel_parameters.named, body, (first, second, third),
             Vector(*self.gravity)))
 
+    def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array, *, is_free: bool = True,
+                     ) -> Mechanism:
+        """Return the robot as a mechanism; see `tree_structure`."""
+        structure = tree_structure(self.geometry, self.masses, (*strokes, efforts), is_free)
+        bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
+        return Mechanism(structure, bodies, structure.inertial[bodies], np.zeros(COUNT),
+                         self.gravity)
+
     # --- motion --------------------------------------------------------------------------------
 
     def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
-                         seed: PlatformMotion | None = None) -> PlatformMotion:
-        """Return the platform's motion, by forward kinematics."""
-        return solve_forward_motion(self.geometry, position, velocity, acceleration, seed).motion
+                         closed: dict[Any, Array] | None = None) -> PlatformMotion:
+        """Return the platform's motion, by forward kinematics; see `solve_forward_motion`."""
+        return solve_forward_motion(self.geometry, position, velocity, acceleration, closed)
 
     def at_home(self, samples: int) -> PlatformMotion:
         """Return the platform at rest at its home pose."""
@@ -224,17 +234,10 @@ class ThreePprs:
         return load
 
     def moved(self, state: MechanismState, position: Array, acceleration: Array) -> MechanismState:
-        """Return the state at other drive positions, to first order, and accelerations."""
-        motion = state.motion
-        if position is not state.position:
-            from scipy.spatial.transform import Rotation  # here: commands start without it
-
-            move = np.einsum('nij,nj->ni', state.links.J, position - state.position)
-            turned = Rotation.from_rotvec(move[:, 3:]) * Rotation.from_quat(motion.orientation)
-            motion = PlatformMotion.at_rest(motion.position + move[:, :3], turned.as_quat())
-        rates = platform_rates(self.geometry, motion, state.velocity, acceleration)
-        rates = rates.with_channels(state.channels)
-        return replace(self.state(rates if state.time is None else rates.with_time(state.time),
+        """Return the state at other positions and accelerations of the drives."""
+        motion = self.motion_of_drives(position, state.velocity, acceleration)
+        motion = motion.with_channels(state.channels)
+        return replace(self.state(motion if state.time is None else motion.with_time(state.time),
                                   state.reversal), robot=state.robot, load=state.load)
 
     # --- singularities ----------------------------------------------------------------------------
