@@ -128,10 +128,10 @@ def test_platform_rates_are_differences_of_forward_kinematics(elbow):
 
         def motion(self, time):
             q = drives(time)
-            return solve_forward_motion(geometry, q, 0 * q, 0 * q).motion
+            return solve_forward_motion(geometry, q, 0 * q, 0 * q)
 
     expected = motion_from_poses(Path(), t)
-    found = solve_forward_motion(geometry, drives(t), drives(t, 1), drives(t, 2)).motion
+    found = solve_forward_motion(geometry, drives(t), drives(t, 1), drives(t, 2))
     # Poses are known to 1e-13; over h^2 = 1e-6 that is 1e-7. Truncation: h^4 of 5 rad/s.
     for name, tolerance in (('position', 1e-12), ('linear_velocity', 1e-9),
                             ('angular_velocity', 1e-8), ('linear_acceleration', 1e-6),

@@ -360,7 +360,7 @@ class ThreePprs:
     def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
                          closed: dict[Any, Array] | None = None) -> PlatformMotion:
         """Return the platform's motion, by forward kinematics; see `solve_forward_motion`."""
-        return solve_forward_motion(self.geometry, position, velocity, acceleration, closed).motion
+        return solve_forward_motion(self.geometry, position, velocity, acceleration, closed)
 
     def at_home(self, samples: int) -> PlatformMotion:
         """Return the platform at rest at its home pose."""
