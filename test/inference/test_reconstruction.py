@@ -11,21 +11,18 @@ from functools import cache
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from random_states import paper_model
+from random_states import inverse_kinematics, paper_model
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import PlatformMotion
 from pprs_dynamics.errors import ConvergenceError, MotionError
 from pprs_dynamics.inference.residuals.reconstruction import reconstruct, treated_forces
 from pprs_dynamics.measurement.files.recording import Recording
-from pprs_dynamics.measurement.motion.differentiation import (
-    LocalPolynomial,
-)
+from pprs_dynamics.measurement.motion.differentiation import LocalPolynomial
 from pprs_dynamics.measurement.motion.drive_motion import smooth_drives
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.physics.three_pprs.inverse_kinematics import solve_inverse_kinematics
 
 RATE, RESOLUTION, DURATION = 500.0, 1e-6, 8.0  # [Hz, m, s]
 STEP = 1 / RATE
@@ -66,7 +63,7 @@ def truth_at(time, frequency=1.0, amplitude=0.06, tilt=0.15, seed=1):
     """Return what the paper's robot does and needs at times within 0..DURATION."""
     path = Excitation(DURATION + 1, seed, amplitude, tilt, frequency)
     motion = motion_from_poses(path, np.asarray(time) + 0.5)
-    return Truth(np.asarray(time), solve_inverse_kinematics(MODEL.robot.geometry, motion),
+    return Truth(np.asarray(time), inverse_kinematics(MODEL.robot.geometry, motion),
                  MODEL.drive_forces(motion).total)
 
 

@@ -11,14 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_up_recordings import (
-    DYNAMIC,
-    STATE,
-    STORE,
-    message,
-    with_definitions,
-    write_plain_bag,
-)
+from made_up_recordings import DYNAMIC, STATE, STORE, message, with_definitions, write_plain_bag
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Writer
 from rosbags.typesys import Stores, get_typestore

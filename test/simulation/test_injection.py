@@ -232,8 +232,8 @@ def test_given_drives_have_the_effect() -> None:
                                              np.random.default_rng(0), 1.0)],
                     np.random.default_rng(2))
     assert run.truths[0]['drives'] == ['lift_1', 'slide_2']
-    for words, text in (('viscous', 'did you mean'), ('base_tilt:lift_1', 'acts in no drive'),
-                        ('effort_offset:x', 'acts in a drive')):
+    for words, text in (('viscous', 'did you mean'), ('base_tilt:lift_1', 'does not act in'),
+                        ('effort_offset:x', 'does not act in')):
         with pytest.raises(InjectedEffectError, match=text):
             Injection(plain_platform(), [named(words, np.random.default_rng(0), 1.0)],
                       np.random.default_rng(2))

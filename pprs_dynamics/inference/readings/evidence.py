@@ -95,7 +95,7 @@ def _forces(model: DriveModel, motion: DriveMotion, time: Array) -> Array:
     rigid, others = [], np.zeros_like(still)
     with np.errstate(all='ignore'):
         for each in (motion, replace(motion, velocity=still, acceleration=still)):
-            followed = follow(model, time, each).motion.with_time(time)
+            followed = follow(model, time, each).with_time(time)
             forces = model.drive_forces(followed)
             rigid.append(np.sum([forces.parts[name] for name in forces.parts if name in bodies],
                                 axis=0))

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,31 +32,16 @@ from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.laws.elastic_joint import LINK_POSITION
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.motion import QUANTITIES, PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 
 if TYPE_CHECKING:
     from pprs_dynamics.measurement.files.recording import Recording
 
 POSITION_STEP = 1e-4  # [m, rad], for derivatives of errors by positions
 CHUNK = 16_000  # samples at a time; a million at once would take gigabytes
-PLATFORM_COLUMNS = 19  # of `PlatformMotion.rows`
 Motion = PlatformMotion | JointMotion
-
-
-class FollowedMotion(NamedTuple):
-    """Motion of N samples without times, and nearness to another branch (N,)."""
-
-    motion: Motion
-    near_branch: np.ndarray
-
-    @property
-    def notes(self) -> list[str]:
-        """The findings as sentences."""
-        count = int(self.near_branch.sum())
-        return [f'{count} samples lie near another solution of the forward kinematics, where small '
-                'errors of positions matter most'] if count else []
+MOTION = ('position', 'velocity', 'acceleration')
 
 
 @dataclass(frozen=True)
@@ -97,8 +82,6 @@ class Reconstruction(DriveMotion):
         nothing.
     treat : Treatment
         What effort and model both get: values (N, k) -> (M, k).
-    near_branch : (N,) bool array
-        See `ForwardMotion`.
     gain : (D,) array
         By which recorded currents were multiplied [N m/A, N/A]; NaN where efforts were recorded.
     dropped : int
@@ -121,7 +104,6 @@ class Reconstruction(DriveMotion):
     motion: Motion
     effort: Array
     treat: Treatment
-    near_branch: np.ndarray
     gain: Array
     dropped: int
     start: float
@@ -162,8 +144,8 @@ class Reconstruction(DriveMotion):
 
 
 def follow(model: DriveModel, time: Array, drives: DriveMotion,
-           progress: Progress | None = None) -> FollowedMotion:
-    """Return the motion that belongs to the drives'; of the platform, on a 3-PPRS.
+           progress: Progress | None = None) -> Motion:
+    """Return the motion, without times, that belongs to one of the drives.
 
     Parameters
     ----------
@@ -179,29 +161,27 @@ def follow(model: DriveModel, time: Array, drives: DriveMotion,
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    count = len(time)
-    if model.moves_joints:
-        return FollowedMotion(JointMotion(drives.position, drives.velocity, drives.acceleration),
-                              np.zeros(count, dtype=bool))
-    platform = np.empty((count, PLATFORM_COLUMNS))
-    near = np.zeros(count, dtype=bool)
+    parts: list[Any] = []
     for segment in drives.segments:
         closed: dict[Any, Array] = {}
         for start in range(segment.start, segment.stop, CHUNK):
             rows = slice(start, min(start + CHUNK, segment.stop))
             try:
-                found = solve_forward_motion(
-                    model.robot.geometry, drives.position[rows], drives.velocity[rows],
-                    drives.acceleration[rows], closed)
+                parts.append(model.robot.motion_of_drives(
+                    drives.position[rows], drives.velocity[rows], drives.acceleration[rows],
+                    closed))
             except ConvergenceError as error:
                 sample = start + error.sample
                 raise ConvergenceError(
                     int(drives.index[sample]), f'at {time[sample]:.6g} s {error.found}',
                     error.rule) from None
-            platform[rows], near[rows] = found.motion.rows, found.near_branch
             if progress is not None:
-                progress(rows.stop, count)
-    return FollowedMotion(PlatformMotion.from_rows(platform), near)
+                progress(rows.stop, len(time))
+    kind = type(parts[0])
+    names = QUANTITIES if kind is PlatformMotion else MOTION
+    motion: Motion = kind(*(np.concatenate([getattr(part, name) for part in parts])
+                            for name in names))
+    return motion
 
 
 def reconstruct(
@@ -213,7 +193,6 @@ def reconstruct(
     Parameters
     ----------
     model : DriveModel
-        Whose kinematics to use.
     recording : Recording
         Or anything with its arrays and segments.
     progress : callable, optional
@@ -238,11 +217,10 @@ def reconstruct(
     read, time, total = drives, recording.time[drives.index], len(drives.index)
     effort = _efforts(model, recording)[drives.index]
     windup = _windup(recording, read)
-    drives, followed = _followed_rightly(model, recording, read, time, windup, progress)
+    drives, motion = _followed_rightly(model, recording, read, time, windup, progress)
     dropped = sum(part.stop - part.start for part in recording.segments) - total
     notes = [*drives.notes, f'{dropped} samples are dropped: half a window at the ends of '
-             f'{len(drives.segments)} segments, what fills no block, and segments too short',
-             *followed.notes]
+             f'{len(drives.segments)} segments, what fills no block, and segments too short']
     rests = np.isfinite(recording.effort[drives.index]) & np.isnan(effort)
     if np.any(rests):
         shares = (f'{name} {share:.0%}' for name, share in zip(
@@ -251,9 +229,8 @@ def reconstruct(
                      + (', '.join(shares) or 'less than 0.5% of the time'))
     drives = replace(drives, notes=tuple(notes))
     return Reconstruction(
-        **vars(drives), time=time, motion=followed.motion, effort=effort,
-        treat=Treatment(drives.block_starts, total), near_branch=followed.near_branch,
-        gain=_applied_gain(recording), dropped=dropped,
+        **vars(drives), time=time, motion=motion, effort=effort,
+        treat=Treatment(drives.block_starts, total), gain=_applied_gain(recording), dropped=dropped,
         start=float(recording.time[0]), channels=_channels(recording, drives.index),
         recorded=recording, read=read, windup=windup)
 
@@ -268,12 +245,12 @@ def read_by(reconstruction: Reconstruction, model: DriveModel) -> Reconstruction
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    drives, followed = _followed_rightly(
+    drives, motion = _followed_rightly(
         model, reconstruction.recorded, reconstruction.read, reconstruction.time,
         reconstruction.windup)
     return replace(reconstruction, position=drives.position, velocity=drives.velocity,
                    acceleration=drives.acceleration, smoothing=drives.smoothing,
-                   motion=followed.motion, near_branch=followed.near_branch)
+                   motion=motion)
 
 
 def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recording: Recording,
@@ -309,7 +286,7 @@ def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recordin
 def _followed_rightly(
     model: DriveModel, recording: Recording, read: DriveMotion, time: Array,
     windup: Array | None, progress: Progress | None = None,
-) -> tuple[DriveMotion, FollowedMotion]:
+) -> tuple[DriveMotion, Motion]:
     """Return the true motion of the drives, and of what they move, behind that which was read."""
     if not model.misreadings:
         return read, follow(model, time, read, progress)
@@ -324,7 +301,7 @@ def _followed_rightly(
         return drives, followed
     # Loads hardly change by what they do to positions: one step is enough.
     load = np.concatenate([
-        model.mechanism(followed.motion[start:start + CHUNK]).transmitted
+        model.mechanism(followed[start:start + CHUNK]).transmitted
         for start in range(0, len(time), CHUNK)])
     drives = replace(drives, position=drives.position - model.loaded_position_error(load))
     if windup is not None:
@@ -368,8 +345,7 @@ def _efforts(model: DriveModel, recording: Recording) -> Array:
     Where poses are held throughout, their efforts count: they show gravity and offsets.
     """
     effort = recording.effort
-    if model.rest_speed and not are_held_poses(
-            recording.position, recording.segments):
+    if model.rest_speed and not are_held_poses(recording.position, recording.segments):
         effort = effort.copy()
         for part in recording.segments:
             step = float(np.median(np.diff(recording.time[part])))

@@ -10,7 +10,7 @@ has at home.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,33 +20,14 @@ from pprs_dynamics.errors import ConvergenceError, WorkspaceError
 from pprs_dynamics.physics.mechanism.link_motion import LinkMotion
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.mechanism.motion_checks import checked_matrix
-from pprs_dynamics.physics.mechanism.tree_tables import DETERMINANT
 from pprs_dynamics.physics.three_pprs.geometry import Geometry
 from pprs_dynamics.physics.three_pprs.tree import structure_of
-
-# Where det [B] has fallen to this share of its value at home, two solutions are about to meet.
-NEAR_BRANCH = 0.1
-
-
-class ForwardMotion(NamedTuple):
-    """The platform's motion at N samples.
-
-    Parameters
-    ----------
-    motion : PlatformMotion
-    near_branch : (N,) bool array
-        True where another solution is close: abs(det [B]) below a tenth of its value at home.
-        Poses there are sensitive to the measurement and may have left the true branch.
-    """
-
-    motion: PlatformMotion
-    near_branch: np.ndarray
 
 
 def solve_forward_motion(
     geometry: Geometry, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike,
     closed: dict[Any, Array] | None = None,
-) -> ForwardMotion:
+) -> PlatformMotion:
     """Return the platform's motion that belongs to a continuous motion of the drives.
 
     Parameters
@@ -78,11 +59,9 @@ def solve_forward_motion(
             'they must close the mechanism in the assembly mode of the home pose') from None
     m, (row, _) = links.motion, structure.links[structure.tool]
     closed[structure] = m.q[-1].copy()
-    motion = PlatformMotion(m.p[:, row], _orientation(*(m.q[:, structure.coordinates.index(
+    return PlatformMotion(m.p[:, row], _orientation(*(m.q[:, structure.coordinates.index(
         f'platform.{angle}')] for angle in ('yaw', 'pitch', 'roll'))),
         m.u[:, row], m.w[:, row], m.ud[:, row], m.wd[:, row])
-    home = structure.evaluation.at_home[DETERMINANT]
-    return ForwardMotion(motion, m.solution[:, DETERMINANT] / home < NEAR_BRANCH)
 
 
 def _orientation(yaw: Array, pitch: Array, roll: Array) -> Array:
