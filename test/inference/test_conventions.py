@@ -182,21 +182,6 @@ def test_velocities_that_are_not_the_derivative_are_told(factor: float, word: st
            [f'velocity of lift_1, lift_2, lift_3 is {word}'])
 
 
-def test_a_real_drive_is_called_right() -> None:
-    from benchmarks.real import emps_files as emps
-    from benchmarks.real.recorded_data import find_data, missing
-
-    data = find_data('emps', emps.IDENTIFICATION)
-    if data is None:
-        pytest.skip(missing('emps'))
-    for name in (emps.IDENTIFICATION, emps.PULSES):
-        run = emps.read_emps(data / name)
-        assert find_mistakes(AXIS, run) == ()
-        (finding,) = find_mistakes(AXIS, Recording.from_arrays(
-            'minus', run.time, run.position, None, -run.effort, ('axis',)))
-        assert MINUS in finding.what
-
-
 def test_commands_say_it_before_they_compare(tmp_path: Path) -> None:
     write_recording(tmp_path / 'minus.csv', recording(scaled(effort=-1.0)(robot())))
     write_recording(tmp_path / 'mm.csv', recording(scaled(motion=1e3)(robot())))
