@@ -30,11 +30,9 @@ from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.incoming_bytes import is_whole, message_in
 from pprs_dynamics.ros.messages.status_codes import Rejection
 from pprs_dynamics.ros.messages.trajectory_request import (
+    TRAJECTORY,
     RequestReader,
-    joint_reader,
-    read_joint_trajectory,
-    read_trajectory,
-    reader_for,
+    readers_for,
 )
 
 pytestmark = pytest.mark.nodes
@@ -54,7 +52,11 @@ def random_message(points: int, seed: int) -> MultiDOFJointTrajectory:
 
 
 def poses() -> RequestReader:
-    return reader_for(DriveModel.load())
+    return readers_for(DriveModel.load())[TRAJECTORY]
+
+
+def joints_of(names: Sequence[str]) -> RequestReader:
+    return RequestReader(JointTrajectory, names)
 
 
 def outcome(read: Callable[..., Any], *what: Any) -> object:
@@ -82,7 +84,7 @@ def from_bytes(reader: RequestReader, message: Any) -> object:
 @given(POINTS, SEEDS)
 def test_bytes_and_objects_give_the_same_numbers(points: int, seed: int) -> None:
     message = random_message(points, seed)
-    assert from_bytes(poses(), message) == outcome(read_trajectory, message)
+    assert from_bytes(poses(), message) == outcome(poses().of_message, message)
 
 
 LEGS = tuple(f'leg_{k}' for k in range(1, 7))
@@ -106,16 +108,16 @@ def joint_message(points: int, seed: int, joints: Sequence[str] = LEGS) -> Joint
 def test_joints_are_read_from_bytes_as_from_objects(joints: int, points: int, seed: int) -> None:
     names = tuple(f'j{"o" * k}int' for k in range(joints))
     message = joint_message(points, seed, names)
-    assert from_bytes(joint_reader(names), message) == outcome(
-        read_joint_trajectory, message, names)
+    assert from_bytes(joints_of(names), message) == outcome(
+        joints_of(names).of_message, message)
 
 
 @pytest.mark.parametrize('order', [LEGS, LEGS[::-1], (*LEGS[2:], *LEGS[:2])])
 def test_joints_come_in_any_order_and_frame(order: tuple[str, ...]) -> None:
     message = joint_message(2, 3, order)
     message.header.frame_id = 'map'
-    assert from_bytes(joint_reader(LEGS), message) == outcome(
-        read_joint_trajectory, message, LEGS)
+    assert from_bytes(joints_of(LEGS), message) == outcome(
+        joints_of(LEGS).of_message, message)
 
 
 @settings(max_examples=200)
@@ -131,8 +133,8 @@ def test_joint_messages_of_another_layout_are_left_to_the_ordinary_path(
         message.joint_names = rng.permutation(LEGS).tolist()[:int(rng.integers(5, 7))]
     else:
         setattr(point, field, [0.5] * int(rng.choice([0, 5, 7] if field != 'effort' else [1, 6])))
-    assert outcome(joint_reader(LEGS).read, serialize_message(message)) == outcome(
-        read_joint_trajectory, message, LEGS)
+    assert outcome(joints_of(LEGS).read, serialize_message(message)) == outcome(
+        joints_of(LEGS).of_message, message)
 
 
 @settings(max_examples=200)
@@ -146,9 +148,9 @@ def test_changed_joint_bytes_give_the_ordinary_numbers_or_a_rejection(
         data[int(rng.integers(len(data)))] = int(rng.integers(256))
 
     def ordinary(data: bytes, now: int, missing: str) -> Any:
-        return read_joint_trajectory(message_in(data, JointTrajectory), LEGS, now, missing)
+        return joints_of(LEGS).of_message(message_in(data, JointTrajectory), now, missing)
 
-    assert outcome(joint_reader(LEGS).read, bytes(data)) == outcome(ordinary, bytes(data))
+    assert outcome(joints_of(LEGS).read, bytes(data)) == outcome(ordinary, bytes(data))
 
 
 def alter(message: MultiDOFJointTrajectory, rng: np.random.Generator) -> None:
@@ -180,7 +182,7 @@ def test_whatever_differs_from_the_layout_is_left_to_the_ordinary_path(
 ) -> None:
     message = random_message(points, seed)
     alter(message, np.random.default_rng(seed))
-    assert outcome(poses().read, serialize_message(message)) == outcome(read_trajectory, message)
+    assert outcome(poses().read, serialize_message(message)) == outcome(poses().of_message, message)
 
 
 @settings(max_examples=200)
@@ -192,12 +194,12 @@ def test_changed_bytes_give_the_ordinary_numbers_or_a_rejection(points: int, see
         data[int(rng.integers(len(data)))] = int(rng.integers(256))
 
     def ordinary(data: bytes, now: int, missing: str) -> Any:
-        return read_trajectory(message_in(data, MultiDOFJointTrajectory), now, missing)
+        return poses().of_message(message_in(data, MultiDOFJointTrajectory), now, missing)
 
     assert outcome(poses().read, bytes(data)) == outcome(ordinary, bytes(data))
 
 
-@pytest.mark.parametrize('reader', [poses(), joint_reader(LEGS)])
+@pytest.mark.parametrize('reader', [poses(), joints_of(LEGS)])
 def test_big_endian_bytes_are_read_by_the_ordinary_path_or_rejected(reader: RequestReader) -> None:
     data = bytearray(serialize_message(
         random_message(1, 2) if reader.message is MultiDOFJointTrajectory else joint_message(1, 2)))
