@@ -80,7 +80,7 @@ def test_the_variables_are_those_of_the_motion() -> None:
     for name, expected, tolerance in (
             ('position', truth.position, 1e-5), ('velocity', truth.velocity, 1e-4),
             ('acceleration', truth.acceleration, 5e-3), ('load', truth.friction_load, 0.02),
-            ('rod_angle', np.tile(truth.links.chains.rod_angle, 2), 1e-4),
+            ('rod_angle', np.tile(truth.links.rod_angle, 2), 1e-4),
             ('platform_x', motion.position[:, 0], 1e-5), ('platform_tilt', motion.tilt, 1e-3),
             ('platform_turn', motion.turn, 1e-3)):
         np.testing.assert_allclose(residuals.variables[name], expected, rtol=0, atol=tolerance,

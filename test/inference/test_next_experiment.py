@@ -44,7 +44,7 @@ from pprs_dynamics.physics.effects.catalogue import CATALOGUE
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.parameter_file import default_parameters
-from pprs_dynamics.physics.three_pprs.jacobians import condition_number
+from pprs_dynamics.physics.three_pprs.robot import condition_number
 
 DURATION = 8.0
 HARMONICS = 5
@@ -196,7 +196,7 @@ def test_a_design_keeps_tight_limits_and_repeats_with_its_seed(model: DriveModel
     tight.limits.check_strokes(forces.mechanism.position)
     number = condition_number(tight.robot.geometry, forces.mechanism.links.J)
     assert number.max() <= 0.9 * 2.2 + 1e-3
-    assert np.abs(forces.mechanism.links.chains.sin_u).min() >= 0.5
+    assert np.abs(forces.mechanism.links.sin_u).min() >= 0.5
     tight.limits.check_efforts(forces.total)
     first, again, other = (motions.drawn(seed, 1)[0].coefficients for seed in (1, 1, 2))
     assert np.array_equal(first, again)

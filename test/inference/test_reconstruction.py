@@ -11,7 +11,13 @@ from functools import cache
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from random_states import ELBOWS, paper_model, random_robot, smooth_motion
+from random_states import (
+    ELBOWS,
+    inverse_kinematics,
+    paper_model,
+    random_robot,
+    smooth_motion,
+)
 from scipy.spatial.transform import Rotation
 
 from pprs_dynamics import PlatformMotion
@@ -29,7 +35,6 @@ from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruct
 from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
-from pprs_dynamics.physics.three_pprs.inverse_kinematics import solve_inverse_kinematics
 
 RATE, RESOLUTION, DURATION = 500.0, 1e-6, 8.0  # [Hz, m, s]
 STEP = 1 / RATE
@@ -70,7 +75,7 @@ def truth_at(time, frequency=1.0, amplitude=0.06, tilt=0.15, seed=1):
     """Return what the paper's robot does and needs at times within 0..DURATION."""
     path = Excitation(DURATION + 1, seed, amplitude, tilt, frequency)
     motion = motion_from_poses(path, np.asarray(time) + 0.5)
-    return Truth(np.asarray(time), solve_inverse_kinematics(MODEL.robot.geometry, motion),
+    return Truth(np.asarray(time), inverse_kinematics(MODEL.robot.geometry, motion),
                  MODEL.drive_forces(motion).total)
 
 
@@ -109,7 +114,7 @@ def rms(values, axis=0):
 @pytest.mark.parametrize('elbow', ELBOWS)
 def test_platform_rates_are_differences_of_forward_kinematics(elbow):
     geometry = random_robot(np.random.default_rng(3), elbow).geometry
-    home = solve_inverse_kinematics(
+    home = inverse_kinematics(
         geometry, smooth_motion(np.array([0.3]), elbow)).position
     rng, t = np.random.default_rng(4), np.linspace(0, 2, 40)
     frequency, phase = rng.uniform(2, 5, 6), rng.uniform(0, 6, 6)

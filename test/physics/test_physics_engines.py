@@ -53,7 +53,7 @@ def answers(states):
 
 @every_engine
 def test_drive_motion_is_the_engines(states, answers, engine):
-    chains, oracle = states[2].mechanism.links.chains, answers[engine]
+    chains, oracle = states[2].mechanism.links, answers[engine]
     # Accelerations up to some 100 m/s^2 come from divisions by sin u.
     assert_allclose(chains.position, oracle.position, rtol=0, atol=1e-14)
     assert_allclose(chains.velocity, oracle.velocity, rtol=0, atol=1e-13)
