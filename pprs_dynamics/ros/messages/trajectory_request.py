@@ -233,7 +233,7 @@ class RequestReader:
 
     def _fill_in(self, numbers: Array, time: Array, lacking: Mask) -> None:
         """Put the derivatives of a spline into the columns of those points that lack their own."""
-        place, velocity, acceleration = np.split(numbers, np.cumsum(self._widths)[:-1], axis=1)
+        place, velocity, acceleration = self._parts(numbers)
         derivatives = (spline_derivatives(time, place[:, :3], place[:, 3:]) if self._is_body
                        else position_spline_derivatives(time, place))
         for given, values, rows in zip((velocity, acceleration), derivatives, lacking.T,
@@ -242,6 +242,11 @@ class RequestReader:
                 raise Rejection('OUTPUT', 'the spline through the points has derivatives that are '
                                 'not finite')
             given[rows] = values[rows]
+
+    def _parts(self, numbers: Array) -> tuple[Array, Array, Array]:
+        """Return places, velocities and accelerations, as views."""
+        first, second = self._widths[0], self._widths[0] + self._widths[1]
+        return numbers[:, :first], numbers[:, first:second], numbers[:, second:]
 
     def _request(self, points: Points, now: int) -> TrajectoryRequest:
         numbers, offsets = points.numbers, points.offsets
@@ -252,7 +257,7 @@ class RequestReader:
         if self._is_body:
             motion = PlatformMotion.from_rows(numbers, offsets / NANOSECONDS)
         else:
-            position, velocity, acceleration = np.split(numbers, 3, axis=1)
+            position, velocity, acceleration = self._parts(numbers)
             if points.names != self._names:
                 order = [points.names.index(joint) for joint in self._names]
                 position, velocity, acceleration = (
