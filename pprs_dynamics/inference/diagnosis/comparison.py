@@ -250,8 +250,7 @@ def _compare_drive(
     if floor is not None and noise is not None and noise.period == residuals.period:
         # What no pattern explains is an upper bound of the noise.
         floor = noise_at_most(floor, noise.rms)
-    most = max((statement.mean_square for statement in findings.statements
-                if statement.kind != 'level'), default=0.0)
+    most = max((statement.mean_square for statement in findings.statements), default=0.0)
     parts = [root_mean_square(part[known, index] - part[known, index].mean())
              for part in residuals.parts.values()]
     return DriveComparison(
