@@ -28,7 +28,6 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.paths import Excitation, HelicalPath, with_lead_in
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.parameter_file import find_file
-from pprs_dynamics.physics.three_pprs.forward_kinematics import solve_forward_kinematics
 from pprs_dynamics.ros.setpoints import SetpointQueue
 from pprs_dynamics.simulation.drive_control import Setpoint
 from pprs_dynamics.simulation.plant import Plant
@@ -281,10 +280,9 @@ def _tracking(commands: np.ndarray, states: np.ndarray, late_share: float) -> Tr
     inside = (states[:, 0] > commands[0, 0] + LEAD_IN) & (states[:, 0] < commands[-1, 0])
     sent, positions, velocities, _ = _columns(commands)
     times, measured, _, _ = _columns(states[inside])
-    geometry = DriveModel.load().robot.geometry
-    goal = solve_forward_kinematics(
-        geometry, CubicHermiteSpline(sent, positions, velocities)(times))
-    found = solve_forward_kinematics(geometry, measured)
+    robot, rest = DriveModel.load().robot, np.zeros_like(measured)
+    wanted = CubicHermiteSpline(sent, positions, velocities)(times)
+    goal, found = (robot.motion_of_drives(q, rest, rest) for q in (wanted, measured))
     turn = (Rotation.from_quat(goal.orientation).inv()
             * Rotation.from_quat(found.orientation)).magnitude()
     return Tracking(times - sent[0] - LEAD_IN, found.position - goal.position, turn, late_share,

@@ -33,9 +33,6 @@ from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementE
 from pprs_dynamics.physics.effects.effect import CatalogueEffect
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.physics.mechanism.places import PLATFORM
-from pprs_dynamics.physics.three_pprs.forward_kinematics import (
-    solve_forward_kinematics,
-)
 
 SECONDS, RATE = 20.0, 200.0
 # What an effect's force is drawn over, where it is not the drive's velocity.
@@ -107,10 +104,9 @@ def platform_law(effect: type[CatalogueEffect]) -> tuple[Mapping[str, Array], Ar
     at = motion
     if changed.misreadings:
         # Positions are read with the error, so that the model is evaluated at another pose.
-        poses = solve_forward_kinematics(model.robot.geometry,
-                                         state.position
-                                         + changed.position_error(state.position)
-                                         + changed.loaded_position_error(state.transmitted))
+        q = (state.position + changed.position_error(state.position)
+             + changed.loaded_position_error(state.transmitted))
+        poses = model.robot.motion_of_drives(q, 0 * q, 0 * q)
         at = PlatformMotion.from_poses(motion.time, poses.position, poses.orientation)
     forces = changed.drive_forces(at)
     added = changed.measured(forces).total - plain.total

@@ -33,7 +33,6 @@ from pprs_dynamics import DriveModel
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.physics.mechanism.paths import HelicalPath
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 
 JTC, FORWARD, BROADCASTER = ('joint_trajectory_controller', 'forward_command_controller',
                              'joint_state_broadcaster')
@@ -59,8 +58,8 @@ def at_start(names: tuple[str, ...] = DRIVES) -> dict[str, float]:
 def gravity_of(position: Array) -> Array:
     """Return what holds the drives at rest at positions (6,), which need not be on the path."""
     model, rest = DriveModel.load(), np.zeros((1, len(DRIVES)))
-    found = solve_forward_motion(model.robot.geometry, position[None], rest, rest)
-    return np.asarray(model.drive_forces(found.motion).total[0])
+    motion = model.robot.motion_of_drives(position[None], rest, rest)
+    return np.asarray(model.drive_forces(motion).total[0])
 
 
 def beside(running: Cell, controller: str = JTC, **parameters: Any) -> list[dict[str, Any]]:

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.hidden.effort_noise import EffortNoise, NoiseSettings
 from benchmarks.hidden.motions import RandomMotion, draw_motion
 from benchmarks.hidden.off_forms import off_form
 from benchmarks.hidden.strength import Refit, Whitening, sensitivities, tolerated_numbers
@@ -32,7 +33,6 @@ from pprs_dynamics.measurement.motion.differentiation import Stretch, choose_smo
 from pprs_dynamics.measurement.motion.treatment import Treatment, block_length
 from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.model.parameter_file import default_parameters
-from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.simulation.engine import MechanismEngine
 from pprs_dynamics.simulation.engine_loops import ClosedMotion
 from pprs_dynamics.simulation.injection import (
@@ -44,7 +44,7 @@ from pprs_dynamics.simulation.injection import (
     PlainRobot,
 )
 from pprs_dynamics.simulation.platform import as_mechanism
-from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
+from pprs_dynamics.simulation.sensors import SensorSettings
 from pprs_dynamics.simulation.temperatures import read_thermometers
 
 # What of the catalogue can be injected into a 3-PPRS.
@@ -201,12 +201,11 @@ class Scene:
         _, rate, burst = differentiator.differentiated(run.beside)
         velocity[inside] += rate
         acceleration[inside] += burst
-        found = solve_forward_motion(self.model.robot.geometry, run.position, velocity,
-                                     acceleration, self.platform[:1])
-        return self.model.drive_forces(found.motion.with_time(motion.time)).total
+        found = self.model.robot.motion_of_drives(run.position, velocity, acceleration)
+        return self.model.drive_forces(found.with_time(motion.time)).total
 
-    def recording(self, name: str, effects: Sequence[Choice], settings: SensorSettings,
-                  noise: np.ndarray, off: Sequence[np.random.Generator] = ()) -> Recording:
+    def recording(self, name: str, effects: Sequence[Choice], noise: np.ndarray,
+                  off: Sequence[np.random.Generator] = ()) -> Recording:
         """Return a recording with effects and noise (M, 6) [N].
 
         With a generator for each effect, their forms are off.
@@ -219,8 +218,9 @@ class Scene:
         channels = {}
         if any(effect.name == 'friction_temperature' for effect in effects):
             channels['temperature'] = read_thermometers(run.time, run.temperature)[LEAD:]
-        return Recording.from_arrays(name, self.time, settings.quantised(run.position[LEAD:]),
-                                     None, effort[LEAD:] + noise, channels=channels)
+        return Recording.from_arrays(
+            name, self.time, SensorSettings().quantised(run.position[LEAD:]), None,
+            effort[LEAD:] + noise, channels=channels)
 
 
 def simulated(model: DriveModel, robot: Mapping[str, Any],
@@ -265,12 +265,11 @@ def tolerant_model(tolerance: float) -> DriveModel:
         {**values, **{f'tolerances.{key}': tolerance for key in keys}})
 
 
-def noise_settings(noise: float | str, deviation: float) -> SensorSettings:
-    """Return sensors whose efforts carry noise of a sort and a standard deviation [N]."""
+def noise_settings(noise: float | str, deviation: float) -> NoiseSettings:
+    """Return noise of a sort and a standard deviation [N]."""
     if noise == PINK:
-        return SensorSettings(white_noise=0.0, coloured_noise=0.0, pink_noise=deviation)
-    return SensorSettings(white_noise=np.sqrt(0.3) * deviation,
-                          coloured_noise=np.sqrt(0.7) * deviation, noise_correlation=float(noise))
+        return NoiseSettings(0.0, 0.0, pink=deviation)
+    return NoiseSettings(np.sqrt(0.3) * deviation, np.sqrt(0.7) * deviation, float(noise))
 
 
 def make_case(case: Case) -> tuple[DriveModel, Recording, dict[str, Any]]:
@@ -281,7 +280,7 @@ def make_case(case: Case) -> tuple[DriveModel, Recording, dict[str, Any]]:
     effects = [one.effect for one in found]
     settings = noise_settings(case.noise, deviation)
     noise = EffortNoise(settings, case.rng(f'noise {case.name}')).samples(len(place.time))
-    recording = place.recording(case.name, effects, settings, noise, [
+    recording = place.recording(case.name, effects, noise, [
         case.rng(f'form {one.what}') for one in found] if case.row == 'forms' else ())
     truth = {
         'case': asdict(case), 'name': case.name,

@@ -19,9 +19,9 @@ from scipy.linalg import solve_toeplitz
 from scipy.optimize import brentq, lsq_linear
 from scipy.signal import lfilter
 
+from benchmarks.hidden.effort_noise import EffortNoise, NoiseSettings
 from pprs_dynamics import DriveModel, PlatformMotion
 from pprs_dynamics.measurement.motion.treatment import Treatment
-from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 WHITENING_ORDER = 64
 # Numbers that are known to a tolerance only. Not the inertia: the paper's disc is as thin as a
@@ -79,12 +79,12 @@ class Whitening:
 
     Parameters
     ----------
-    settings : SensorSettings
+    settings : NoiseSettings
     block : int
         Samples per block.
     """
 
-    def __init__(self, settings: SensorSettings, block: int) -> None:
+    def __init__(self, settings: NoiseSettings, block: int) -> None:
         noise = EffortNoise(settings, np.random.default_rng(0))
         offsets = np.subtract.outer(np.arange(block), np.arange(block))
         lags = block * np.arange(WHITENING_ORDER + 1)[:, None, None] + offsets

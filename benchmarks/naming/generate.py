@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.hidden.effort_noise import EffortNoise
 from benchmarks.hidden.off_forms import CAN_BE_OFF
 from benchmarks.hidden.recordings import Case, make_case, noise_settings
 from benchmarks.naming.columns import problem_of
@@ -40,7 +41,6 @@ from pprs_dynamics.simulation.export.exported_robot import export_robot
 from pprs_dynamics.simulation.export.expressed import express
 from pprs_dynamics.simulation.export.writers import written
 from pprs_dynamics.simulation.injection import NOT_IN_CATALOGUE, simulate_mechanism
-from pprs_dynamics.simulation.sensors import EffortNoise
 
 DURATION = 40.0  # [s]
 SNRS = (0.5, 1.0, 2.0, 5.0, 20.0)

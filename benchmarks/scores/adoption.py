@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.hidden import recordings as hidden_recordings
+from benchmarks.hidden.effort_noise import EffortNoise
 from benchmarks.hidden.recordings import IN_CATALOGUE, Case, Scene, noise_settings
 from benchmarks.hidden.strength import Whitening
 from benchmarks.scores.cases import outcomes_of, scoring_parser
@@ -37,7 +38,6 @@ from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.effects.catalogue import catalogue
 from pprs_dynamics.physics.model.model_writer import write_model
 from pprs_dynamics.simulation.injection import Choice
-from pprs_dynamics.simulation.sensors import EffortNoise
 
 OTHER_MOTION = 1000  # between the seeds of the two motions
 GOOD = 1.1  # error over that of the best fit of the effect's own form
@@ -73,7 +73,7 @@ class Robot:
     def _recording(self, place: Scene, name: str) -> Recording:
         settings = noise_settings(self.case.noise, self.noise)
         rng = self.case.rng(f'noise {name} {self.case.name}')
-        return place.recording(name, self.effects, settings,
+        return place.recording(name, self.effects,
                                EffortNoise(settings, rng).samples(len(place.time)))
 
     def best_error(self, first: Recording, second: Recording) -> float:

@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.hidden.effort_noise import EffortNoise
 from benchmarks.hidden.recordings import (
     ROUNDS,
     driven,
@@ -48,7 +49,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.mechanism.joint_series import JointSeries
 from pprs_dynamics.physics.mechanism.paths import HOME, Excitation
 from pprs_dynamics.simulation.injection import CLIMATE, Choice, Injection, PlainRobot
-from pprs_dynamics.simulation.sensors import EffortNoise
+from pprs_dynamics.simulation.sensors import SensorSettings
 
 EFFECTS = ('external_wrench', 'base_tilt', 'payload_mass', 'payload_offset', 'link_mass',
            'effort_offset', 'drive_spring', 'effort_gain', 'homing_error', 'coulomb_friction',
@@ -86,7 +87,7 @@ class HiddenRobot:
         settings = noise_settings(CORRELATION, NOISE)
         noise = EffortNoise(settings, np.random.default_rng((self.seed, 4, run))).samples(
             len(motion))
-        return Recording.from_arrays(f'run {run}', run_along.time, settings.quantised(
+        return Recording.from_arrays(f'run {run}', run_along.time, SensorSettings().quantised(
             run_along.position), None, run_along.efforts + noise)
 
 

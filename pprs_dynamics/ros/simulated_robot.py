@@ -202,8 +202,7 @@ def _simulated(model: DriveModel, values: Mapping[str, Any]) -> SimulatedRobot:
                           actuation_delay=values['actuation_delay'])
     return SimulatedRobot(
         plant, seed=values['seed'], rate=values['rate'], control=control,
-        sensors=SensorSettings.with_effort_noise(values['effort_noise'],
-                                                 values['encoder_resolution']))
+        sensors=SensorSettings(values['encoder_resolution'], values['effort_noise']))
 
 
 class InjectedParameters(Followed[dict[str, Any]]):

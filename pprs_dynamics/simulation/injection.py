@@ -142,6 +142,17 @@ class Choice:
     drives: tuple[str, ...] = ()
     sizes: dict[str, Any] | None = None
 
+    def require(self, names: Sequence[str], drives: Sequence[str]) -> None:
+        """Raise InjectedEffectError for a name that is not among some, or other drives."""
+        if self.name not in names:
+            raise InjectedEffectError(
+                f'{self.name} cannot be injected here{suggestion(self.name, names)}, '
+                f'must be one of {", ".join(names)}')
+        wrong = [drive for drive in self.drives
+                 if self.name in NOT_IN_DRIVES or drive not in drives]
+        if wrong:
+            raise InjectedEffectError(f'{self.name} does not act in {wrong[0]!r}')
+
 
 class PlainRobot:
     """A robot along a motion without injected effects.
@@ -181,7 +192,54 @@ class PlainRobot:
         return self.carried.efforts + self.friction
 
 
-class Injection:
+class Injecting:
+    """A robot while one effect is injected into it.
+
+    Attributes
+    ----------
+    model : DriveModel
+    engine : MechanismEngine
+    choice : Choice
+        The effect.
+    """
+
+    model: DriveModel
+    engine: MechanismEngine
+    choice: Choice
+
+    @property
+    def random(self) -> np.random.Generator:
+        """Generator of the sizes of the effect."""
+        return self.choice.random
+
+    @property
+    def scale(self) -> float:
+        """Multiplies the sizes of the effect."""
+        return self.choice.scale
+
+    @property
+    def given(self) -> list[int]:
+        """Numbers of the drives that are given with the effect."""
+        return [self.model.drives.index(name) for name in self.choice.drives]
+
+    def sizes(self, draw: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """Return the sizes of the effect, drawn where it is injected for the first time."""
+        if self.choice.sizes is None:
+            self.choice.sizes = draw()
+        return self.choice.sizes
+
+    def size(self, low: float, high: float) -> float:
+        """Return a random size, times the scale."""
+        return self.scale * float(self.random.uniform(low, high))
+
+    def inject_one(self, effect: Callable[[Any], Injected]) -> dict[str, Any]:
+        """Inject the effect and return what is true about it."""
+        drives, parameters, form = effect(self)
+        return {'name': self.choice.name, 'drives': drives, 'parameters': parameters,
+                'form': form}
+
+
+class Injection(Injecting):
     """A robot along a motion while effects are injected into it.
 
     Parameters
@@ -229,43 +287,17 @@ class Injection:
         self.picked: tuple[Array, Array] | None = None
         self.truths: list[dict[str, Any]] = []
         for choice in choices:
-            if choice.name not in NAMES:
-                raise InjectedEffectError(
-                    f'{choice.name} is no injected effect of such a robot'
-                    f'{suggestion(choice.name, NAMES)}, must be one of {", ".join(NAMES)}')
+            choice.require(NAMES, self.model.drives)
         for share, (start, effects) in enumerate(STAGES, 1):
             start(self)
             # Forces of drives are drawn in the order in which they were named.
             for choice in sorted((one for one in choices if one.name in effects),
                                  key=lambda one: 0 if effects is FORCES
                                  else list(effects).index(one.name)):
-                self.choice, self.given = choice, self.drives_of(choice)
-                self.random, self.scale = choice.random, choice.scale
-                drives, parameters, form = effects[choice.name](self)
-                self.truths.append({'name': choice.name, 'drives': drives,
-                                    'parameters': parameters, 'form': form})
+                self.choice = choice
+                self.truths.append(self.inject_one(effects[choice.name]))
             if progress is not None:
                 progress(share / len(STAGES))
-
-    def drives_of(self, choice: Choice) -> list[int]:
-        """Return the numbers of the drives that are given with an effect."""
-        for name in choice.drives:
-            if name not in self.model.drives:
-                raise InjectedEffectError(f'{choice.name} acts in a drive, not in {name!r}')
-        if choice.drives and choice.name in NOT_IN_DRIVES:
-            raise InjectedEffectError(f'{choice.name} acts in no drive, so that '
-                                      f'{",".join(choice.drives)} must not follow')
-        return [self.model.drives.index(name) for name in choice.drives]
-
-    def sizes(self, draw: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Return the sizes of the effect, drawn where it is injected for the first time."""
-        if self.choice.sizes is None:
-            self.choice.sizes = draw()
-        return self.choice.sizes
-
-    def size(self, low: float, high: float) -> float:
-        """Return a random size, times the scale."""
-        return self.scale * float(self.random.uniform(low, high))
 
     def joint(self, least: int = 0) -> int:
         """Return the given drive, or a random one from a number on where there are others."""
@@ -450,19 +482,48 @@ def _eccentric_encoder(run: Injection) -> Injected:
         'q - atan(e sin(x) / (1 + e cos(x))) / n, x = n q + phi, behind what is read as q')
 
 
-def _payload_mass(run: Injection) -> Injected:
-    size = run.sizes(lambda: {'share': run.size(0.05, 0.12)})
-    return inject_payload(run.engine, size['share'], 0.05)
+def _payload_mass(run: Injecting) -> Injected:
+    engine = run.engine
+    share = run.sizes(lambda: {'share': run.size(0.05, 0.12)})['share']
+    mass = share * float(engine.robot.masses.sum())
+    engine.carry(engine.structure.tool, body_at(mass, (0.0, 0.0, 0.05), np.zeros((3, 3))))
+    return Injected(None, {'mass': mass}, 'a point 5 cm before the tool')
 
 
-def _link_mass(run: Injection) -> Injected:
-    return inject_link_mass(run.engine, **run.sizes(
-        lambda: link_sizes(run.model, run.random, run.scale)))
+def _link_mass(run: Injecting) -> Injected:
+    """Make a link heavier by a share of its mass, or all rods of a 3-PPRS."""
+    engine, robot = run.engine, run.engine.robot
+    rods = isinstance(run.model, PlatformMechanism)
+
+    def draw() -> dict[str, Any]:
+        name = 'rods' if rods else robot.body_names[
+            int(run.random.choice(links_that_weigh(run.model)))]
+        return {'name': name, 'share': run.scale * float(run.random.uniform(0.1, 0.3))}
+
+    name, share = run.sizes(draw).values()
+    for link in RODS if rods else (name,):
+        parameters = robot.inertial[robot.body_names.index(link)]
+        mass = share * float(parameters[0])
+        centre = engine.structure.links[link][1].inverse.of_point(parameters[1:4] / parameters[0])
+        engine.carry(link, body_at(mass, tuple(centre), np.zeros((3, 3))))
+    return Injected(None, {f'{name}.mass': mass}, 'a point at its centre')
+
+
+def links_that_weigh(model: DriveModel) -> list[int]:
+    """Return the links whose mass can be hidden, or raise InjectedEffectError.
+
+    What turns about an upright axis shows in no weight, and the last link is the payload's.
+    """
+    able = [j for j in range(len(model.robot.bodies)) if j != model.robot.carrier
+            and (j or model.robot.structure.loops)]
+    if not able:
+        raise InjectedEffectError('link_mass needs a link between the first and the tool')
+    return able
 
 
 def _payload_offset(run: Injection) -> Injected:
     """Inject another centre of mass of what carries the tool."""
-    _require_tool(run.model, 'payload_offset')
+    _require_platform(run.model, 'payload_offset')
     offset = run.sizes(lambda: {
         axis: run.size(0.003, 0.015) * float(run.random.choice((-1.0, 1.0))) for axis in 'xyz'})
     run.engine.shift_tool(np.array([*offset.values()]))
@@ -471,7 +532,7 @@ def _payload_offset(run: Injection) -> Injected:
 
 def _platform_inertia(run: Injection) -> Injected:
     """Inject a beam across the tool, whose inertia about one axis in its plane is 0."""
-    _require_tool(run.model, 'platform_inertia')
+    _require_platform(run.model, 'platform_inertia')
     sizes = run.sizes(lambda: {
         'inertia': run.scale * float(np.exp(run.random.uniform(np.log(0.01), np.log(0.04)))),
         'angle': float(run.random.uniform(0.0, np.pi))})
@@ -484,7 +545,7 @@ def _platform_inertia(run: Injection) -> Injected:
 
 def _payload_pick_up(run: Injection) -> Injected:
     """Inject a payload that the tool takes in the middle of the motion. Not in the catalogue."""
-    _require_tool(run.model, 'payload_pick_up')
+    require_tool(run.model, 'payload_pick_up')
     sizes = run.sizes(lambda: {
         'mass': run.size(0.05, 0.12) * float(run.engine.robot.masses.sum()),
         'time': float(np.quantile(run.time, run.random.uniform(0.1, 0.4)))})
@@ -551,13 +612,16 @@ def _joint_spring(run: Injection) -> Injected:
                     'k x (1 + (x / x_h)^2), x = u - u_0')
 
 
-def _base_tilt(run: Injection) -> Injected:
-    _require_tool(run.model, 'base_tilt')
-    return inject_tilt(run.engine, run.sizes(lambda: {'x': run.size(0.01, 0.03)})['x'])
+def _base_tilt(run: Injecting) -> Injected:
+    """Tilt the base about its x axis."""
+    require_tool(run.model, 'base_tilt')
+    angle = run.sizes(lambda: {'x': run.size(0.01, 0.03)})['x']
+    run.engine.gravity = tilted(run.engine.gravity, angle)
+    return Injected(None, {'x': angle, 'y': 0.0}, 'about x')
 
 
 def _external_wrench(run: Injection) -> Injected:
-    _require_tool(run.model, 'external_wrench')
+    require_tool(run.model, 'external_wrench')
     force = run.sizes(lambda: {
         'force_z': run.scale * 0.05 * float(np.abs(run.plain.effort).max())})['force_z']
     run.engine.wrench = run.engine.wrench + np.array([0.0, 0.0, force, 0.0, 0.0, 0.0])
@@ -566,7 +630,7 @@ def _external_wrench(run: Injection) -> Injected:
 
 def _tool_drag(run: Injection) -> Injected:
     """Inject a liquid or a curtain that the tool moves through."""
-    _require_tool(run.model, 'tool_drag')
+    require_tool(run.model, 'tool_drag')
     velocity = run.engine.tool_velocity(run.engine.closed(run.motion))
     speed = np.linalg.norm(velocity, axis=1, keepdims=True)
     top = float(speed.max())
@@ -578,51 +642,16 @@ def _tool_drag(run: Injection) -> Injected:
     return Injected(None, sizes, 'c v sqrt(1 + (|v| / v_1)^2)')
 
 
-def _require_tool(model: DriveModel, name: str) -> None:
+def _require_platform(model: DriveModel, name: str) -> None:
+    """Raise InjectedEffectError for a robot whose payload_mass has a centre and an inertia."""
+    if not isinstance(model, PlatformMechanism):
+        raise InjectedEffectError(f'{name} acts on the platform of a 3-PPRS: choose payload_mass')
+
+
+def require_tool(model: DriveModel, name: str) -> None:
     """Raise InjectedEffectError for an axis, which a force across it does not move."""
     if not model.is_mechanism:
         raise InjectedEffectError(f'{name} does not act along a single axis: choose effort_offset')
-
-
-def inject_payload(engine: MechanismEngine, share: float, ahead: float) -> Injected:
-    """Hang a point of a share of the robot's mass on the tool, along its z axis [m]."""
-    mass = share * float(engine.robot.masses.sum())
-    engine.carry(engine.structure.tool, body_at(mass, (0.0, 0.0, ahead), np.zeros((3, 3))))
-    return Injected(None, {'mass': mass}, f'a point {100 * ahead:g} cm before the tool'
-                    if ahead else "a point at the tool's origin")
-
-
-def link_sizes(model: DriveModel, random: np.random.Generator, scale: float,
-               first: int = 1) -> dict[str, Any]:
-    """Return a random link and a share of its mass; the rods of a 3-PPRS.
-
-    Links of a robot without loops are drawn from a number on.
-    """
-    name = 'rods'
-    if not isinstance(model, PlatformMechanism):
-        able = links_that_weigh(model, first)
-        if not able:
-            raise InjectedEffectError('link_mass needs a link between the first and the tool')
-        name = model.robot.body_names[int(random.choice(able))]
-    return {'name': name, 'share': scale * float(random.uniform(0.1, 0.3))}
-
-
-def inject_link_mass(engine: MechanismEngine, name: str, share: float) -> Injected:
-    """Make a link heavier by a share of its mass, or all rods of a 3-PPRS."""
-    robot = engine.robot
-    for link in RODS if isinstance(engine.model_file, PlatformMechanism) else (name,):
-        parameters = robot.inertial[robot.body_names.index(link)]
-        mass = share * float(parameters[0])
-        frame = engine.structure.links[link][1].inverse
-        centre = frame.of_point(parameters[1:4] / parameters[0])
-        engine.carry(link, body_at(mass, tuple(centre), np.zeros((3, 3))))
-    return Injected(None, {f'{name}.mass': mass}, 'a point at its centre')
-
-
-def inject_tilt(engine: MechanismEngine, angle: float) -> Injected:
-    """Tilt the base about its x axis [rad]."""
-    engine.gravity = tilted(engine.gravity, angle)
-    return Injected(None, {'x': angle, 'y': 0.0}, 'about x')
 
 
 # ----------------------------------------------------------------------------------------- gears
@@ -841,15 +870,6 @@ def own_friction(model: DriveModel, engine: MechanismEngine, motion: JointMotion
             friction = friction + engine.joint_friction(
                 motion, effect.table(model.robot, model.reversal), rounds)
     return friction
-
-
-def links_that_weigh(model: DriveModel, first: int = 1) -> list[int]:
-    """Return the links whose mass can be hidden.
-
-    What turns about an upright axis shows in no weight, and the last link is the payload's.
-    """
-    return [j for j in range(len(model.robot.bodies)) if j != model.robot.carrier
-            and (j >= first or model.robot.structure.loops)]
 
 
 def able_joints(name: str, model: DriveModel, motion: JointMotion) -> list[int]:

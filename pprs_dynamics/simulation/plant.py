@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.errors import PprsError, WorkspaceError, suggestion
+from pprs_dynamics.errors import PprsError, WorkspaceError
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.simulation.drive_control import ControlSettings
@@ -31,23 +31,21 @@ from pprs_dynamics.simulation.engine import SLOWEST, MechanismEngine
 from pprs_dynamics.simulation.injected_forms import (
     FORMS,
     UNKNOWN,
-    InjectedEffectError,
     JointMoment,
     draw_form,
 )
 from pprs_dynamics.simulation.injection import (
+    BODIES,
     RANDOM,
     Choice,
     Injected,
+    Injecting,
     draw_motion,
     guides,
-    inject_link_mass,
-    inject_payload,
-    inject_tilt,
-    link_sizes,
     links_that_weigh,
     named,
     one_able_joint,
+    require_tool,
 )
 from pprs_dynamics.simulation.platform import as_mechanism
 from pprs_dynamics.simulation.temperatures import Climate
@@ -60,11 +58,11 @@ STOP_FREQUENCY, STOP_DAMPING = 40.0, 0.3  # [Hz], of critical
 BEYOND = 1.0  # of a range behind its stop, from which on the motion means nothing
 FASTEST = 100.0  # of a range, or of a turn, in a second
 NOMINAL = 10.0  # [s], of the motion that gives the sizes of efforts and speeds of this robot
-BODIES = ('payload_mass', 'link_mass', 'base_tilt')
+OF_BODIES = ('payload_mass', 'link_mass', 'base_tilt')
 # Forms that need the moment alone, without a memory or the acceleration.
 OF_MOMENT = {name: form for name, form in {**FORMS, **UNKNOWN}.items()
              if name not in ('hysteresis', 'drive_inertia')}
-INJECTED = (*OF_MOMENT, *BODIES)
+INJECTED = (*OF_MOMENT, *OF_BODIES)
 
 
 class UnsolvedError(PprsError, ArithmeticError):
@@ -76,7 +74,7 @@ class UnsolvedError(PprsError, ArithmeticError):
                          'be such as a mechanism can have')
 
 
-class Plant:
+class Plant(Injecting):
     """A robot under efforts of its drives; it starts at home, an arm amid its ranges.
 
     Parameters
@@ -173,10 +171,9 @@ class Plant:
         self._pushes: list[tuple[int, str, dict[str, float], JointMoment]] = []
         self.injected: list[dict[str, Any]] = []
         try:
-            for choice in chosen:
-                drives, parameters, form = self._inject(choice, scale)
-                self.injected.append({'name': choice.name, 'drives': drives,
-                                      'parameters': parameters, 'form': form})
+            for self.choice in chosen:
+                self.injected.append(self.inject_one(
+                    BODIES.get(self.choice.name, Plant._push)))
         finally:
             self.engine.data.qpos[:] = kept
 
@@ -187,39 +184,28 @@ class Plant:
             if words == RANDOM:
                 words = str(np.random.default_rng(seed).choice(sorted(INJECTED)))
             choice = named(words, np.random.default_rng((seed, zlib.crc32(words.encode()))), scale)
-            wrong = [drive for drive in choice.drives
-                     if drive not in self.structure.drives or choice.name in BODIES]
-            if choice.name not in INJECTED:
-                raise InjectedEffectError(
-                    f'{choice.name} cannot be injected into a robot while it moves'
-                    f'{suggestion(choice.name, INJECTED)}, must be one of {", ".join(INJECTED)}')
-            if wrong:
-                raise InjectedEffectError(f'{choice.name} does not act in {wrong[0]!r}')
+            choice.require(INJECTED, self.structure.drives)
             if choice.name in OF_MOMENT:
                 one_able_joint(choice.name, self.model, self._nominal, np.random.default_rng(0))
-            elif choice.name == 'link_mass' and not links_that_weigh(self.model, 0):
-                raise InjectedEffectError('link_mass needs a link beside that of the tool')
+            elif choice.name == 'link_mass':
+                links_that_weigh(self.model)
+            elif choice.name == 'base_tilt':
+                require_tool(self.model, choice.name)
             chosen.append(choice)
         return chosen
 
-    def _inject(self, choice: Choice, scale: float) -> Injected:
-        name, random = choice.name, choice.random
-        if name == 'payload_mass':
-            return inject_payload(self.engine, scale * float(random.uniform(0.05, 0.12)), 0.0)
-        if name == 'link_mass':
-            return inject_link_mass(self.engine, **link_sizes(self.model, random, scale, first=0))
-        if name == 'base_tilt':
-            return inject_tilt(self.engine, scale * float(random.uniform(0.01, 0.03)))
+    def _push(self) -> Injected:
+        """Inject a force on drives."""
+        name, random = self.choice.name, self.random
         model, motion, form = self.model, self._nominal, OF_MOMENT[name]
-        chosen = [model.drives.index(drive) for drive in choice.drives] or [
-            one_able_joint(name, model, motion, random)]
+        chosen = self.given or [one_able_joint(name, model, motion, random)]
         assert motion.time is not None
         temperature = Climate.draw(random, len(model.drives)).along(motion.time, motion.velocity)
         parameters = {}
         for j in chosen:
             moment = JointMoment.along(motion, j, self._efforts[:, j], self.largest[j],
                                        model.gear_ratios[j], temperature)
-            drawn = parameters[model.drives[j]] = draw_form(form, random, moment, scale)
+            drawn = parameters[model.drives[j]] = draw_form(form, random, moment, self.scale)
             self._pushes.append((j, name, drawn, moment))
         return Injected([*parameters], parameters, form.form)
 

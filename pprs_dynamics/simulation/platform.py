@@ -14,7 +14,6 @@ from pprs_dynamics.physics.effects.effect import Effect
 from pprs_dynamics.physics.effects.laws.axis_friction import AxisFriction, AxisOffset
 from pprs_dynamics.physics.effects.laws.joint_friction import ModelJointFriction
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.tree import mechanism_of
 from pprs_dynamics.simulation.export.exported_robot import described
 from pprs_dynamics.simulation.export.expressed import MJCF
 from pprs_dynamics.simulation.export.writers import written
@@ -44,7 +43,7 @@ class PlatformMechanism(DriveModel):
             blocks |= dict.fromkeys(joints, block)
         effects: tuple[Effect, ...] = (AxisFriction(0.0, 0.0), AxisOffset(0.0),
                                        ModelJointFriction(blocks))
-        robot = mechanism_of(model.robot, model.strokes, model.effort_limits)
+        robot = model.robot.as_mechanism(model.limits.strokes, model.limits.efforts)
         return cls(robot=robot, effects=effects, reversal=model.reversal, limits=model.limits,
                    values=values)
 

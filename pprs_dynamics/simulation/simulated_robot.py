@@ -96,7 +96,7 @@ class SimulatedRobot:
                     plant.velocity = np.zeros_like(plant.velocity)
                     self.notes.append(Note(now + k * step, 'STOPPED',
                                            f'the robot stopped: {error.found}'))
-            self.sensors.read_encoders(plant.position, plant.velocity)
+            self.sensors.read_encoders(plant.position)
         self._ticks += 1
         assert measured is not None
         return measured

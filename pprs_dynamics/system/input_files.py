@@ -13,14 +13,6 @@ from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.system.output_files import kind_of
 
 
-def require_files(path: str, *others: str) -> list[str]:
-    """Return a path and those of others that are not '', or raise as `require_file` for one."""
-    given = [path, *(other for other in others if other)]
-    for each in given:
-        require_file(each)
-    return given
-
-
 def require_file(path: str | PathLike[str]) -> None:
     """Raise UnreadableFileError where a path is nothing that can be read to its end."""
     try:

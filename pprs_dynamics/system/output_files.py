@@ -3,27 +3,27 @@
 
 """Atomic writing of files and folders: readers see the old content or the new one.
 
-Only regular files are replaced. Of a symbolic link the target is written, which must be of the
-same kind by its ending.
+Only regular files are replaced. Of a symbolic link the target is written.
 """
 
 from __future__ import annotations
 
 import os
-import shutil
 import stat
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
+from secrets import token_hex
+from tempfile import TemporaryDirectory
 from typing import IO
 
 from pprs_dynamics.errors import UnreadableFileError
 
-PERMISSIONS = 0o666  # less the umask, as of any new file
 # Of what is not finished. Short: with the target's own name it could be too long.
 PREFIX = '.pprs_'
+KINDS = {stat.S_IFDIR: 'a folder', stat.S_IFIFO: 'a pipe', stat.S_IFSOCK: 'a socket',
+         stat.S_IFCHR: 'a device', stat.S_IFBLK: 'a device'}
 
 
 @contextmanager
@@ -36,21 +36,16 @@ def new_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
         If it cannot be written. The old content then remains; a kill may leave a file `.pprs_*`.
     """
     target = writable_file(path)
-    with _told(path):
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=PREFIX)
+    partial = target.parent / f'{PREFIX}{token_hex(8)}'
+    with _named(path):
         try:
-            with os.fdopen(handle, 'w+b') as file:
+            with partial.open('x+b') as file:
                 yield file
                 file.flush()
                 os.fsync(file.fileno())
-            # mkstemp makes files that only their owner may read.
-            umask = os.umask(0)
-            os.umask(umask)
-            os.chmod(name, PERMISSIONS & ~umask)
-            os.replace(name, target)
-        except BaseException:
-            Path(name).unlink(missing_ok=True)
-            raise
+            partial.replace(target)
+        finally:
+            partial.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -66,9 +61,8 @@ def new_folder(path: str | PathLike[str]) -> Iterator[Path]:
     if os.path.lexists(target):
         raise UnreadableFileError(target, 'exists already, and folders are never overwritten')
     with scratch_folder(target) as scratch:
-        folder = scratch / target.name
-        yield folder
-        folder.rename(target)
+        yield scratch / target.name
+        (scratch / target.name).rename(target)
 
 
 @contextmanager
@@ -80,12 +74,9 @@ def scratch_folder(path: Path) -> Iterator[Path]:
     UnreadableFileError
         Where anything that is done in the block cannot be written.
     """
-    with _told(path):
-        folder = Path(tempfile.mkdtemp(dir=path.parent, prefix=PREFIX))
-        try:
-            yield folder
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
+    with _named(path), TemporaryDirectory(
+            prefix=PREFIX, dir=path.parent, ignore_cleanup_errors=True) as folder:
+        yield Path(folder)
 
 
 def write_text(path: str | PathLike[str], text: str) -> None:
@@ -100,11 +91,11 @@ def writable_file(path: str | PathLike[str]) -> Path:
     Raises
     ------
     UnreadableFileError
-        For what is there and is no regular file, a link to a file of another kind, and a name
-        that the file system does not take.
+        For what is there and is no regular file, a folder that does not exist, and a name that
+        the file system does not take.
     """
-    path = Path(path)
-    with _told(path):
+    target = Path(os.path.realpath(path))
+    with _named(path):
         try:
             mode = os.stat(path).st_mode
         except FileNotFoundError:
@@ -112,25 +103,18 @@ def writable_file(path: str | PathLike[str]) -> Path:
         if not stat.S_ISREG(mode):
             raise UnreadableFileError(
                 path, f'cannot be written: it is {kind_of(mode)}, must be a file')
-        target = Path(os.path.realpath(path))
-        if path.is_symlink() and target.suffix != path.suffix:
-            raise UnreadableFileError(
-                path, f'cannot be written: it is a link to {target}, must be one to a file that '
-                f'ends in {path.suffix or "nothing"}, too')
         if not target.parent.is_dir():
             raise UnreadableFileError(path, 'cannot be written: its folder does not exist')
-        return target
+    return target
 
 
 def kind_of(mode: int) -> str:
-    """Return what a mode of `os.stat` is of, in words."""
-    kinds = {stat.S_IFDIR: 'a folder', stat.S_IFIFO: 'a pipe', stat.S_IFSOCK: 'a socket',
-             stat.S_IFCHR: 'a device', stat.S_IFBLK: 'a device', stat.S_IFREG: 'a file'}
-    return kinds.get(stat.S_IFMT(mode), 'something else')
+    """Return the kind of a mode of `os.stat` that is no regular file's, in words."""
+    return KINDS.get(stat.S_IFMT(mode), 'something else')
 
 
 @contextmanager
-def _told(path: str | PathLike[str]) -> Iterator[None]:
+def _named(path: str | PathLike[str]) -> Iterator[None]:
     """Name the file and the reason where the system refuses."""
     try:
         yield

@@ -32,11 +32,13 @@ def located(path: str, folder: Path) -> Path:
     if not path.startswith(SCHEME):
         return (folder / path).resolve()
     name, _, rest = path.removeprefix(SCHEME).partition('/')
-    for found in _places(name, folder.resolve()):
-        return (found / rest).resolve()
-    raise UnreadableFileError(
-        path, f'package {name} is in none of AMENT_PREFIX_PATH, ROS_PACKAGE_PATH and the folders '
-        f'around {folder.resolve()}: source its workspace, or write the path of the file')
+    found = next(_places(name, folder.resolve()), None)
+    if found is None:
+        raise UnreadableFileError(
+            path, f'package {name} is in none of AMENT_PREFIX_PATH, ROS_PACKAGE_PATH and the '
+            f'folders around {folder.resolve()}: source its workspace, or write the path of the '
+            'file')
+    return (found / rest).resolve()
 
 
 def _places(name: str, folder: Path) -> Iterator[Path]:
@@ -44,22 +46,15 @@ def _places(name: str, folder: Path) -> Iterator[Path]:
     for prefix in _listed('AMENT_PREFIX_PATH'):
         if (prefix / INDEX / name).exists():
             yield prefix / 'share' / name
-    for root in _listed('ROS_PACKAGE_PATH'):
-        for place in (root, root / name):
-            if _is_package(place, name):
-                yield place
-    for above in (folder, *folder.parents):
-        for place in (above, above / name):
-            if _is_package(place, name):
-                yield place
-        if (above / name).is_dir():  # copied without its package.xml
-            yield above / name
+    for root in (*_listed('ROS_PACKAGE_PATH'), folder, *folder.parents):
+        if _is_package(root, name):
+            yield root
+        if (root / name).is_dir():  # it may have been copied without its package.xml
+            yield root / name
 
 
-def _listed(variable: str) -> Iterator[Path]:
-    for path in os.environ.get(variable, '').split(os.pathsep):
-        if path:
-            yield Path(path)
+def _listed(variable: str) -> list[Path]:
+    return [Path(path) for path in os.environ.get(variable, '').split(os.pathsep) if path]
 
 
 def _is_package(place: Path, name: str) -> bool:

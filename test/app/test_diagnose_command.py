@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from pprs_command import pprs
 
+from benchmarks.hidden.effort_noise import EffortNoise, NoiseSettings
 from benchmarks.hidden.recordings import driven
 from pprs_dynamics import DriveModel, __version__
 from pprs_dynamics.drives import DRIVES
@@ -23,7 +24,7 @@ from pprs_dynamics.measurement.files.recording import Recording, write_recording
 from pprs_dynamics.physics.mechanism.paths import Excitation
 from pprs_dynamics.simulation.injection import Choice, Injection, PlainRobot
 from pprs_dynamics.simulation.platform import as_mechanism
-from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
+from pprs_dynamics.simulation.sensors import SensorSettings
 
 HIDDEN, RATE = 'coulomb_friction', 250.0
 EFFECT = Choice(HIDDEN, np.random.default_rng(11))
@@ -35,10 +36,9 @@ def record(path: Path, seed: int, duration: float) -> dict[str, Any]:
     time = np.arange(0.0, duration, 1 / RATE)
     motion = driven(model, Excitation(duration=duration, seed=seed).motion(time))
     run = Injection(PlainRobot(as_mechanism(model), motion), [EFFECT], np.random.default_rng(0))
-    sensors = SensorSettings()
-    noise = EffortNoise(sensors, np.random.default_rng(seed)).samples(len(time))
+    noise = EffortNoise(NoiseSettings(), np.random.default_rng(seed)).samples(len(time))
     write_recording(path, Recording.from_arrays(
-        path.name, time, sensors.quantised(run.position), None, run.efforts + noise))
+        path.name, time, SensorSettings().quantised(run.position), None, run.efforts + noise))
     return run.truths[0]
 
 

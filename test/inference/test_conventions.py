@@ -79,7 +79,8 @@ MISTAKES: dict[str, tuple[Callable[[Arrays], Arrays], list[str]]] = {
     'a lift in kN': (scaled(effort=[1, 1, 1, 1e-3, 1, 1]), [f'of lift_1 looks like 0.001 {TIMES}']),
     'ms': (scaled(time=1e3), ['times look like milliseconds: .* 1000 times too slow']),
     'mm': (scaled(motion=1e3), ['positions of all drives look like millimetres']),
-    'lifts in mm': (scaled(motion=[1, 1, 1, 1e3, 1e3, 1e3]), ['positions of the lifts .*milli']),
+    'lifts in mm': (scaled(motion=[1, 1, 1, 1e3, 1e3, 1e3]),
+                    ['positions of lift_1, lift_2, lift_3 .*milli']),
     'negated': (scaled(motion=-1.0), ['positions of all drives look negated']),
     'a slide negated': (scaled(motion=[1, 1, -1, 1, 1, 1]), ['position of slide_3 looks negated']),
     'a slide counts the other way': (
@@ -182,7 +183,8 @@ def test_velocities_that_are_not_the_derivative_are_told(factor: float, word: st
     expect(told((time, position, factor * velocity, effort)),
            [f'velocity of all drives is {word} the derivative of the position'])
     velocity[:, 3:] *= factor
-    expect(told((time, position, velocity, effort)), [f'velocity of the lifts is {word}'])
+    expect(told((time, position, velocity, effort)),
+           [f'velocity of lift_1, lift_2, lift_3 is {word}'])
 
 
 def test_a_real_drive_is_called_right() -> None:

@@ -64,10 +64,7 @@ def test_the_basis_is_that_of_de_boor(periodic: bool) -> None:
     if periodic:
         full[:, :3] += full[:, intervals:]
         full = full[:, :intervals]
-    index, weight = spline_basis(x, start, end, intervals, periodic)
-    mine = np.zeros_like(full)
-    for k in range(4):
-        np.add.at(mine, (np.arange(len(x)), index[:, k]), weight[:, k])
+    mine = spline_basis(x, start, end, intervals, periodic).toarray()
     np.testing.assert_allclose(mine, full, atol=1e-12)
 
 

@@ -12,11 +12,11 @@ import pytest
 from scipy.optimize import minimize
 from scipy.signal import lfilter
 
+from benchmarks.hidden.effort_noise import EffortNoise, NoiseSettings
 from pprs_dynamics.inference.regression.joint_fit import JointFit, Regression
 from pprs_dynamics.inference.residuals.bands import DriveSeries, FrequencyBands
 from pprs_dynamics.inference.residuals.noise import NoiseShapes, NoiseSpectrum
 from pprs_dynamics.inference.residuals.residuals import Residuals
-from pprs_dynamics.simulation.sensors import EffortNoise, SensorSettings
 
 PERIOD = 0.01
 
@@ -199,16 +199,25 @@ def test_the_noise_is_that_of_the_samples_that_were_measured(every: int) -> None
 
 
 @pytest.mark.parametrize(('settings', 'most'), [
-    (SensorSettings(white_noise=0.08, coloured_noise=0.0), 0.0),
-    (SensorSettings(white_noise=0.04, coloured_noise=0.07, noise_correlation=0.999), 0.04),
-    (SensorSettings(white_noise=0.0, coloured_noise=0.0, pink_noise=0.08), 0.12)])
-def test_a_constant_of_noise_seldom_stands_out(settings: SensorSettings, most: float) -> None:
+    (NoiseSettings(white=0.08, coloured=0.0), 0.0),
+    (NoiseSettings(white=0.04, coloured=0.07, correlation=0.999), 0.04),
+    (NoiseSettings(white=0.0, coloured=0.0, pink=0.08), 0.12)])
+def test_a_constant_of_noise_seldom_stands_out(settings: NoiseSettings, most: float) -> None:
     beyond = []
     for seed in range(8):
         noise = EffortNoise(settings, np.random.default_rng((seed, 31))).samples(20_000)
         _, fit = fitted(noise.reshape(4000, 5, 6).mean(axis=1))
         beyond += list(fit.squares[:, 0] > 9 * fit.spectra[:, 0])
     assert np.mean(beyond) <= most
+
+
+def test_noise_of_the_benchmarks_has_the_stated_covariance() -> None:
+    lags = np.array([0, 1, 3, 10])
+    source = EffortNoise(NoiseSettings(0.05, 0.06, 0.8, pink=0.02), np.random.default_rng(5))
+    samples = source.samples(200_000)
+    samples -= samples.mean(axis=0)
+    found = [np.mean(samples[lag:] * samples[:len(samples) - lag]) for lag in lags]
+    np.testing.assert_allclose(found, source.autocovariance(lags), atol=2e-4)
 
 
 def test_a_drive_without_any_noise_has_finite_noise() -> None:

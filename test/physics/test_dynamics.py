@@ -63,7 +63,7 @@ def motion(robot):
 
 def reactions_on_platform(robot, forces):
     """Return the force of every rod on the platform, (N, 3, 3) [N], from H, V and W."""
-    (e, n), chains, r = chain_vectors(robot.geometry), forces.mechanism.links.chains, \
+    (e, n), chains, r = chain_vectors(robot.geometry), forces.mechanism.links, \
         forces.mechanism.reactions.reactions
     c, s = chains.cos_u[..., None], chains.sin_u[..., None]
     along, normal = -c * e + s * UP, -(s * e + c * UP)
@@ -129,7 +129,7 @@ def test_reactions_satisfy_the_platforms_newton_euler_equations(robot, motion):
 
 def test_reactions_and_loads_are_those_of_every_body_cut_free(robot, motion):
     forces = model_of(robot).drive_forces(motion)
-    chains, body = forces.mechanism.links.chains, forces.mechanism.reactions
+    chains, body = forces.mechanism.links, forces.mechanism.reactions
     (e, n), g, l = chain_vectors(robot.geometry), np.asarray(robot.gravity), \
         robot.geometry.rod_length  # noqa: E741
     slides, lifts, rods = (np.asarray(m)[:, None] for m in (
@@ -184,7 +184,7 @@ def joint_friction(robot, motion, forces, c_r, mu_r, d_r, c_s, mu_s, d_s):
     """
     _, n = chain_vectors(robot.geometry)
     r = forces.mechanism.reactions.reactions
-    rod = forces.mechanism.links.chains.u_dot[..., None] * n
+    rod = forces.mechanism.links.u_dot[..., None] * n
     relative = rod - motion.angular_velocity[:, None]
     moments = []
     for velocity, load, c, mu, d in (
@@ -213,7 +213,7 @@ def test_passive_friction_does_the_joints_virtual_work_for_every_drive(robot, mo
             lambda x, p=pose: drive_motion(robot.geometry, moved(p, x))[0][0], 6)
         platform = np.linalg.inv(turns)
         u = central_difference(
-            lambda x, p=pose: model.mechanism(moved(p, x)).links.chains.rod_angle[0], 6) @ platform
+            lambda x, p=pose: model.mechanism(moved(p, x)).links.rod_angle[0], 6) @ platform
         virtual = np.zeros(6)
         for i in range(3):
             rod = n[i][:, None] * u[i]
@@ -246,7 +246,7 @@ def test_zero_velocity_gives_zero_friction(robot, motion, changes):
     zero = np.zeros_like(motion.position)
     starting = PlatformMotion(motion.position, motion.orientation, zero, zero,
                               motion.linear_acceleration, motion.angular_acceleration)
-    cos_u = model_of(robot).mechanism(starting).links.chains.cos_u
+    cos_u = model_of(robot).mechanism(starting).links.cos_u
     starting = starting[np.all(np.abs(cos_u) > 0.06, axis=1)]
     forces = model_of(robot, changes).drive_forces(starting)
     for part in ('active_friction', 'passive_friction'):
@@ -258,13 +258,13 @@ def test_zero_velocity_gives_zero_friction(robot, motion, changes):
 
 
 def test_independent_chains_do_each_chains_virtual_work(robot, motion):
-    cos_u = model_of(robot).mechanism(motion).links.chains.cos_u
+    cos_u = model_of(robot).mechanism(motion).links.cos_u
     defined = motion[np.all(np.abs(cos_u) >= 0.05, axis=1)]
     changes = {**INDEPENDENT, **HARD_SIGN, **NUMBERS}
     forces = model_of(robot, changes).drive_forces(defined)
     at_C, at_A, *_ = joint_friction(robot, defined, forces, *NUMBERS.values())
     _, n = chain_vectors(robot.geometry)
-    lever = robot.geometry.rod_length * forces.mechanism.links.chains.cos_u
+    lever = robot.geometry.rod_length * forces.mechanism.links.cos_u
     slides = at_A[..., 2] / lever
     lifts = np.sum((at_A + at_C) * n, axis=-1) / lever
     assert_allclose(forces.parts['passive_friction'], np.concatenate((slides, lifts), axis=1),

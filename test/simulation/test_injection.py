@@ -138,6 +138,13 @@ def test_effects_are_injected_into_an_axis_or_refused(name: str) -> None:
             or np.abs(run.position - plain.position).max() > 1e-3)
 
 
+@pytest.mark.parametrize('name', ['payload_offset', 'platform_inertia'])
+def test_what_acts_on_a_platform_is_not_injected_into_an_arm(model: DriveModel, name: str) -> None:
+    """The catalogue has it on a 3-PPRS alone: no diagnosis of an arm could name it."""
+    with pytest.raises(InjectedEffectError, match='choose payload_mass'):
+        simulate_mechanism(model, (name,), 4, duration=8.0)
+
+
 def test_motors_without_a_map_rub_nowhere(model: DriveModel) -> None:
     with pytest.raises(InjectedEffectError, match=r'friction: \{motors:'):
         simulate_mechanism(model, ('coupled_drives',), 4, duration=10.0)
@@ -225,8 +232,8 @@ def test_given_drives_have_the_effect() -> None:
                                              np.random.default_rng(0), 1.0)],
                     np.random.default_rng(2))
     assert run.truths[0]['drives'] == ['lift_1', 'slide_2']
-    for words, text in (('viscous', 'did you mean'), ('base_tilt:lift_1', 'acts in no drive'),
-                        ('effort_offset:x', 'acts in a drive')):
+    for words, text in (('viscous', 'did you mean'), ('base_tilt:lift_1', 'does not act in'),
+                        ('effort_offset:x', 'does not act in')):
         with pytest.raises(InjectedEffectError, match=text):
             Injection(plain_platform(), [named(words, np.random.default_rng(0), 1.0)],
                       np.random.default_rng(2))

@@ -23,7 +23,7 @@ from pprs_dynamics.simulation.platform import as_mechanism
 from pprs_dynamics.simulation.sensors import SensorSettings
 from pprs_dynamics.simulation.simulated_robot import SimulatedRobot
 
-QUIET = SensorSettings.with_effort_noise(0.0)
+QUIET = SensorSettings(effort_noise=0.0)
 TICK = 0.002
 
 

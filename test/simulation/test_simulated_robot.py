@@ -19,11 +19,11 @@ from pprs_dynamics.simulation.drive_control import (
     Setpoint,
 )
 from pprs_dynamics.simulation.plant import Plant
-from pprs_dynamics.simulation.sensors import EffortNoise, Measurement, SensorSettings
+from pprs_dynamics.simulation.sensors import Measurement, SensorSettings
 from pprs_dynamics.simulation.simulated_robot import SimulatedRobot
 
 AXIS = DriveModel.load('config/single_axis.yaml')
-QUIET = SensorSettings(quantisation=0.0, true_velocity=True, white_noise=0.0, coloured_noise=0.0)
+QUIET = SensorSettings(quantisation=0.0, effort_noise=0.0)
 RATE = 500.0
 ZERO = np.zeros(1)
 
@@ -62,7 +62,7 @@ def test_feedforward_lowers_the_tracking_error() -> None:
 
 
 def test_the_lag_of_differentiated_velocities_is_no_tracking_error() -> None:
-    _, true = wave(axis(dataclasses.replace(QUIET, true_velocity=False)), 1.0)
+    _, true = wave(axis(), 1.0)
     assert np.abs(true[:, 0] - true[:, 2]).max() < 5e-5
 
 
@@ -175,43 +175,21 @@ def test_encoders_count_in_whole_steps() -> None:
 
 
 def test_differentiated_velocities_follow_the_true_ones() -> None:
-    measured, true = wave(axis(SensorSettings(white_noise=0.0, coloured_noise=0.0)), 0.5)
+    measured, true = wave(axis(SensorSettings(effort_noise=0.0)), 0.5)
     error = np.array([each.velocity[0] for each in measured]) - true[:, 1]
     # They lag by 2 ms behind 2 m/s^2.
     assert 1e-4 < np.sqrt(np.mean(error ** 2)) < 0.01
 
 
-def noise(samples: int, **settings: float) -> np.ndarray:
-    chosen = SensorSettings(**{'white_noise': 0.0, 'coloured_noise': 0.0, **settings})
-    return EffortNoise(chosen, np.random.default_rng(11)).samples(samples)
-
-
 def test_noise_has_its_size_and_its_correlation() -> None:
-    white = noise(4000, white_noise=0.2)
-    # 24 000 samples: the standard error of a standard deviation is 0.5 %, of a correlation 0.7 %.
-    assert white.std() == pytest.approx(0.2, rel=0.03)
-    assert abs(np.mean(white[1:] * white[:-1])) / 0.04 < 0.04
-    coloured = noise(8000, coloured_noise=0.2, noise_correlation=0.9)
-    # Ten samples tell as much as one: the standard errors are thrice those of white noise.
-    assert coloured.std() == pytest.approx(0.2, rel=0.06)
+    robot = axis(SensorSettings(effort_noise=0.2))
+    noise = np.array([robot.sensors.measure(0.0, ZERO).effort[0] for _ in range(40_000)])
+    noise /= robot.plant.largest[0]
+    # A correlated sample tells a tenth of what an independent one does.
+    assert noise.std() == pytest.approx(0.2, rel=0.03)
     for lag in (1, 5):
-        found = np.mean(coloured[lag:] * coloured[:-lag]) / coloured.var()
-        assert found == pytest.approx(0.9 ** lag, abs=0.04)
-
-
-def test_noise_at_once_is_the_noise_sample_by_sample_and_has_the_stated_covariance() -> None:
-    settings = SensorSettings(white_noise=0.05, coloured_noise=0.06, noise_correlation=0.8,
-                              pink_noise=0.02)
-    one, all_of_it = (EffortNoise(settings, np.random.default_rng(4)) for _ in range(2))
-    np.testing.assert_allclose([one.sample() for _ in range(30)],
-                               np.vstack((all_of_it.samples(10), all_of_it.samples(20))),
-                               rtol=0, atol=1e-14)
-    lags = np.array([0, 1, 3, 10])
-    quick = SensorSettings(white_noise=0.05, coloured_noise=0.06, noise_correlation=0.8)
-    source = EffortNoise(quick, np.random.default_rng(5))
-    samples = source.samples(200_000)
-    found = [np.mean(samples[lag:] * samples[:len(samples) - lag]) for lag in lags]
-    np.testing.assert_allclose(found, source.autocovariance(lags), atol=3e-5)
+        found = np.mean(noise[lag:] * noise[:-lag]) / noise.var()
+        assert found == pytest.approx(0.36 * 0.9 ** lag, abs=0.04)
 
 
 # House rules.

@@ -27,7 +27,7 @@ from pprs_dynamics.physics.effects.effect import Parameter
 from pprs_dynamics.physics.effects.structure_effect import BodyEffect
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 
-PLACE, FAULT = os.environ.get('WORN_BRAKE', 'columns none').split()
+PLACE, FAULT = os.environ.get('WORN_BRAKE', 'nowhere none').split()
 
 def fault(place, result):
     if place != PLACE:
@@ -97,11 +97,19 @@ class Hose(BodyEffect):
 FAULTS = {
     'raises': 'columns raised ZeroDivisionError: division by zero (',
     'exits': 'columns raised SystemExit: 3 (',
-    'none': "columns raised TypeError: 'NoneType' object is not iterable",
-    'longer': 'columns returned an array of shape (2,), must be (1,)',
-    'fewer': 'columns returned 0 arrays, must be 1 (coefficient)',
-    'words': 'columns raised ValueError: could not convert string to float',
-    'nan': 'columns returned an array with nan, must be finite',
+    'none': "force raised TypeError: 'NoneType' object is not iterable",
+    'longer': 'force raised ValueError: ',
+    'fewer': 'force raised ValueError: ',
+    'words': 'force raised TypeError: ',
+}
+# The same where they are there when the package is loaded.
+LOADED = {
+    'raises': 'columns raised ZeroDivisionError: division by zero (',
+    'none': 'columns returned None, must be a tuple of 1 arrays (coefficient)',
+    'longer': 'columns returned array([0.1, 0.2, 0.3, 0. ]) for three samples',
+    'fewer': 'columns returned (), must be a tuple of 1 arrays (coefficient)',
+    'words': "columns returned 'much' for three samples",
+    'nan': 'columns returned array([nan, nan, nan]) for three samples',
 }
 EFFECTS = {'worn_brake': 'WornBrake', 'hose': 'Hose'}
 BLOCKS = {'worn_brake': {'slide_2': {'coefficient': 3.0}}, 'hose': {'force': 2.0}}

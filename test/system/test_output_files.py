@@ -69,14 +69,6 @@ def test_of_a_link_the_target_is_written(tmp_path: Path) -> None:
     assert loose.is_symlink()
 
 
-def test_a_link_to_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
-    (tmp_path / 'run.csv').write_text('recording')
-    (tmp_path / 'page.html').symlink_to(tmp_path / 'run.csv')
-    with pytest.raises(UnreadableFileError, match=r'a link to .*run\.csv, must be one'):
-        write_text(tmp_path / 'page.html', 'page')
-    assert (tmp_path / 'run.csv').read_text() == 'recording'
-
-
 @pytest.mark.parametrize('error', [KeyboardInterrupt, OSError(28, 'No space left on device')])
 def test_what_ends_early_leaves_nothing(error: BaseException, tmp_path: Path) -> None:
     def write_half_a_file() -> None:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import takewhile
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -20,11 +20,11 @@ from pprs_dynamics.inference.readings.check import find_mistakes
 from pprs_dynamics.inference.readings.columns import (
     AmbiguousColumns,
     Guess,
-    RateError,
     guess_columns,
+    joint_in,
     words_of,
 )
-from pprs_dynamics.inference.readings.findings import OtherReading, Scales, columns_line
+from pprs_dynamics.inference.readings.findings import OtherReading, columns_line
 from pprs_dynamics.inference.readings.table import (
     CURRENT,
     EFFORT,
@@ -34,8 +34,9 @@ from pprs_dynamics.inference.readings.table import (
 )
 from pprs_dynamics.measurement.files.array_files import is_lerobot
 from pprs_dynamics.measurement.files.bag_storage import is_storage
-from pprs_dynamics.measurement.files.contents import Contents, Series, look_into
+from pprs_dynamics.measurement.files.contents import Contents, look_into
 from pprs_dynamics.measurement.files.recording import read_recording
+from pprs_dynamics.measurement.files.samples import Series
 from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE, read_column
 from pprs_dynamics.measurement.files.way_out import common_prefix
 from pprs_dynamics.physics.mechanism.branches import (
@@ -150,11 +151,12 @@ def first_model(
     is_mjcf = _root_tag(path) == 'mujoco'
     description = _description(path, is_mjcf)
     given, files = _grouped([Path(recording) for recording in recordings])
-    contents = look_into(files.get(POSITION, given[0])) if given else None
+    contents = look_into(files.get(POSITION, given[0])) if given else Contents()
     movable = [joint.name for joint in description.joints.values()
                if joint.kind not in (FIXED, FLOATING) and joint.mimic is None]
-    names = _names(contents, movable) if contents is not None and not files else Names()
-    recorded = set(names.joints) | (_mentioned(contents, movable) if contents else set())
+    names = Names() if files else _names(contents, movable)
+    recorded = {*names.joints} | {place[0] for column in contents.series if (
+        place := joint_in(words_of(column.title), movable))}
     branch, notes = _branch(description, tool, recorded)
     notes += description.remarks
     chosen = _drives(description, path, is_mjcf, branch, drives, recorded)
@@ -163,86 +165,56 @@ def first_model(
         chosen = tuple(name for name in chosen if name not in shared)
         notes.append(f'{" and ".join(shared)} share a transmission: they are not driven; '
                      'to drive them, list them with friction: {motors: …}')
-    if contents is not None and contents.joints and not names.joints:
+    if contents.joints and not names.joints:
         names = _by_numbers(contents, chosen)
         notes.append('joints are matched by the numbers in their names')
-    columns: list[str] = []
-    guessed: list[str] = []
-    found: Collection[str] = ()
-    questions: list[str] = []
-    if contents is not None:
+    draft = _Draft(path, Path(output), is_mjcf, description, base or root_of(description), branch,
+                   chosen, names, [file.name for file in given])
+    if given:
         try:
-            columns, guessed, found = _columns(given[0], files, contents, names, description,
-                                               chosen, rate)
-        except (AmbiguousColumns, RateError) as error:
+            draft.columns, draft.guessed, draft.kinds = _columns(
+                given[0], files, contents, names, [*description.joints], chosen, rate)
+        except AmbiguousColumns as error:
             notes.append(str(error))
-            questions += error.lines
-        notes += guessed
-
-    def written() -> tuple[str, DriveModel]:
-        text = _text(path, Path(output), is_mjcf, description, base or root_of(description),
-                     branch, chosen, names, columns, guessed, [path.name for path in given],
-                     CURRENT in found, EXTERNAL in found, questions)
-        return text, DriveModel.from_parameters(parse_parameters(text, output), source=str(output))
-
-    has_efforts = bool({EFFORT, CURRENT} & {*found}) and EXTERNAL not in found
-    text, model = written()
-    corrected: set[str] = set()
-    while has_efforts:
-        scales, reasons, questions = _corrections(model, given[0], corrected)
-        columns, guessed = _with_scales(columns, scales), [*guessed, *reasons]
-        notes += [*reasons, *questions]
-        text, model = written()
-        if not scales:
-            break
-    if CURRENT in found:
+            draft.questions += error.lines
+        notes += draft.guessed
+    has_efforts = bool({EFFORT, CURRENT} & draft.kinds) and EXTERNAL not in draft.kinds
+    if given and not draft.questions:
+        notes += _correct(draft, given[0])
+    if CURRENT in draft.kinds:
         notes.append('efforts are currents [A]: they stay amperes until gain is given in '
-                     f'{Path(output).name}')
-    if given and not has_efforts and EXTERNAL not in found:
+                     f'{draft.output.name}')
+    if given and not has_efforts and EXTERNAL not in draft.kinds:
         notes.append('no efforts were found: compare, diagnose and fit need them')
-    return FirstModel(Path(output), text, model, tuple(notes), tuple(given), has_efforts,
-                      tuple(questions))
+    return FirstModel(draft.output, draft.text, draft.model, tuple(notes), tuple(given),
+                      has_efforts, tuple(draft.questions))
 
 
-# ---------------------------------------------------------------------------------- readings
+def _correct(draft: _Draft, path: Path) -> list[str]:
+    """Write what a recording surely is into a draft, and ask about the rest; return notes.
 
-
-def _corrections(model: DriveModel, path: Path, corrected: set[str],
-                 ) -> tuple[Scales, list[str], list[str]]:
-    """Return factors with which a recording is read surely, why, and what is not sure.
-
-    What is corrected already is a question when it comes again; `corrected` gets the new kinds.
+    A kind of mistake that comes again after its correction is a question.
     """
-    try:
-        mistakes = find_mistakes(model, read_recording(path, model.recorded))
-    except PprsError:
-        return (), [], []
-    readings = [each for each in mistakes if isinstance(each, OtherReading)]
-    sure = [each for each in readings if each.scales and each.kind in SURE_KINDS - corrected]
-    corrected.update(each.kind for each in sure)
-    unsure = [each for each in readings if each not in sure] if not sure else []
-    questions = [each.what + (f': if so, write {line}' if line else '') for each in unsure
-                 for line in [each.line or columns_line([each])]]
-    return (tuple(scale for each in sure for scale in each.scales),
-            [each.what for each in sure], questions)
-
-
-def _with_scales(lines: Sequence[str], scales: Scales) -> list[str]:
-    """Return lines of `columns` with factors of drives, which replace those that are there."""
-    found = list(lines)
-    for drive, key, value in scales:
-        entry, start = f'{key}: {value:.12g}', f'{scalar(drive)}: {{' if drive else f'{key}:'
-        at = next((k for k, line in enumerate(found) if line.startswith(start)), None)
-        if not drive:
-            found[slice(at, None if at is None else at + 1) if at is not None else slice(
-                len(found), None)] = [entry]
-        elif at is None:
-            found.append(f'{start}{entry}}}')
-        else:
-            inside = [part for part in found[at][len(start):-1].split(', ')
-                      if not part.startswith(f'{key}:')]
-            found[at] = start + ', '.join([*inside, entry]) + '}'
-    return found
+    notes: list[str] = []
+    corrected: set[str] = set()
+    while True:
+        try:
+            mistakes = find_mistakes(draft.model, read_recording(path, draft.model.recorded))
+        except PprsError:
+            return notes
+        readings = [each for each in mistakes if isinstance(each, OtherReading)]
+        sure = [each for each in readings if each.scales and each.kind in SURE_KINDS - corrected]
+        if not sure:
+            draft.questions = [
+                each.what + (f': if so, write {line}' if line else '') for each in readings
+                for line in [each.line or columns_line([each])]]
+            return notes + draft.questions
+        for each in sure:
+            corrected.add(each.kind)
+            draft.guessed.append(each.what)
+            notes.append(each.what)
+            for drive, key, value in each.scales:
+                (draft.columns.setdefault(drive, {}) if drive else draft.columns)[key] = value
 
 
 # ------------------------------------------------------------------------------ description
@@ -390,96 +362,77 @@ def _by_numbers(contents: Contents, drives: Sequence[str]) -> Names:
     return Names(found)
 
 
-def _mentioned(contents: Contents, joints: Sequence[str]) -> set[str]:
-    """Return the joints whose names are in the titles of columns."""
-    titles = [words_of(column.title) for column in contents.series]
-    found = set()
-    for joint in joints:
-        words = words_of(joint)
-        if not all(word.isdigit() for word in words) and any(
-                title[k:k + len(words)] == words for title in titles
-                for k in range(len(title) - len(words) + 1)):
-            found.add(joint)
-    return found
-
-
 def _columns(path: Path, files: Mapping[str, Path], contents: Contents, names: Names,
-             description: Description, drives: Sequence[str], rate: float | None,
-             ) -> tuple[list[str], list[str], Collection[str]]:
-    """Return the lines of `columns`, what was guessed, and which quantities there are."""
-    movable = list(description.joints)
+             movable: Sequence[str], drives: Sequence[str], rate: float | None,
+             ) -> tuple[dict[str, Any], list[str], set[str]]:
+    """Return what `columns` hold, what was guessed, and which quantities there are."""
+    kinds = {*files}
+    found: dict[str, Any] = {}
     if files:
-        return _file_columns(path, files, drives, rate, movable)
-    joints = tuple(names.joints.get(name, f'{names.prefix}{name}') for name in drives)
-    try:
-        recording = read_recording(path, RecordedDrives(
-            tuple(drives), joints, gain=(1.0,) * len(drives)))
-        known = bool(np.isfinite(recording.effort).any())
-        return [], [], [EFFORT if recording.gain is None else CURRENT] if known else []
-    except UnreadableFileError:
-        # Positions of joint states may have their efforts in arrays; what is left is a table.
-        if contents.joints and not contents.series:
-            raise
-    guess = guess_columns(contents.series, drives, others=movable, rate=rate)
-    lines = []
-    if guess.time is not None and guess.time not in TIME_COLUMNS:
-        lines.append(f'time: {scalar(guess.time)}')
-    is_bag = bool(contents.series) and all(
-        str(each.column).startswith('/') for each in contents.series)
-    if guess.time is None and not is_bag:
-        lines.append(_rate(path, guess.rate))
-    return ([*lines, *_drive_lines(guess, drives, contents.decimal)], guess.notes,
-            {*(kind for _, kind in guess.columns), guess.effort_kind})
+        guess = _guess_of_files(files, drives, rate, movable)
+        pattern = {kind: file.name for kind, file in files.items()} if path.is_dir() else (
+            _pattern(files))
+        found['files'] = pattern
+    else:
+        joints = tuple(names.joints.get(name, f'{names.prefix}{name}') for name in drives)
+        try:
+            recording = read_recording(path, RecordedDrives(
+                tuple(drives), joints, gain=(1.0,) * len(drives)))
+            known = bool(np.isfinite(recording.effort).any())
+            return {}, [], {EFFORT if recording.gain is None else CURRENT} if known else set()
+        except UnreadableFileError:
+            # Positions of joint states may have their efforts in arrays; else it is a table.
+            if contents.joints and not contents.series:
+                raise
+        guess = guess_columns(contents.series, drives, others=movable, rate=rate)
+        kinds = {*(kind for _, kind in guess.columns), guess.effort_kind}
+    if guess.time is not None:
+        if guess.time not in TIME_COLUMNS:
+            found['time'] = guess.time
+    elif not all(str(each.column).startswith('/') for each in contents.series):  # not of a bag
+        if guess.rate is None:
+            raise FirstModelError(f'{path}: there is no column of times: give --rate HZ, the '
+                                  'samples per second')
+        found['rate'] = guess.rate
+    if guess.time_scale is not None:
+        found['time_scale'] = guess.time_scale
+    if contents.decimal != '.':
+        found['decimal'] = contents.decimal
+    for drive in drives:
+        cells: dict[str, Any] = {
+            kind: guess.columns[drive, kind] for kind in (*SETTLED, *CHANNELS)
+            if (drive, kind) in guess.columns}
+        cells |= {SCALE_KEYS[kind]: guess.scales[drive, kind] for kind in SETTLED
+                  if (drive, kind) in guess.scales}
+        if cells:
+            found[drive] = cells
+    return found, guess.notes, kinds
 
 
-def _rate(path: Path, rate: float | None) -> str:
-    if rate is None:
-        raise FirstModelError(f'{path}: there is no column of times: give --rate HZ, the samples '
-                              'per second')
-    return f'rate: {rate:g}  # samples per second [Hz]'
-
-
-def _file_columns(path: Path, files: Mapping[str, Path], drives: Sequence[str],
-                  rate: float | None, movable: Sequence[str],
-                  ) -> tuple[list[str], list[str], Collection[str]]:
-    """Return the same of files of one quantity each."""
+def _guess_of_files(files: Mapping[str, Path], drives: Sequence[str], rate: float | None,
+                    movable: Sequence[str]) -> Guess:
+    """Return which columns are what in files of one quantity each."""
     inside = {kind: look_into(file) for kind, file in files.items()}
     inside.update(_in_turn(files, inside, len(drives)))
     guesses = {kind: guess_columns(file.series, drives, kind, movable, rate)
                for kind, file in inside.items() if kind != FILE_TIME}
-    merged = Guess(
-        guesses[POSITION].time, {key: column for guess in guesses.values()
-                                 for key, column in guess.columns.items()},
-        {key: scale for guess in guesses.values() for key, scale in guess.scales.items()},
-        guesses[POSITION].time_scale, [note for kind, guess in guesses.items()
-                                       for note in (f'{files[kind].name}: {note}'
-                                                    for note in guess.notes)])
-    lines = []
+    merged = replace(
+        guesses[POSITION], rate=rate,
+        columns={key: column for each in guesses.values() for key, column in each.columns.items()},
+        scales={key: scale for each in guesses.values() for key, scale in each.scales.items()},
+        notes=[f'{files[kind].name}: {note}' for kind, each in guesses.items()
+               for note in each.notes])
     if FILE_TIME in inside:
         series = inside[FILE_TIME].series
-        merged = replace(merged, time=series[0].column if series else 1)
-    if merged.time is not None:
-        if merged.time not in TIME_COLUMNS:
-            lines.append(f'time: {scalar(merged.time)}')
-    else:
-        lines.append(_rate(path, rate))
-    names = {kind: file.name for kind, file in files.items()} if path.is_dir() else _pattern(files)
-    lines.append('files: {' + ', '.join(
-        f'{kind}: {scalar(name)}' for kind, name in names.items()) + '}'
-        + '  # * is what recordings in one folder differ in' * ('*' in names[POSITION]))
-    return ([*lines, *_drive_lines(merged, drives, inside[POSITION].decimal)], merged.notes,
-            {*files})
+        return replace(merged, time=series[0].column if series else 1)
+    return merged
 
 
 def _pattern(files: Mapping[str, Path]) -> dict[str, str]:
     """Return names of files with * for what they have in common: the name of the recording."""
     stems = [file.name.partition('.')[0] for file in files.values()]
-
-    def common(letters: Sequence[str]) -> str:
-        return ''.join(each[0] for each in takewhile(
-            lambda each: len({*each}) == 1, zip(*letters, strict=False)))
-
-    head, tail = common(stems), common([stem[::-1] for stem in stems])[::-1]
+    head = os.path.commonprefix(stems)  # noqa: RUF071 of letters
+    tail = os.path.commonprefix([stem[::-1] for stem in stems])[::-1]  # noqa: RUF071
     found = {}
     for (kind, file), stem in zip(files.items(), stems, strict=True):
         if tail and not tail[0].isalpha():
@@ -506,66 +459,111 @@ def _in_turn(files: Mapping[str, Path], inside: Mapping[str, Contents], count: i
                     Series(f'1[{k}]', f'{kind} {k}', values[k::count]) for k in range(count)))
 
 
-def _drive_lines(guess: Guess, drives: Sequence[str], decimal: str) -> Iterator[str]:
-    if guess.time_scale is not None:
-        yield f'time_scale: {guess.time_scale:g}  # seconds per unit of time'
-    if decimal != '.':
-        yield f'decimal: "{decimal}"'
-    for drive in drives:
-        cells = [f'{kind}: {scalar(guess.columns[drive, kind])}' for kind in (*SETTLED, *CHANNELS)
-                 if (drive, kind) in guess.columns]
-        cells += [f'{SCALE_KEYS[kind]}: {scale:.12g}' for kind in SETTLED
-                  if (scale := guess.scales.get((drive, kind))) is not None]
-        if cells:
-            yield f'{scalar(drive)}: {{{", ".join(cells)}}}'
-
-
 # -------------------------------------------------------------------------------------- text
 
 
-def _text(robot: Path, output: Path, is_mjcf: bool, description: Description, base: str,
-          branch: Branch, drives: Sequence[str], names: Names, columns: Sequence[str],
-          guessed: Sequence[str], recordings: Sequence[str], currents: bool, external: bool,
-          questions: Sequence[str] = ()) -> str:
-    place = os.path.relpath(robot.resolve(), output.resolve().parent)
-    slides = all(description.joints[name].kind == PRISMATIC for name in drives)
-    gain = ', '.join(['1.0'] * len(drives))
-    lines = [
-        f'# Model of {robot.name}'
-        + (f', read with {", ".join(recordings[:3])}' if recordings else '')
-        + '. Lines with "guessed" or "not known" are to be checked.',
-        '/**:',
-        '  ros__parameters:',
-        '    robot:',
-        f'      {"mjcf" if is_mjcf else "urdf"}: {scalar(place)}  # from the folder of this file',
-        f'      base: {scalar(base)}  # the link that does not move',
-        f'      tool: {scalar(branch.tool)}  # the link that carries the load',
-        f'      drives: [{", ".join(scalar(name) for name in drives)}]  # driven, in the order '
-        'of all results',
-        f'      effort_unit: {"N" if slides else "N m"}  # not known from the files; A where '
-        'recorded efforts are currents',
-        f'      {"" if currents else "# "}gain: [{gain}]  # not known: effort per ampere '
-        f'[{"N/A" if slides else "N m/A"}], of recorded currents',
-        f'      # gear_ratio: [{gain}]  # not known: turns of the motor per turn of the joint, '
-        'where ripple is looked for',
-    ]
-    lines += [f'      # loop {loop.name}: {loop.kind}, {loop.a} to {loop.b}, from the '
-              'description' for loop in description.loops]
-    lines += [
-        f'    effort_kind: {CURRENT if currents else EXTERNAL if external else MEASURED}'
-        '  # not known from the files: what efforts are, one of ' + ', '.join(EFFORT_KINDS),
-        '    # `pprs fit` finds friction and masses, and writes them into a copy of this file.']
-    if names.prefix:
-        lines.append(f'    joint_prefix: {scalar(names.prefix)}  # recordings call {drives[0]} '
-                     f'{names.prefix}{drives[0]}')
-    elif renamed := {drive: names.joints[drive] for drive in drives
-                     if names.joints.get(drive, drive) != drive}:
-        lines.append('    joint_map: {' + ', '.join(
-            f'{scalar(drive)}: {scalar(name)}' for drive, name in renamed.items())
-            + '}  # what recordings call them')
-    if columns:
-        lines.append('    columns:  # of tables: names, or numbers from 1')
-        lines += [f'      # guessed: {note}' for note in guessed]
-        lines += [f'      {line}' for line in columns]
-    lines += [f'    # not sure: {line}' for line in questions]
-    return '\n'.join(lines) + '\n'
+@dataclass
+class _Draft:
+    """What is known of a model file that is being written.
+
+    Parameters
+    ----------
+    robot, output : Path
+        The description, and the model file.
+    is_mjcf : bool
+    description : Description
+    base : str
+    branch : Branch
+    drives : tuple of str
+    names : Names
+    recordings : list of str
+    columns : dict
+        Content of the key `columns`.
+    guessed, questions : list of str
+        Comments.
+    kinds : set of str
+        Quantities that are recorded.
+    """
+
+    robot: Path
+    output: Path
+    is_mjcf: bool
+    description: Description
+    base: str
+    branch: Branch
+    drives: tuple[str, ...]
+    names: Names
+    recordings: list[str]
+    columns: dict[str, Any] = field(default_factory=dict)
+    guessed: list[str] = field(default_factory=list)
+    questions: list[str] = field(default_factory=list)
+    kinds: set[str] = field(default_factory=set)
+
+    @property
+    def model(self) -> DriveModel:
+        """The model of the file."""
+        return DriveModel.from_parameters(parse_parameters(self.text, self.output),
+                                          source=str(self.output))
+
+    @property
+    def text(self) -> str:
+        """Content of the file."""
+        place = os.path.relpath(self.robot.resolve(), self.output.resolve().parent)
+        slides = all(self.description.joints[name].kind == PRISMATIC for name in self.drives)
+        gain, is_current = ', '.join(['1.0'] * len(self.drives)), CURRENT in self.kinds
+        kind = CURRENT if is_current else EXTERNAL if EXTERNAL in self.kinds else MEASURED
+        read_with = f', read with {", ".join(self.recordings[:3])}' if self.recordings else ''
+        lines = [
+            f'# Model of {self.robot.name}{read_with}. Lines with "guessed" or "not known" are to '
+            'be checked.',
+            '/**:',
+            '  ros__parameters:',
+            '    robot:',
+            f'      {"mjcf" if self.is_mjcf else "urdf"}: {scalar(place)}  # from the folder of '
+            'this file',
+            f'      base: {scalar(self.base)}  # the link that does not move',
+            f'      tool: {scalar(self.branch.tool)}  # the link that carries the load',
+            f'      drives: {_yaml([*self.drives])}  # driven, in the order of all results',
+            f'      effort_unit: {"N" if slides else "N m"}  # not known from the files; A where '
+            'recorded efforts are currents',
+            f'      {"" if is_current else "# "}gain: [{gain}]  # not known: effort per ampere '
+            f'[{"N/A" if slides else "N m/A"}], of recorded currents',
+            f'      # gear_ratio: [{gain}]  # not known: turns of the motor per turn of the joint, '
+            'where ripple is looked for',
+            *(f'      # loop {loop.name}: {loop.kind}, {loop.a} to {loop.b}, from the description'
+              for loop in self.description.loops),
+            f'    effort_kind: {kind}  # not known from the files: what efforts are, one of '
+            + ', '.join(EFFORT_KINDS),
+            '    # `pprs fit` finds friction and masses, and writes them into a copy of this file.',
+        ]
+        renamed = {drive: self.names.joints[drive] for drive in self.drives
+                   if self.names.joints.get(drive, drive) != drive}
+        if self.names.prefix:
+            first = self.drives[0]
+            lines.append(f'    joint_prefix: {scalar(self.names.prefix)}  # recordings call '
+                         f'{first} {self.names.prefix}{first}')
+        elif renamed:
+            lines.append(f'    joint_map: {_yaml(renamed)}  # what recordings call them')
+        if self.columns:
+            lines += ['    columns:  # of tables: names, or numbers from 1',
+                      *(f'      # guessed: {note}' for note in self.guessed),
+                      *(f'      {scalar(key)}: {_yaml(value)}{_comment(key, value)}'
+                        for key, value in self.columns.items())]
+        lines += [f'    # not sure: {question}' for question in self.questions]
+        return '\n'.join(lines) + '\n'
+
+
+def _comment(key: str, value: Any) -> str:
+    comments = {'rate': 'samples per second [Hz]', 'time_scale': 'seconds per unit of time'}
+    if key == 'files' and '*' in value[POSITION]:
+        return '  # * is what recordings in one folder differ in'
+    return f'  # {comments[key]}' if key in comments else ''
+
+
+def _yaml(value: Any) -> str:
+    """Return a value in one line of YAML."""
+    if isinstance(value, Mapping):
+        return '{' + ', '.join(f'{scalar(key)}: {_yaml(each)}' for key, each in value.items()) + '}'
+    if isinstance(value, list):
+        return '[' + ', '.join(map(_yaml, value)) + ']'
+    return f'{value:.12g}' if isinstance(value, float) else scalar(value)

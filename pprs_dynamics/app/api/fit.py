@@ -109,5 +109,5 @@ def fit(model: Model, recordings: Recordings, validate: Recordings = (), *,
     found = fit_base(inputs.model, inputs.fitted, inputs.held_out, stage(progress, 'fitting'))
     if set(inputs.recordings) <= inputs.paths:
         found = replace(found, model=with_own_reference(
-            found.model, inputs.fitted, [Path(name) for name in inputs.recordings]))
+            found.model, [Path(name) for name in inputs.recordings]))
     return FitResult(inputs, found)

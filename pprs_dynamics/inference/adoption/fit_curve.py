@@ -25,7 +25,6 @@ from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.residuals.residuals import Residuals, ResidualsError
 from pprs_dynamics.inference.search.estimates import Estimate
 from pprs_dynamics.physics.effects.laws.measured_curve import (
-    DEGREE,
     OF,
     Curve,
     MeasuredCurve,
@@ -123,9 +122,8 @@ class FittedCurve:
 
     def band(self, x: Array) -> Array:
         """Return the standard deviation of the curve at values of its variable, (N,)."""
-        index, weight = self.curve.basis(x)
-        covariance = self.covariance[index[:, :, None], index[:, None, :]]
-        band: Array = np.sqrt(np.einsum('ni,nij,nj->n', weight, covariance, weight))
+        basis = self.curve.basis(x)
+        band: Array = np.sqrt(np.asarray(basis.multiply(basis @ self.covariance).sum(axis=1)))
         return band
 
 
@@ -182,10 +180,7 @@ def fit_curve(residuals: Residuals, request: CurveRequest, left_out: slice | Non
         start, end = -pi, pi
     scale = root_mean_square(residuals.error[np.isfinite(residuals.measured[:, drive]), drive])
 
-    index, weight = spline_basis(x, start, end, INTERVALS, turns)
-    columns = np.zeros((INTERVALS + (0 if turns else DEGREE), len(x)))
-    for k in range(DEGREE + 1):
-        np.add.at(columns, (index[:, k], np.arange(len(x))), weight[:, k])
+    columns = spline_basis(x, start, end, INTERVALS, turns).toarray().T
     unit = np.eye(len(columns))
     second = (unit - 2 * np.roll(unit, 1, 1) + np.roll(unit, 2, 1) if turns
               else np.diff(unit, 2, axis=0))

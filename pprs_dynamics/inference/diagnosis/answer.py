@@ -49,6 +49,7 @@ from pprs_dynamics.inference.search.fitted_model import (
     linear_residual,
     model_at,
     parts_of,
+    reversal_forces,
 )
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.inference.search.held_out import (
@@ -109,16 +110,13 @@ class Answer:
         self.noise: dict[str, NoiseSpectrum] = {
             self.drives[d]: spectrum
             for d, spectrum in fits.regression.noise(fitted.fit).items()}
-        known, most = noise_floors(table.first), {
-            self.drives[d]: self.fits.regression.noise_floor(self.fitted.fit, d)
-            for d in self.fits.regression.drives}
         # The residual of the reported set is an upper bound of the noise.
+        most = {self.drives[d]: self.fits.regression.noise_floor(self.fitted.fit, d)
+                for d in self.fits.regression.drives}
+        known = noise_floors(table.first, reported=table.reported.fit)
         self.noise_levels = {name: noise_at_most(known.get(name, np.inf), bound)
                              for name, bound in most.items()}
-        # Free curves take slow noise as well, so that residuals are judged without them.
-        judged = noise_floors(table.last, best=table.reported.fit)
-        self.floors = {name: judged.get(name, bound) for name, bound in most.items()}
-        self.unseen = tuple(name for name in self.floors if name not in judged)
+        self.unseen = tuple(name for name in most if name not in known)
 
     def _remaining(self) -> Array:
         """Return measured minus what the reported model predicts, (M, D) [N]."""
@@ -134,7 +132,7 @@ class Answer:
     def _fit_widths(self) -> None:
         """Fit the velocities within which friction reverses, where the error falls with them."""
         widths = estimate_widths(self.fits, self.fitted)
-        if not (widths and self.fitted.effects):
+        if not widths:
             return
         before = vars(self).copy()
         base, effects = parts_of(self.fits, self.fitted)
@@ -155,7 +153,7 @@ class Answer:
     def over_noise(self, error: Array) -> float:
         """Return the root of the mean square of errors (M, D), each drive over its noise [1]."""
         return root_mean_square([
-            root_mean_square(error[:, d]) / max(self.floors[self.drives[d]], 1e-300)
+            root_mean_square(error[:, d]) / max(self.noise_levels[self.drives[d]], 1e-300)
             for d in self.fits.regression.drives])
 
     def diagnosis(self, unconfirmed: tuple[FoundEffect, ...] = ()) -> Diagnosis:
@@ -165,7 +163,7 @@ class Answer:
         depends = (*self._passing(), *self._depends_on())
         above = self._above_noise()
         little = little_explained(self.adopted, table.first.design.residuals, self.remaining,
-                                  self.decisions, self.floors)
+                                  self.decisions, self.noise_levels)
         drifts = any(effect.course is not None and effect.course.kind != SINCE
                      for effect in effects)
         verdict = ('unknown' if unconfirmed or depends or above or little or drifts
@@ -243,7 +241,7 @@ class Answer:
             before, after = (root_mean_square(error[:, d])
                              for error in (self.given.error, self.remaining))
             # A drive with too few samples for a fit has no noise floor.
-            if after > max(rise * before, ratio * self.floors.get(name, before)):
+            if after > max(rise * before, ratio * self.noise_levels.get(name, before)):
                 return True
         return False
 
@@ -305,12 +303,15 @@ class Answer:
 
     @outside_cost('a residual above hypot(1.5 noise, form error), or 5 times the noise: `unknown`')
     def _above_noise(self) -> dict[str, float]:
-        """Return the drives with more residual than noise and forms explain, over the noise."""
-        found = {}
+        """Return the drives with more residual than noise and forms explain, over the noise.
+
+        Every fit takes widths of reversal as unknown, so that they are part of the explanation.
+        """
+        found, residual = {}, self.remaining - reversal_forces(self.fits, self.fitted)
         for d in self.fits.regression.drives:
-            floor = max(self.floors[self.drives[d]], 1e-300)
+            floor = max(self.noise_levels[self.drives[d]], 1e-300)
             # A constant may be slow noise.
-            ratio = float(np.nanstd(self.remaining[:, d])) / floor
+            ratio = float(np.nanstd(residual[:, d])) / floor
             allowed = min(float(np.hypot(self.decisions.left_ratio, self._form_error[d] / floor)),
                           self.decisions.most_left)
             effort = float(np.nanstd(self.given.measured[:, d]))

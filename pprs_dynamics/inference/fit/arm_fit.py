@@ -194,12 +194,11 @@ def fit_arm(model: DriveModel, columns: Sequence[ArmColumns]) -> ArmFit:
         joints = np.concatenate([one.of_joints(width) for one in columns])
         problem = _Problem(bodies, inertial, joints, rest, known & moving, start)
         weights = problem.weights(point, own)
-        point, own = problem.solved(weights, point, own)
-    spread = problem.spread(weights, point, own)
+        point, own, spread = problem.solved(weights, point, own)
     links = len(bodies)
     ratio = np.linalg.eigvalsh(spread[:links, :links]) / SPREAD ** 2
     masses = np.sqrt(np.diag(spread)[9:links:PARAMETERS]) / SPREAD
-    std = np.sqrt(np.diag(spread)[links:]).reshape(OF_JOINT, count)
+    std = np.sqrt(np.diag(spread)[links:]).reshape(count, OF_JOINT).T
     std[:, ~moving] = np.inf
     names = np.array(model.drives)
     return ArmFit(
@@ -362,49 +361,23 @@ class _Problem:
         return np.concatenate((*parts, self.bodies.distance(point) / SPREAD,
                                (own - self.start.ravel()) / self.own_spread.ravel()))
 
-    def solved(self, weights: Array, point: Array, own: Array) -> tuple[Array, Array]:
-        """Return the best point and own numbers.
+    def solved(self, weights: Array, point: Array, own: Array) -> tuple[Array, Array, Array]:
+        """Return the best point and own numbers, and the covariance of both.
 
-        Armature and friction that would be negative are held at 0, and the others fitted again.
+        Armature and friction are not negative.
         """
-        unknown = np.concatenate((point, own.ravel()))
-        lowest = np.zeros(own.shape)
-        lowest[:, OFFSET] = -np.inf
-        bound = np.concatenate((np.full(len(point), -np.inf), lowest.ravel()))
-        free = np.ones(len(unknown), dtype=bool)
-        while True:
-            unknown = self._descended(unknown, free, weights)
-            below = free & (unknown < bound)
-            if not np.any(below):
-                return unknown[:len(point)], unknown[len(point):].reshape(own.shape)
-            free &= ~below
-            unknown[below] = 0.0
-
-    def _descended(self, unknown: Array, free: np.typing.NDArray[np.bool_], weights: Array,
-                   ) -> Array:
         from scipy.optimize import least_squares  # here: commands start without it
 
-        def residuals(part: Array) -> Array:
-            every = unknown.copy()
-            every[free] = part
-            return self._residuals(every, weights)
-
-        found: Array = unknown.copy()
-        found[free] = least_squares(residuals, unknown[free], x_scale='jac', max_nfev=60).x
-        return found
-
-    def spread(self, weights: Array, point: Array, own: Array) -> Array:
-        """Return the covariance of the unknowns; own numbers in the order of `OF_JOINT`."""
-        at = np.concatenate((point, own.ravel()))
-        step = 1e-6
-        before = self._residuals(at, weights)
-        J: Array = np.column_stack([(self._residuals(at + step * unit, weights) - before) / step
-                                    for unit in np.eye(len(at))])
+        lowest = np.zeros(own.shape)
+        lowest[:, OFFSET] = -np.inf
+        # Dogbox puts a number that would be negative at 0, the other methods only near it.
+        found = least_squares(
+            self._residuals, np.concatenate((point, np.maximum(own, lowest).ravel())),
+            bounds=(np.concatenate((np.full(len(point), -np.inf), lowest.ravel())), np.inf),
+            method='dogbox', x_scale='jac', max_nfev=60, args=(weights,))
+        J: Array = np.asarray(found.jac)
         covariance: Array = np.asarray(np.linalg.inv(J.T @ J), dtype=float)
-        links = len(point)
-        order = np.arange(own.size).reshape(own.shape).T.ravel() + links
-        chosen = np.concatenate((np.arange(links), order))
-        return covariance[np.ix_(chosen, chosen)]
+        return found.x[:len(point)], found.x[len(point):].reshape(own.shape), covariance
 
 
 def independent_share(error: Array) -> float:

@@ -26,8 +26,6 @@ M. C. Kennedy, A. O'Hagan, Bayesian calibration of computer models, J. R. Stat. 
 
 from __future__ import annotations
 
-import base64
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -64,7 +62,6 @@ from pprs_dynamics.inference.search.decisions import DECISIONS, Decisions
 from pprs_dynamics.inference.search.explained_effort import little_explained
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.model.reference_keys import DIRECTIONS
 
 # Tried: in standard deviations of the positions, and in turns of the directions.
 LENGTHS = tuple((position, speed) for position in (0.5, 1.5) for speed in (0.7, 2.0))
@@ -125,16 +122,8 @@ class Reference:
     decisions: Decisions = DECISIONS
 
     @classmethod
-    def of(cls, model: DriveModel, recordings: Sequence[Recording], kept: str = '') -> Reference:
+    def of(cls, model: DriveModel, recordings: Sequence[Recording]) -> Reference:
         """Return the fit of recordings.
-
-        Parameters
-        ----------
-        model : DriveModel
-        recordings : sequence of Recording
-        kept : str, optional
-            What other recordings, to which the model was fitted, left of its numbers' uncertainty;
-            see `directions`.
 
         Raises
         ------
@@ -146,18 +135,12 @@ class Reference:
         found, residuals = _measured(model, recordings)
         numbers = (np.concatenate([_numbers(model, one) for one in found])
                    if model.is_mechanism else None)
-        return cls._fitted(model, residuals, numbers, kept, tuple(one.name for one in recordings),
-                           tuple(recordings))
-
-    @classmethod
-    def _fitted(cls, model: DriveModel, residuals: Residuals, numbers: Array | None, kept: str,
-                named: tuple[str, ...], recordings: tuple[Recording, ...]) -> Reference:
-        names = ', '.join(named)
+        names = tuple(one.name for one in recordings)
         if len(residuals) < LEAST_LENGTH:
             raise ReferenceRunError(
-                f'{names}: too short for a reference, {len(residuals)} samples after treatment, '
-                f'must be at least {LEAST_LENGTH}: record a longer run')
-        columns, base, told = _base(model, numbers, residuals, kept)
+                f'{", ".join(names)}: too short for a reference, {len(residuals)} samples after '
+                f'treatment, must be at least {LEAST_LENGTH}: record a longer run')
+        columns, base, told = _base(model, numbers, residuals)
         drives = range(len(residuals.drives))
         measured = Regression(residuals).drives
         processes = _processes(residuals, columns, measured, model.gear_ratios)
@@ -169,30 +152,18 @@ class Reference:
         regression = Regression(residuals, (*_base_columns(columns), *(
             column for d in drives for column in _columns_of(d, features[d], size[d]))))
         fit = regression.at((), np.stack([one.amplitudes[0] for _, one in fits.values()]))
-        _require_same_robot(model, residuals, columns, fit, names)
+        _require_same_robot(model, residuals, columns, fit, ', '.join(names))
         values, axes = np.linalg.eigh(fit.covariance)
         parts = _parts(residuals)
-        return cls(model, recordings, processes, size,
+        return cls(model, tuple(recordings), processes, size,
                    _repeats(regression, fit, told, parts), base, fit.coefficients,
-                   axes * np.sqrt(np.maximum(values, 0.0)), regression, fit, named)
+                   axes * np.sqrt(np.maximum(values, 0.0)), regression, fit, names)
 
     @property
     def told(self) -> int:
         """How many directions of the base's numbers it determines."""
         shared, *own = (len(one) for one in self.processes)
         return len(self.coefficients) - len(self.size) * shared - sum(own)
-
-    @property
-    def directions(self) -> str:
-        """The principal directions of the base's numbers that the recordings determined, as a text.
-
-        Each of unit variance, half a precision a number: (N, P); '' for none.
-        """
-        told = self.told
-        if not told:
-            return ''
-        values, axes = np.linalg.eigh(self.fit.covariance[:told, :told])
-        return _as_text(self.base[:, :told] @ (axes * np.sqrt(np.maximum(values, 0.0))))
 
     @property
     def note(self) -> str:
@@ -347,41 +318,12 @@ def _require_same_robot(model: DriveModel, residuals: Residuals, columns: Array,
             'of this robot on a day on which its model was right')
 
 
-def _as_text(array: Array) -> str:
-    scale = np.maximum(np.abs(array).max(axis=1), 1e-30).astype('<f4')
-    content = (array / scale[:, None]).astype('<f2')
-    return base64.b64encode(zlib.compress(
-        np.array(array.shape, dtype='<u4').tobytes() + scale.tobytes() + content.tobytes(), 9)
-    ).decode()
-
-
-def _as_array(text: str, key: str) -> Array:
-    try:
-        content = zlib.decompress(base64.b64decode(text, validate=True))
-        rows, columns = np.frombuffer(content, '<u4', 2)
-        scale = np.frombuffer(content, '<f4', rows, 8).astype(float)
-        share = np.frombuffer(content, '<f2', rows * columns, 8 + 4 * rows).astype(float)
-        found: Array = scale[:, None] * share.reshape(rows, columns)
-        return found
-    except (ValueError, zlib.error):
-        raise ReferenceRunError(f'{key}: it is no text that pprs fit wrote, must be taken out, or '
-                                'fit the model again') from None
-
-
-def _base(model: DriveModel, numbers: Array | None, residuals: Residuals, kept: str,
+def _base(model: DriveModel, numbers: Array | None, residuals: Residuals,
           ) -> tuple[Array, Array, int]:
     """Return columns (M, D, P) of determined directions of the base, all directions, and P."""
     if numbers is None:
         return np.zeros((len(residuals), len(residuals.drives), 0)), np.zeros((0, 0)), 0
     prior = base_prior(model, residuals.measured, numbers)
-    if kept:
-        told_before = _as_array(kept, DIRECTIONS)
-        if len(told_before) != len(prior):
-            raise ReferenceRunError(f'{DIRECTIONS}: they are of {len(told_before)} numbers, must '
-                                    f'be of {len(prior)}: fit the model again')
-        # What it did not tell is as it was.
-        axes = np.linalg.qr(np.linalg.solve(prior, told_before), mode='complete')[0]
-        prior = np.concatenate((told_before, prior @ axes[:, told_before.shape[1]:]), axis=1)
     columns = numbers @ prior
     known = np.isfinite(residuals.error).any(axis=0)
     noise = np.nanmean(residuals.error[:, known] ** 2, axis=0)

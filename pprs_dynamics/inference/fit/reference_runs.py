@@ -14,14 +14,12 @@ from pprs_dynamics.errors import UnreadableFileError
 from pprs_dynamics.inference.fit.reference import Reference, ReferenceRunError
 from pprs_dynamics.inference.readings.check import with_mistakes
 from pprs_dynamics.inference.residuals.long_recordings import excerpts_within_memory
-from pprs_dynamics.measurement.files.fingerprint import fingerprint, samples_fingerprint
+from pprs_dynamics.measurement.files.fingerprint import fingerprint
 from pprs_dynamics.measurement.files.recording import Recording, read_recording
 from pprs_dynamics.measurement.files.repeats import find_repeat
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.ledger import values_before_changes
 from pprs_dynamics.physics.model.reference_keys import (
-    DIRECTIONS,
-    HASHES,
     ReferenceFile,
     reference_files,
     with_reference,
@@ -68,12 +66,7 @@ def read_reference(model: DriveModel, files: Sequence[RunFile] = (),
     repeat = find_repeat(runs, diagnosed)
     if repeat is not None:
         raise UnreadableFileError(runs[repeat[0]].name, f'{repeat[1]}, but {OTHER}')
-    fitted_to = model.values.get(HASHES, ())
-    hashes = [samples_fingerprint(one) if isinstance(one, Recording) else fingerprint(one)
-              for one in given]
-    # What the model was fitted to already is no second evidence of its numbers.
-    kept = '' if set(hashes) & set(fitted_to) else str(model.values.get(DIRECTIONS, ''))
-    return Reference.of(model, runs, kept)
+    return Reference.of(model, runs)
 
 
 def _own(model: DriveModel) -> tuple[ReferenceFile, ...]:
@@ -94,16 +87,7 @@ def _own(model: DriveModel) -> tuple[ReferenceFile, ...]:
     return found
 
 
-def with_own_reference(model: DriveModel, recordings: Sequence[Recording],
-                       paths: Sequence[Path]) -> DriveModel:
-    """Return a model that names the files it was fitted to, with its remaining uncertainty.
-
-    The model unchanged where they are too short for a reference.
-    """
-    try:
-        reference = Reference.of(model, recordings)
-    except ReferenceRunError:
-        return model
+def with_own_reference(model: DriveModel, paths: Sequence[Path]) -> DriveModel:
+    """Return a model that names the files it was fitted to."""
     files = [ReferenceFile(path.absolute(), fingerprint(path)) for path in paths]
-    return DriveModel.from_parameters(with_reference(
-        model.values, files, reference.directions), model.source)
+    return DriveModel.from_parameters(with_reference(model.values, files), model.source)

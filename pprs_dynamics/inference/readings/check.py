@@ -15,13 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
-from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import MisreadError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.efforts import (
     effort_scales,
     find_changed_efforts,
-    find_changed_positions,
     find_no_measurements,
     find_scales,
     find_sign_bit,
@@ -44,6 +42,7 @@ from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.measurement.files.samples import Defect
 from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.recorded_names import CURRENT
+from pprs_dynamics.system.plain_yaml import scalar
 
 
 @dataclass(frozen=True)
@@ -100,11 +99,12 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
     recording : Recording
         Of the model's drives.
     """
-    for early in (find_changed_positions, find_sign_bit):
-        if found := tuple(early(recording)):
-            return found  # no reading of the whole is right
+    if found := tuple(find_sign_bit(recording)):
+        return found
     excerpts = {unit: excerpt for unit in (1.0, *_time_units(recording))
                 if (excerpt := excerpt_of(recording, unit, table.STRETCHES)) is not None}
+    if wrong := [*_of_rate(model, recording, excerpts.get(1.0))]:
+        return tuple(wrong)
     search = Search(model, excerpts, bool(np.all(recording.position % 1 == 0)))
     best = search.best()
     rival = None if best is None else search.rival(best)
@@ -112,9 +112,9 @@ def find_mistakes(model: DriveModel, recording: Recording) -> tuple[Defect, ...]
         best = None  # `find_scales` compares the factors themselves
     contents = effort_contents(model, recording, excerpts.get(1.0))
     has_columns = model.recorded.columns is not None
-    mistakes: list[Defect] = [] if best is None else list(_of_fit(model, best))
+    mistakes: list[Defect] = [] if best is None else list(_of_fit(model, recording, best))
     if best is not None and rival is not None:
-        both = [[*_of_fit(model, fit)] for fit in (best, rival)]
+        both = [[*_of_fit(model, recording, fit)] for fit in (best, rival)]
         mistakes = [OtherReading.of(
             'ambiguous', model.drives, range(len(model.drives)), ', or '.join(
                 ' and '.join(mistake.what for mistake in each) for each in both),
@@ -164,7 +164,7 @@ class Search:
 
         Limits of a turn or more of a motor without weight are invented, as URDF asks for some.
         """
-        lower, upper = self.model.strokes
+        lower, upper = self.model.limits.strokes
         excerpt = self.excerpts.get(1.0)
         parts = None if excerpt is None else parts_of(
             self.model, excerpt, plain(len(lower)), in_pieces=True)
@@ -196,7 +196,7 @@ class Search:
                 fit = None if reading is first and unit == 1 else self.fit(reading, unit)
                 # Symmetric robots fit nearly as well in another order of their drives.
                 if fit is not None and (reading.kind != 'drive_order'
-                                        or fit.left < table.OTHER_ORDER * start.left):
+                                        or fit.left < table.BETTER_ORDER * start.left):
                     self.fits.append(fit)
                     best = self._better(best, fit)
         # Zeros that are quarter turns off, one drive after another.
@@ -299,7 +299,7 @@ class Search:
                 table.COST['effort_sign'] if told[0] < 0 else 0.0)
         if np.all(told == told[0]):
             return _mistakes(float(told[0]))
-        kinds = [scales[:3], scales[3:]] if self.model.drives == DRIVES else [scales]
+        kinds = [scales[[*family]] for family in table.families(self.model.drives)]
         return sum(_mistakes(float(kind[0])) if np.all(kind == kind[0])
                    else sum(map(_mistakes, kind.tolist())) for kind in kinds)
 
@@ -374,14 +374,18 @@ def _time_units(recording: Recording) -> list[float]:
 # --------------------------------------------------------------------------------- sentences
 
 
-def _of_fit(model: DriveModel, fit: Fit) -> Iterator[OtherReading]:
+def _of_fit(model: DriveModel, recording: Recording, fit: Fit) -> Iterator[OtherReading]:
     """Yield the mistakes of times, of positions and order, and of efforts."""
     drives, units = model.drives, model.units
     if fit.time_unit != 1.0:
         yield OtherReading('time_unit', 1, f'the times look like {table.TIMES[fit.time_unit]}: as '
                            f'seconds they make the motion {1 / fit.time_unit:.0f} times too slow '
                            'for its efforts', scales=(('', 'time_scale', fit.time_unit),))
-    if fit.reading.kind:
+    if fit.reading.kind == 'drive_order':
+        scales, line = _order_scales(model, recording, fit.reading)
+        yield OtherReading.of('drive_order', drives, fit.reading.drives, fit.reading.what, line,
+                              scales=scales)
+    elif fit.reading.kind:
         yield OtherReading.of(fit.reading.kind, drives, fit.reading.drives, fit.reading.what,
                               scales=position_scales(model, fit.reading))
     if fit.has_constants:
@@ -422,7 +426,29 @@ def position_scales(model: DriveModel, reading: Reading) -> Scales:
             found.append((drive, 'position_scale', factor * scale))
         if k in reading.drives and (total := factor * start + float(offset[k])) != start:
             found.append((drive, 'position_offset', total))
-    return () if reading.kind == 'drive_order' else tuple(found)
+    return tuple(found)
+
+
+def _order_scales(model: DriveModel, recording: Recording, reading: Reading) -> tuple[Scales, str]:
+    """Return the columns with which drives are read in another order, or a line of joints."""
+    drives, joints = model.drives, model.recorded.joints or model.drives
+    moved = [(keys, matrix.argmax(axis=1)) for keys, matrix in (
+        (('position', 'velocity'), reading.position), (('effort', 'current'), reading.effort))
+        if np.any(matrix != np.eye(len(drives)))]
+    columns = {} if model.recorded.columns is None else model.recorded.columns.drives
+    names = {drive: columns[drive].names for drive in columns}
+    if not any(names.values()):
+        if len(moved) > 1:
+            return (), 'joint_map: {' + ', '.join(
+                f'{scalar(drives[k])}: {scalar(joints[moved[0][1][k]])}'
+                for k in reading.drives) + '}'
+        if ', ' in recording.source:  # of a topic: its columns cannot be named
+            return (), ''
+        known = ('position', 'effort', *(['velocity'] if recording.velocity is not None else []))
+        names = {drive: {key: f'{joint}/{key}' for key in known}
+                 for drive, joint in zip(drives, joints, strict=True)}
+    return tuple((drives[k], key, names[drives[order[k]]][key]) for keys, order in moved
+                 for k in reading.drives for key in keys if key in names[drives[order[k]]]), ''
 
 
 def _of_strokes(model: DriveModel, recording: Recording, strokes: tuple[Array, Array],
@@ -450,34 +476,41 @@ def _of_strokes(model: DriveModel, recording: Recording, strokes: tuple[Array, A
             scales=() if unit == 1.0 else position_scales(model, scale))
 
 
-def _of_velocities(model: DriveModel, recording: Recording, excerpt: Excerpt | None,
-                   ) -> Iterator[Defect]:
-    """Yield recorded velocities that are not the derivatives of positions."""
+def _factors(excerpt: Excerpt | None) -> dict[int, float]:
+    """Return recorded velocities over the derivatives of positions, of drives where they agree."""
+    found: dict[int, float] = {}
     if excerpt is None or excerpt.velocity is None:
-        return
-    factors = {}
-    for drive in range(len(recording.drives)):
+        return found
+    for drive in range(excerpt.velocity.shape[1]):
         known = np.isfinite(excerpt.velocity[:, drive])
         recorded, true = (values[known, drive] for values in (
             excerpt.velocity, excerpt.motion.velocity))
         size = float(true @ true) * float(recorded @ recorded)
         if size > 0 and abs(float(recorded @ true)) >= table.ALIKE * np.sqrt(size):
-            factors[drive] = float(recorded @ true) / float(true @ true)
-    columns = model.recorded.columns
+            found[drive] = float(recorded @ true) / float(true @ true)
+    return found
+
+
+def _of_rate(model: DriveModel, recording: Recording, excerpt: Excerpt | None) -> Iterator[Defect]:
+    """Yield a rate of the model file that all recorded velocities contradict alike."""
+    columns, factors = model.recorded.columns, np.array([*_factors(excerpt).values()])
     rate = None if columns is None else columns.rate
-    middle = float(np.median([*factors.values()])) if factors else 1.0
-    if rate is not None and middle > 0 and abs(np.log(middle)) > table.RATE_OFF and np.all(
-            np.abs(np.array([*factors.values()]) / middle - 1) < table.RATE_OFF):
-        true_rate = float(f'{rate * middle:.4g}')
-        yield OtherReading('rate', len(recording.time), f'the recorded velocities are '
-                           f'{middle:.4g} times the derivatives of the positions at {rate:g} '
-                           f'samples per second, as if there were {true_rate:g}',
-                           scales=(('', 'rate', true_rate),))
+    factor = float(np.median(factors)) if len(factors) else 0.0
+    if rate is None or factor <= 0 or np.any(np.abs(factors / factor - 1) > table.RATE_OFF) or any(
+            abs(factor / unit - 1) < table.RATE_OFF for unit in (1.0, *table.VELOCITY_UNITS)):
         return
-    groups: dict[float, list[int]] = {}
-    for drive, factor in factors.items():
-        for wrong in (-1.0, *(sign * each for sign in (1, -1) for unit in table.VELOCITY_FACTORS
-                              for each in (unit, 1 / unit))):
+    true_rate = float(f'{rate * factor:.3g}')
+    yield OtherReading('rate', len(recording.time), f'the recorded velocities are {factor:.4g} '
+                       f'times the derivatives of the positions at {rate:g} samples per second, '
+                       f'as if there were {true_rate:g}', scales=(('', 'rate', true_rate),))
+
+
+def _of_velocities(model: DriveModel, recording: Recording, excerpt: Excerpt | None,
+                   ) -> Iterator[Defect]:
+    """Yield recorded velocities in other units or signs than positions."""
+    columns, groups = model.recorded.columns, dict[float, list[int]]()
+    for drive, factor in _factors(excerpt).items():
+        for wrong in table.VELOCITY_UNITS:
             if abs(factor / wrong - 1) <= table.NEAR_ONE:
                 groups.setdefault(wrong, []).append(drive)
     for factor, group in groups.items():

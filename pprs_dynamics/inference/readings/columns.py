@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,8 +16,10 @@ from pprs_dynamics.drives import Column
 from pprs_dynamics.errors import PprsError
 from pprs_dynamics.inference.readings import table
 from pprs_dynamics.inference.readings.table import CURRENT, EFFORT, POSITION, VELOCITY
-from pprs_dynamics.measurement.files.contents import Series
+from pprs_dynamics.measurement.files.samples import Series
 from pprs_dynamics.measurement.files.table_files import TIME_COLUMNS, TIME_LIKE
+
+TIME_WORDS = {'time', 'micros', 'millis', *TIME_LIKE, *table.TIME_WORDS}
 
 
 class GuessError(PprsError, ValueError):
@@ -43,16 +45,6 @@ class AmbiguousColumns(GuessError):
             for k, joint in enumerate(joints)) for reading in readings)
         super().__init__('two readings of the columns are as likely, write one of them: '
                          + ' or '.join(f'columns: {{{line}}}' for line in self.lines))
-
-
-class RateError(GuessError):
-    """A sampling rate that velocities contradict."""
-
-    def __init__(self, given: float, found: float) -> None:
-        self.lines = (f'rate: {found:g}', f'rate: {given:g}')
-        super().__init__(f'--rate {given:g}: the recorded velocities are the derivatives of the '
-                         f'positions at {found:g} samples per second: give --rate {found:g}, or '
-                         f'write rate: {given:g} and the velocity_scale of each joint')
 
 
 @dataclass(frozen=True)
@@ -107,6 +99,8 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
     """
     time, time_scale, notes = _time(series, rate is not None)
     left = [one for one in series if time is None or one.column != time.column]
+    if not left:
+        raise GuessError('no column holds numbers beside times')
     # pandas numbers rows in a column without a title.
     titled = [one for one in left if one.title]
     if titled:
@@ -132,12 +126,12 @@ def guess_columns(series: Sequence[Series], joints: Sequence[str], quantity: str
                      'a model was taken out')
     guess = Guess(None if time is None else time.column, columns, scales, time_scale, notes, rate,
                   table.EXTERNAL if outside else '')
-    return guess if quantity else _judge_velocities(guess, by_column, time, rate)
+    return guess if quantity else _judge_velocities(guess, by_column, time)
 
 
 def words_of(title: str) -> list[str]:
     """Return the words and numbers that a name is made of, in lower case."""
-    parts = re.sub(r'([a-z])([A-Z])', r'\1 \2', title)
+    parts = re.sub(r'([a-z])(?<!\bm)([A-Z])', r'\1 \2', title.replace('_', ' '))  # not in mA
     return [each for word in re.findall(r'[a-z]+|\d+', parts.lower()) for each in _split(word)]
 
 
@@ -165,13 +159,14 @@ def _time(series: Sequence[Series], has_rate: bool,
     """Return the column of times, its unit [s] where it is not seconds, and comments."""
     rising = [each for each in series if _rises(each.values)]
     named = [each for each in rising if each.title in TIME_COLUMNS] or [
-        each for each in rising if {*words_of(each.title)} & {'time', 'zeit', *TIME_LIKE}]
+        each for each in rising if {*words_of(each.title)} & TIME_WORDS]
     found = next(iter(named), None)
     notes: list[str] = []
     if found is None:
         # Positions may rise as well: with a rate no column is needed.
-        even = [] if has_rate else [each for each in rising if not each.title
-                                    and _is_even(each.values)]
+        even = [] if has_rate else [
+            each for each in rising if _is_even(each.values)
+            and (not each.title or (each is series[0] and not _counts_rows(each.values)))]
         if not even:
             return None, None, notes
         found = even[0]
@@ -196,6 +191,10 @@ def _is_even(values: Array) -> bool:
     return bool(np.mean(np.abs(steps - np.median(steps)) < 4 * np.median(steps)) > 0.9)
 
 
+def _counts_rows(values: Array) -> bool:
+    return bool(np.all(np.diff(values[np.isfinite(values)]) == 1))
+
+
 # ------------------------------------------------------------------------------------ names
 
 
@@ -205,7 +204,7 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
     unnamed = []
     for one in series:
         words = words_of(one.title)
-        place = _joint_in(words, list(dict.fromkeys((*joints, *others))))
+        place = joint_in(words, list(dict.fromkeys((*joints, *others))))
         if place is None:
             unnamed.append(one)
         elif place[0] in joints:
@@ -231,6 +230,8 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
             continue
         if each == CURRENT and any(kind == EFFORT for _, kind in columns):
             continue
+        best = _last_of(best, [key for key in groups if _fit(key, groups[key], each, quantity)
+                               == _fit(best, groups[best], each, quantity)], groups, series)
         if {*best} & table.COMMANDS:
             notes.append(f'{each}: only commands are there ({" ".join(best)})')
         columns.update({(joint, each): column for joint, column in groups[best].items()})
@@ -242,14 +243,36 @@ def _by_names(series: Sequence[Series], joints: Sequence[str], quantity: str | N
     return columns, notes
 
 
+def _last_of(best: tuple[str, ...], rivals: Sequence[tuple[str, ...]],
+             groups: Mapping[tuple[str, ...], Mapping[str, Column]], series: Sequence[Series],
+             ) -> tuple[str, ...]:
+    """Return the group that moves last of those that move alike: commands come first."""
+    values = {one.column: one.values for one in series}
+
+    joint = max(groups[best], key=lambda joint: np.nanstd(values[groups[best][joint]]))
+    return max((key for key in rivals if joint in groups[key]), key=lambda key: _lag(
+        values[groups[best][joint]], values[groups[key][joint]])) if len(rivals) > 1 else best
+
+
+def _lag(values: Array, other: Array) -> int:
+    """Return by how many samples other values come later; 0 where they do not move alike."""
+    first, second = np.diff(np.nan_to_num(values)), np.diff(np.nan_to_num(other))
+    count = len(first) - table.LONGEST_LAG
+    if count < table.LEAST_ROWS or not (np.any(first) and np.any(second)):
+        return 0
+    found = {sign * k: float(np.corrcoef(early[:count], late[k:count + k])[0, 1])
+             for sign, early, late in ((-1, second, first), (1, first, second))
+             for k in range(table.LONGEST_LAG)}
+    best = max(found, key=lambda lag: found[lag])
+    return best if found[best] > table.COPY else 0
+
+
 def _fit(key: tuple[str, ...], members: dict[str, Column], quantity: str, given: str | None,
          ) -> tuple[float, ...]:
     """Return how well a group of columns fits a quantity; not at all below 0."""
     told = {kind for kind, words in table.WORDS.items() if {*key} & {*words}}
-    if {*key} & {'joint', 'joints', 'state'} and len(told) > 1:
-        told.discard(POSITION)  # "joint torque" is no position
-    if {*key} & {*table.WORDS[POSITION][:7]}:
-        told.add(POSITION)
+    if not told and {*key} & table.OF_JOINTS:
+        told.add(POSITION)  # "joint torque" is no position
     if CURRENT in told and EFFORT in told:
         told.discard(EFFORT)
     # The name of the joint alone is a position, as in `shoulder_pan`.
@@ -263,7 +286,7 @@ def _fit(key: tuple[str, ...], members: dict[str, Column], quantity: str, given:
             float(bool({*key} & table.MEASURED)), -float(len(key)))
 
 
-def _joint_in(words: Sequence[str], joints: Sequence[str]) -> tuple[str, int, int] | None:
+def joint_in(words: Sequence[str], joints: Sequence[str]) -> tuple[str, int, int] | None:
     """Return the joint whose name is among the words, where, and how long it is."""
     best: tuple[str, int, int] | None = None
     for joint in joints:
@@ -349,35 +372,30 @@ def _by_numbers(series: Sequence[Series], joints: Sequence[str], time: Array,
                 quantity: str | None, notes: list[str]) -> dict[tuple[str, str], Column]:
     """Return columns without names by what they are of each other, in any order."""
     count = len(joints)
-    values = np.column_stack([each.values for each in series])
     if quantity:
         return {(joint, quantity): each.column
                 for joint, each in zip(joints, series, strict=False)}
-    links = Links.of(values, time)
-    kinds = _chains(links, count) or _layout(values, time, count)
-    if not kinds:
+    values = np.column_stack([each.values for each in series])
+    candidates = [*_chains(values, time, count)] or [*_layouts(values, time, count)]
+    if not candidates:
         raise GuessError(
             f'there is no header, and {len(series)} columns beside time are no blocks of {count} '
             f'joints ({", ".join(joints)}), nor are there as many positions with their '
             f'velocities: write columns: {{time: 1, {joints[0]}: {{position: 2, effort: …}}}} '
             'with numbers from 1')
-    position = values[:, kinds[POSITION]]
-    used = {place for places in kinds.values() for place in places}
-    rest = [place for place in range(len(series)) if place not in used
-            and not _is_known(links, place, used)]
-    if EFFORT not in kinds and rest:
-        groups = [rest[k:k + count] for k in range(0, len(rest) - count + 1, count)]
-        shares = [_explained(values[:, group], position, time) for group in groups]
-        order = sorted(range(len(shares)), key=lambda k: -shares[k])
-        if len(order) > 1 and shares[order[0]] - shares[order[1]] < table.CLEAR and not _are_alike(
-                values, groups[order[0]], groups[order[1]]):
-            first, second = (groups[k] for k in order[:2])
-            raise AmbiguousColumns(joints, [
-                {**kinds, EFFORT: group} for group in (first, second)], series)
-        if order:
-            # Of what is the same but for its scale, as measured and asked efforts, the first.
-            kinds[EFFORT] = next(group for group in groups if group is groups[order[0]] or
-                                 _are_alike(values, group, groups[order[0]]))
+    scored = [(_explained(values[:, group], values[:, kinds[POSITION]], time), kinds, group)
+              for kinds, groups in candidates for group in groups]
+    # Of positions that explain as much the smoothest, as no effort is.
+    near = [each for each in scored if each[0] > max(scored)[0] - table.CLEAR]
+    kinds = min([each[1] for each in near] or [candidates[0][0]],
+                key=lambda kinds: _roughness(values[:, kinds[POSITION]]))
+    efforts = [group for _, other, group in near if other is kinds]
+    unlike = next((group for group in efforts if not _are_alike(values, efforts[0], group)), None)
+    if unlike:
+        raise AmbiguousColumns(joints, [{**kinds, EFFORT: group}
+                                        for group in (efforts[0], unlike)], series)
+    if efforts:  # of what is the same but for its scale, as measured and asked efforts, the first
+        kinds = {**kinds, EFFORT: efforts[0]}
     told = [f'{_span(series, places)} taken as {table.PLURALS[kind]}'
             for kind, places in kinds.items()]
     unused = [place for place in range(len(series))
@@ -403,8 +421,12 @@ def _span(series: Sequence[Series], places: Sequence[int]) -> str:
     return f'column{"s" * (len(columns) > 1)} {", ".join(columns)}'
 
 
-def _chains(links: Links, count: int) -> dict[str, list[int]]:
-    """Return positions and velocities by derivatives; empty where not each joint has both."""
+Candidate = tuple[dict[str, list[int]], list[list[int]]]  # positions, velocities; other blocks
+
+
+def _chains(values: Array, time: Array, count: int) -> Iterator[Candidate]:
+    """Yield positions and velocities by derivatives, where each joint has both."""
+    links = Links.of(values, time)
     with np.errstate(invalid='ignore'):
         derived = (links.correlation > table.ALIKE) & (links.slope > 0)
         # What has a velocity is followed by it best: an effort may resemble a position.
@@ -429,44 +451,32 @@ def _chains(links: Links, count: int) -> dict[str, list[int]]:
     pairs.sort()
     # Velocities of one robot are in one unit.
     slopes = [float(np.log(links.slope[pair])) for pair in pairs]
-    if (len(pairs) != count or len({j for _, j in pairs}) != count
-            or np.ptp(slopes) > table.SAME_UNIT):
-        return {}
-    return {POSITION: [i for i, _ in pairs], VELOCITY: [j for _, j in pairs]}
+    if (len(pairs) == count == len({j for _, j in pairs})
+            and np.ptp(slopes) <= table.SAME_UNIT):
+        used = [place for pair in pairs for place in pair]
+        rest = [place for place in range(values.shape[1])
+                if place not in used and not _is_known(links, place, used)]
+        yield {POSITION: [i for i, _ in pairs], VELOCITY: [j for _, j in pairs]}, [
+            rest[k:k + count] for k in range(0, len(rest) - count + 1, count)]
 
 
-def _layout(values: Array, time: Array, count: int) -> dict[str, list[int]]:
-    """Return the blocks, or every so many columns, that explain efforts best as positions."""
+def _layouts(values: Array, time: Array, count: int) -> Iterator[Candidate]:
+    """Yield positions, and velocities if there are any, in blocks or in every so many columns."""
     width = values.shape[1]
     if width % count or not width:
-        return {}
+        return
     number = width // count
-    if number == 1:
-        return {POSITION: [*range(count)]}
     layouts = [[[*range(b * count, (b + 1) * count)] for b in range(number)]]
-    if count > 1:
+    if count > 1 and number > 1:
         layouts.append([[*range(b, width, number)] for b in range(number)])
-    found = []
     for layout in layouts:
-        links = [[_linked(values, layout[a], layout[b], time) for b in range(number)]
-                 for a in range(number)]
-        for p in range(number):
-            for e in range(number):
-                if e != p and not links[p][e] and not any(links[a][p] for a in range(number)):
-                    found.append((_explained(values[:, layout[e]], values[:, layout[p]], time),
-                                  -p, layout, p, e, links[p]))
-    if not found:
-        return {}
-    # Of those that explain as much the one whose positions are smoothest, as no effort is.
-    most = max(found, key=lambda one: one[0])[0] - table.CLEAR
-    _, _, layout, p, e, of_p = min(
-        (one for one in found if one[0] >= most), key=lambda one: (
-            _roughness(values[:, one[2][one[3]]]), -one[1]))
-    kinds = {POSITION: layout[p]}
-    speeds = [b for b in range(number) if b not in (p, e) and of_p[b]]
-    if speeds:
-        kinds[VELOCITY] = layout[speeds[0]]
-    return {**kinds, EFFORT: layout[e]}
+        links = [[block is not other and _linked(values, block, other, time) for other in layout]
+                 for block in layout]
+        for block, is_rate in zip(layout, links, strict=True):
+            if not any(link[layout.index(block)] for link in links):
+                speeds = [other for other, yes in zip(layout, is_rate, strict=True) if yes]
+                yield {POSITION: block, **({VELOCITY: speeds[0]} if speeds else {})}, [
+                    other for other in layout if other is not block and other not in speeds]
 
 
 def _roughness(values: Array) -> float:
@@ -540,42 +550,24 @@ def _scale(title: str, quantity: str) -> float | None:
     return next((known[word] for word in words_of(title) if word in known), None)
 
 
-def _judge_velocities(guess: Guess, series: Mapping[Column, Series], time: Series | None,
-                      rate: float | None) -> Guess:
-    """Return a guess with the rate that velocities show, without those that are none.
-
-    Raises
-    ------
-    RateError
-        For a rate that they contradict.
-    """
-    slopes = {}
-    for joint, kind in guess.columns:
-        if kind != POSITION or (joint, VELOCITY) not in guess.columns:
+def _judge_velocities(guess: Guess, series: Mapping[Column, Series], time: Series | None) -> Guess:
+    """Return a guess with the rate that velocities show, without those that are none."""
+    rates = []
+    for joint in [joint for joint, kind in guess.columns if kind == VELOCITY]:
+        position, velocity = (guess.columns.get((joint, kind)) for kind in (POSITION, VELOCITY))
+        if position is None or velocity is None:
             continue
-        pair = np.column_stack([series[guess.columns[joint, each]].values
-                                for each in (POSITION, VELOCITY)])
-        stamps = time.values if time is not None else np.arange(len(pair)) / (rate or 1.0)
-        links = Links.of(pair, stamps[:len(pair)])
+        pair = np.column_stack([series[column].values for column in (position, velocity)])
+        links = Links.of(pair, np.arange(float(len(pair))) if time is None else time.values)
         if links.correlation[0, 1] > table.ALIKE:
-            slopes[joint] = float(links.slope[0, 1])
-        elif np.isfinite(links.correlation[0, 1]) and abs(links.correlation[0, 1]) < table.UNLIKE:
-            guess.notes.append(
-                f'{guess.columns[joint, VELOCITY]} is called a velocity, but is not the '
-                f'derivative of {guess.columns[joint, POSITION]} (correlation '
-                f'{links.correlation[0, 1]:.2f}): not used')
+            rates.append(float(links.slope[0, 1]))
+        elif abs(links.correlation[0, 1]) < table.UNLIKE:
+            guess.notes.append(f'{velocity} is called a velocity, but is not the derivative of '
+                               f'{position} (correlation {links.correlation[0, 1]:.2f}): not used')
             del guess.columns[joint, VELOCITY]
-    if not slopes:
+    if time is not None or guess.rate is not None or not rates:
         return guess
-    middle = float(np.median([*slopes.values()]))
-    if time is None:
-        if rate is None:
-            found = float(f'{middle:.3g}')
-            guess.notes.append(f'rate {found:g} Hz: the velocities are the derivatives of the '
-                               'positions at this rate')
-            return replace(guess, rate=found)
-        is_unit = any(abs(middle / factor - 1) < table.RATE_OFF for factor in (
-            1.0, *table.VELOCITY_FACTORS, *(1 / factor for factor in table.VELOCITY_FACTORS)))
-        if not is_unit:
-            raise RateError(rate, float(f'{rate * middle:.3g}'))
-    return guess
+    rate = float(f'{np.median(rates):.3g}')
+    guess.notes.append(f'rate {rate:g} Hz: the velocities are the derivatives of the positions at '
+                       'this rate')
+    return replace(guess, rate=rate)

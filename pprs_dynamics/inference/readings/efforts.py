@@ -11,6 +11,7 @@ gravity lacks some of these, and any missing effect that is found in it is wrong
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -62,7 +63,7 @@ def find_scales(model: DriveModel, contents: Mapping[str, Shares]) -> list[Other
             return [OtherReading.of(
                 'ambiguous', model.drives, every, f'{found.what}, or in amperes: the factors are '
                 + ', '.join(f'{scale:.3g}' for scale in scales), f'{line} or {gains_line}')]
-    limits = model.effort_limits[[*certain]]
+    limits = model.limits.efforts[[*certain]]
     if len(certain) > 1 and has_weight and np.all(np.isfinite(limits)):
         gains = np.log(sizes * limits)
         are_one = (np.std(np.log(sizes)) > table.SEVERAL_FACTORS
@@ -76,7 +77,7 @@ def find_scales(model: DriveModel, contents: Mapping[str, Shares]) -> list[Other
                                 and np.any(np.abs(np.log(sizes)) > table.SEVERAL_FACTORS))
             if is_share:
                 return [_unit(model, f"{of_all} looks like {name} of the drives' largest",
-                              sign * share * model.effort_limits)]
+                              sign * share * model.limits.efforts)]
     # A load may multiply what one drive of several needs.
     if has_weight and len(certain) >= min(2, len(every)) and np.all(
             np.abs(np.log(sizes)) > np.log(table.SAME_MASSES)) and np.all(
@@ -140,109 +141,71 @@ def find_changed_efforts(model: DriveModel, recording: Recording, excerpt: Excer
     forces = None if excerpt is None else forces_on(model, excerpt.motion, excerpt.time)
     if excerpt is None or forces is None:
         return
-    effort, size = excerpt.effort, np.sqrt(np.mean(forces ** 2, axis=0))
-    told = tuple(d for d in range(effort.shape[1]) if size[d] > table.WEAK * size.max()
-                 and np.isfinite(effort[:, d]).sum() > 2 / table.LEAST_PART)
+    size = np.sqrt(np.mean(forces ** 2, axis=0))
+    told = tuple(d for d in range(len(size)) if size[d] > table.WEAK * size.max()
+                 and np.isfinite(excerpt.effort[:, d]).sum() > 2 / table.LEAST_PART)
+    effort, force = excerpt.effort / size, forces / size
     unsigned = tuple(d for d in told if _is_unsigned(
-        recording.effort[:, d], effort[:, d], forces[:, d]))
+        recording.effort[:, d], effort[:, d], force[:, d]))
     if unsigned:
         yield OtherReading.of(
             'effort_absolute', model.drives, unsigned,
             f'the effort of {named(model.drives, unsigned)} looks like its absolute value: it is '
             'never below 0, where the model changes sign; it must be recorded with its sign')
         return
-    groups = [told, *((d,) for d in told)] if len(told) > 1 else [told]
-    for group in groups if told else ():
-        change = _change(effort[:, group] / size[[*group]], forces[:, group] / size[[*group]])
-        if change is None:
-            continue
-        factor, at, is_after = change
-        first, last = excerpt.time[at - 1], excerpt.time[at]
-        edge = f'{last:.4g} s' if last - first < table.SHARP else (
-            f'a time between {first:.4g} and {last:.4g} s')
-        everyone = tuple(range(len(model.drives))) if group == told else group
-        yield OtherReading.of(
-            'effort_unit' if factor > 0 else 'effort_sign', model.drives, everyone,
-            f'the effort of {named(model.drives, everyone)} looks '
-            f'{table.CHANGES[factor].format(model.units[group[0]].effort)} '
-            f'{f"from {edge} on" if is_after else f"until {edge}"}, unlike in the rest; the '
-            'parts must be recordings of their own')
-        return
+    for group in dict.fromkeys((told, *((d,) for d in told))) if told else ():
+        change = _change(effort[:, group], force[:, group])
+        if change is not None:
+            factor, at, is_after = change
+            every = tuple(range(len(model.drives))) if group == told else group
+            unit = table.CHANGES[factor].format(model.units[group[0]].effort)
+            yield OtherReading.of(
+                'effort_unit' if factor > 0 else 'effort_sign', model.drives, every,
+                f'the effort of {named(model.drives, every)} looks {unit} '
+                f'{"from" if is_after else "until"} about {excerpt.time[at]:.3g} s'
+                f'{" on" if is_after else ""}, unlike in the rest; the parts must be recordings '
+                'of their own')
+            return
 
 
-def _unlike(effort: Array, force: Array) -> float:
-    """Return how much efforts and forces differ: 0 where they are equal, 1 where unrelated."""
-    return float(np.nansum((effort - force) ** 2)
-                 / max(np.nansum(effort ** 2 + force ** 2), 1e-300))
+def _unlike(effort: Array, force: Array) -> Array:
+    """Return by how much efforts and forces, (N, d), differ and how large they are, (2, N)."""
+    found: Array = np.nansum([(effort - force) ** 2, effort ** 2 + force ** 2], axis=2)
+    return found
+
+
+def _share(sums: Array) -> Any:
+    """Return how much of the size the differences are: 0 for equal, 1 for unrelated."""
+    return sums[0] / np.maximum(sums[1], 1e-300)
 
 
 def _is_unsigned(recorded: Array, effort: Array, force: Array) -> bool:
     below = np.sum(np.minimum(force, 0.0) ** 2) / np.sum(force ** 2)
     known = recorded[np.isfinite(recorded)]
+    signed, without = (_share(_unlike(effort[:, None], each[:, None]).sum(axis=1))
+                       for each in (force, np.abs(force)))
     return bool(table.BOTH_SIGNS < below < 1 - table.BOTH_SIGNS and np.all(known >= 0)
-                and np.any(known) and table.CLEARLY * _unlike(effort, np.abs(force))
-                < _unlike(effort, force))
+                and np.any(known) and table.CLEARLY * without < signed)
 
 
 def _change(effort: Array, force: Array) -> tuple[float, int, bool] | None:
-    """Return by which factor efforts (M, d) change, before which sample, and in which part."""
+    """Return by which factor efforts (N, d) change, at which sample, and in which part."""
     margin = max(1, int(table.LEAST_PART * len(effort)))
-    splits = range(margin, len(effort) - margin + 1, max(1, margin // 4))
-    whole, best = _unlike(effort, force), None
+    as_said, found = _unlike(effort, force), []
     for factor in table.CHANGES:
-        other = effort / factor
-        least = min(whole, _unlike(other, force)) / table.CLEARLY
+        changed = _unlike(effort / factor, force)
+        least = min(_share(as_said.sum(axis=1)), _share(changed.sum(axis=1))) / table.CLEARLY
         for is_after in (True, False):
-            def unlike(at: int, other: Array = other, is_after: bool = is_after) -> float:
-                changed = (np.arange(len(effort)) >= at) == is_after
-                # What changed must itself be as the model has it.
-                if _unlike(other[changed], force[changed]) > table.GOOD_FIT:
-                    return 1.0
-                return _unlike(np.where(changed[:, None], other, effort), force)
-
-            at = min(splits, key=unlike)
-            at = min(range(max(at - margin // 4, margin), min(
-                at + margin // 4, len(effort) - margin) + 1), key=unlike)
-            found = unlike(at)
-            if found < min(least, table.GOOD_FIT) and (best is None or found < best[0]):
-                best = found, factor, at, is_after
-    return None if best is None else best[1:]
-
-
-def find_changed_positions(recording: Recording) -> Iterator[OtherReading]:
-    """Yield where the positions of all drives are in another unit from one sample to the next."""
-    units = {**table.LENGTHS, **table.ANGLES}
-    size = np.abs(recording.position)
-    ratio = size[1:] / np.maximum(size[:-1], 1e-300)
-    for unit, is_after in ((unit, is_after) for unit in units for is_after in (True, False)):
-        factor = 1 / unit if is_after else unit
-        # Between two samples of a motion nothing else changes the positions of all drives so.
-        alike = np.abs(ratio / factor - 1) < table.NEARLY
-        still = (size[1:] == 0) | (size[:-1] == 0)
-        for k in np.flatnonzero(np.all(alike | still, axis=1) & np.any(alike, axis=1)).tolist():
-            # One zero crossing may have any ratio: a change of unit lasts.
-            if not table.LASTING - 1 <= k < len(size) - table.LASTING - 1:
-                continue
-            parts = (slice(k + 1 - table.LASTING, k + 1), slice(k + 1, k + 1 + table.LASTING))
-            before, after = (np.median(size[part], axis=0) for part in parts)
-            if np.all(np.abs(after / np.maximum(before, 1e-300) / factor - 1)
-                      < 10 * table.NEARLY) and _steps_change(recording.position, parts, factor):
-                when = (f'from {recording.time[k + 1]:.4g} s on' if is_after
-                        else f'until {recording.time[k]:.4g} s')
-                yield OtherReading.of(
-                    'position_unit', recording.drives, range(len(recording.drives)),
-                    f'the positions look like {units[unit]} {when}, unlike in the rest; the parts '
-                    'must be recordings of their own')
-                return
-
-
-def _steps_change(position: Array, parts: tuple[slice, slice], factor: float) -> bool:
-    """Return whether the steps of a single drive change by the factor, too."""
-    if position.shape[1] > 1:
-        return True
-    before, after = (np.median(np.abs(np.diff(position[part, 0]))) for part in parts)
-    change = after / max(float(before), 1e-300) / factor
-    return bool(1 / table.LIKE_STEPS < change < table.LIKE_STEPS)
+            before, after = (as_said, changed) if is_after else (changed, as_said)
+            sums = (np.cumsum(before, axis=1)[:, :-1]
+                    + np.cumsum(after[:, ::-1], axis=1)[:, -2::-1])
+            at = margin + int(np.argmin(_share(sums)[margin:-margin]))
+            part = changed[:, at + 1:] if is_after else changed[:, :at + 1]
+            # What changed must itself be as the model has it.
+            if max(_share(part.sum(axis=1)), _share(sums[:, at])) < table.GOOD_FIT and (
+                    _share(sums[:, at]) < least):
+                found.append((float(_share(sums[:, at])), factor, at + is_after, is_after))
+    return min(found)[1:] if found else None
 
 
 # ------------------------------------------------------------------------------- measurements
@@ -295,8 +258,8 @@ def _finding(model: DriveModel, contents: Mapping[str, Shares], drives: Sequence
     group = tuple(model.drives.index(drive) for drive in drives)
     content = contents[drives[0]]
     of = f'the effort of {named(model.drives, group)}'
-    gravity = f'gravity ({_share(content.gravity, content.gravity_doubt)})'
-    inertia = f'inertia ({_share(content.inertia, content.inertia_doubt)})'
+    gravity = f'gravity ({_amount(content.gravity, content.gravity_doubt)})'
+    inertia = f'inertia ({_amount(content.inertia, content.inertia_doubt)})'
     beside = [gravity] * content.lacks_gravity + ['friction'] * (not content.has_friction)
     lacks = f'{of} holds no {" nor ".join([inertia, *beside])}: it looks like'
     what = {
@@ -316,6 +279,6 @@ def _finding(model: DriveModel, contents: Mapping[str, Shares], drives: Sequence
                             f'{EFFORT_KIND}: {line}' if line else '')
 
 
-def _share(share: float, doubt: float) -> str:
+def _amount(share: float, doubt: float) -> str:
     # Adding 0 makes minus nothing nothing.
     return f'{round(share, 2) + 0.0:.2f} ± {doubt:.2f} of what the model has'

@@ -11,6 +11,7 @@ from math import comb
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from pprs_dynamics.arrays import Array, root_mean_square
@@ -40,7 +41,7 @@ class Parts:
     velocity: Array
     direction: Array
 
-    def rows(self, which: Array) -> Parts:
+    def rows(self, which: NDArray[np.bool_]) -> Parts:
         """Return some of the samples."""
         return Parts(*(part[which] for part in (
             self.inertia, self.gravity, self.others, self.velocity, self.direction)))
@@ -94,7 +95,7 @@ def _forces(model: DriveModel, motion: DriveMotion, time: Array) -> Array:
     rigid, others = [], np.zeros_like(still)
     with np.errstate(all='ignore'):
         for each in (motion, replace(motion, velocity=still, acceleration=still)):
-            followed = follow(model, time, each).motion.with_time(time)
+            followed = follow(model, time, each).with_time(time)
             forces = model.drive_forces(followed)
             rigid.append(np.sum([forces.parts[name] for name in forces.parts if name in bodies],
                                 axis=0))

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from pprs_dynamics.measurement.files.samples import Defect
+from pprs_dynamics.system.plain_yaml import scalar
 
-Scales = tuple[tuple[str, str, float], ...]
+Scales = tuple[tuple[str, str, float | str | int], ...]
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,8 @@ def columns_line(findings: Iterable[OtherReading], has_columns: bool = False) ->
     """
     blocks: dict[str, list[str]] = {}
     for drive, key, value in (scale for finding in findings for scale in finding.scales):
-        blocks.setdefault(drive, []).append(f'{key}: {value:.7g}')
+        blocks.setdefault(drive, []).append(
+            f'{key}: {scalar(value) if isinstance(value, str | int) else f"{value:.7g}"}')
     entries = [entry if not drive else f'{drive}: {{{entry}}}' for drive, entry in (
         (drive, ', '.join(keys)) for drive, keys in blocks.items())]
     if has_columns and entries:

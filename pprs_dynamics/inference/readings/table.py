@@ -10,6 +10,7 @@ A hypothesis is a way to read a recording. Its score is a log-likelihood, from t
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import permutations
@@ -17,7 +18,7 @@ from itertools import permutations
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DRIVES, DriveUnits
+from pprs_dynamics.drives import DriveUnits
 
 # ------------------------------------------------------------------------------------- units
 
@@ -65,7 +66,7 @@ BEYOND, FAR = 2.0, 10.0  # multiples of the ends of a stroke, or of the speed li
 STROKE_SLACK = 0.05  # share of a stroke
 SURE = 3.0  # nats by which the best hypothesis must win
 GOOD_FIT = 0.25  # residual with which a hypothesis other than the plain one is credible
-OTHER_ORDER = 0.5  # residual in another order of the drives, relative to that in the given one
+BETTER_ORDER = 0.5  # residual in another order of the drives, over that in the given one
 CLOSE_FIT = 2e-3  # residual that leaves nothing to look for
 WEAK = 0.01  # efforts and swings that are this much smaller than others tell nothing
 
@@ -97,10 +98,6 @@ NOISE_STEP, NOISE_ORDER = 0.01, 4  # differences that separate noise from motion
 CHANGES = {1e-3: 'in k{}', 1e3: 'in m{}', -1.0: 'negated'}
 CLEARLY = 3.0  # times that a changed reading fits better
 LEAST_PART = 0.1  # share of a recording that a change lasts
-SHARP = 0.2  # [s]; a change that is known better is reported as one moment
-NEARLY = 0.02  # relative error of a step of positions
-LASTING = 10  # samples for which positions in another unit must last, on both sides
-LIKE_STEPS = 2.0  # factor within which the steps of a single drive change as its unit does
 BOTH_SIGNS = 0.05  # share of the model's squared efforts of the other sign
 
 # ----------------------------------------------------------------------- columns by their names
@@ -108,15 +105,17 @@ BOTH_SIGNS = 0.05  # share of the model's squared efforts of the other sign
 POSITION, VELOCITY, EFFORT, CURRENT = 'position', 'velocity', 'effort', 'current'
 # Words of a title, and the quantity that they tell.
 WORDS = {
-    POSITION: ('position', 'positions', 'pos', 'q', 'angle', 'angles', 'theta', 'state', 'qpos',
-               'joint', 'joints', 'x', 'actual'),
+    POSITION: ('position', 'positions', 'pos', 'q', 'angle', 'angles', 'theta', 'qpos', 'enc',
+               'encoder', 'ticks', 'winkel', 'lage'),
     VELOCITY: ('velocity', 'velocities', 'vel', 'dq', 'qd', 'qdot', 'dtheta', 'speed', 'omega',
-               'qvel', 'dpos', 'v'),
+               'qvel', 'dpos', 'v', 'drehzahl', 'geschwindigkeit'),
     EFFORT: ('effort', 'efforts', 'tau', 'torque', 'torques', 'trq', 'force', 'moment', 'load',
-             'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'f'),
+             'tq', 'qfrc', 'u', 'trqs', 'kraft', 'moments', 'drehmoment', 'f'),
     CURRENT: ('current', 'currents', 'cur', 'curr', 'amp', 'amps', 'ampere', 'amperes', 'i', 'iq',
-              'ma'),
+              'ma', 'strom'),
 }
+# These tell of a position where nothing else is told.
+OF_JOINTS = frozenset(('state', 'joint', 'joints', 'j', 'axis', 'achse', 'x', 'actual'))
 # The same of what may be measured beside.
 CHANNEL_WORDS = {'temperature': {'temperature', 'temperatures', 'temp', 'temps'},
                  'pressure': {'pressure', 'pressures'}}
@@ -130,14 +129,16 @@ OTHERS = frozenset((
 # These tell of a command: taken only where nothing measured is there.
 COMMANDS = frozenset((
     'cmd', 'command', 'commands', 'commanded', 'target', 'targets', 'des', 'desired', 'ref',
-    'reference', 'goal', 'setpoint', 'sp', 'set', 'demand', 'demanded'))
+    'reference', 'goal', 'setpoint', 'sp', 'set', 'soll', 'demand', 'demanded'))
 # These tell of torques from outside, as a driver estimates them: taken where nothing else is there.
 FROM_OUTSIDE = frozenset(('ext', 'external', 'contact'))
 LETTERS = {'a': 'actual', 'm': 'measured', 'd': 'desired', 'c': 'commanded', 'r': 'reference'}
 MEASURED = frozenset((
-    'meas', 'measured', 'actual', 'act', 'real', 'fb', 'feedback', 'msr', 'sensor', 'link'))
+    'meas', 'measured', 'actual', 'act', 'real', 'ist', 'fb', 'fbk', 'feedback', 'msr', 'sensor',
+    'link'))
 UNIT_WORDS = {POSITION: {'deg': math.pi / 180, 'degs': math.pi / 180, 'degree': math.pi / 180,
-                     'degrees': math.pi / 180, 'mm': 1e-3, 'mrad': 1e-3},
+                     'degrees': math.pi / 180, 'grad': math.pi / 180, 'rev': 2 * math.pi,
+                     'mm': 1e-3, 'mrad': 1e-3},
           VELOCITY: {'deg': math.pi / 180, 'degs': math.pi / 180, 'rpm': math.pi / 30,
                      'mm': 1e-3, 'mms': 1e-3},
           EFFORT: {'mnm': 1e-3, 'nmm': 1e-3, 'knm': 1e3},
@@ -153,20 +154,19 @@ UNLIKE = 0.5  # correlation below which a column that is called a velocity is no
 SAME_UNIT = 0.05  # relative distance of a slope from a unit's
 CLEAR = 0.05  # share of the explained efforts by which one block of columns must win
 LEAST_ROWS = 30
+LONGEST_LAG = 20  # samples by which what is measured may follow what was asked for
 LENGTHS_OF_STEPS = (1, 2, 4, 8, 16, 32, 64, 128)  # [samples]
-VELOCITY_FACTORS = (math.pi / 180, 2 * math.pi, math.pi / 30, 1e-3, 1e-6)
 SLOWEST, SHORTEST = 0.5, 1e-5  # [s]; steps of a robot's recording
 
 # --------------------------------------------------------------------------------- velocities
 
 ALIKE = 0.9  # correlation of a velocity with the derivative of its position
+VELOCITY_UNITS = (-1.0, *(sign * each for sign in (1, -1) for unit in (
+    math.pi / 180, 2 * math.pi, math.pi / 30, 1e-3, 1e-6) for each in (unit, 1 / unit)))
 NEAR_ONE = 0.2  # relative distance of a velocity's factor from a known one
 RATE_OFF = 0.03  # relative error of a sampling rate that is reported
 
-SLIDES, LIFTS = (0, 1, 2), (3, 4, 5)  # of the six drives, in drive order
-# Columns in the order chain by chain, and last to first, under names in drive order.
-OTHER_ORDERS = ((0, 2, 4, 1, 3, 5), (0, 3, 1, 4, 2, 5), (5, 4, 3, 2, 1, 0))
-MOST_PERMUTED = 4  # drives of which all orders are tried; of more, exchanges of two
+MOST_PERMUTED = 4  # drives of which all orders are tried
 
 
 @dataclass(frozen=True)
@@ -249,7 +249,7 @@ def readings(drives: tuple[str, ...], units: Sequence[DriveUnits], are_counts: b
                           ALL_NEGATED if len(group) == count > 1 else 0.0))
     yield Reading('reversed_time', 'the recording looks as if it were played backwards: friction '
                   'drives the motion', every, same, same, COST['reversed_time'], backwards=True)
-    for order in _orders(drives):
+    for order in _orders(count):
         moved = tuple(k for k in every if order[k] != k)
         listed = ', '.join(f'{drives[order[k]]} like {drives[k]}' for k in moved)
         turned = same[list(order)]
@@ -276,8 +276,6 @@ def named(drives: tuple[str, ...], group: tuple[int, ...]) -> str:
     """Return how a sentence names some of the drives."""
     if len(group) == len(drives) > 1:
         return 'all drives'
-    if drives == DRIVES and group in (SLIDES, LIFTS):
-        return 'the slides' if group == SLIDES else 'the lifts'
     return ', '.join(drives[k] for k in group)
 
 
@@ -286,30 +284,33 @@ def _position(drives: tuple[str, ...], group: tuple[int, ...]) -> str:
             else 'positions of ' + named(drives, group) + ' look')
 
 
+def families(drives: Sequence[str]) -> list[tuple[int, ...]]:
+    """Return the places of drives whose names differ in their numbers alone, together."""
+    stems = [re.sub(r'\d', '', drive) for drive in drives]
+    return [tuple(k for k, each in enumerate(stems) if each == stem)
+            for stem in dict.fromkeys(stems)]
+
+
 def _groups(drives: tuple[str, ...], alike: tuple[int, ...]) -> list[tuple[int, ...]]:
-    """Return all of some drives together, those of a kind, and each alone."""
-    if not alike:
-        return []
-    return list(dict.fromkeys((alike, *((SLIDES, LIFTS) if drives == DRIVES else ()),
-                               *((k,) for k in alike))))
+    """Return all of some drives together, those of a family, and each alone."""
+    groups = [alike, *families(drives), *((k,) for k in alike)]
+    return [*dict.fromkeys(group for group in groups if group and {*group} <= {*alike})]
 
 
-def _orders(drives: tuple[str, ...]) -> list[tuple[int, ...]]:
-    """Return orders of D drives; of those that fit alike the one that moves least comes first."""
-    count = len(drives)
+def _orders(count: int) -> list[tuple[int, ...]]:
+    """Return orders of drives; of those that fit alike the one that moves least comes first.
+
+    Of many drives: exchanges of two, last to first, begun at another one, and by columns of a
+    table in place of its rows.
+    """
     same = tuple(range(count))
-    if drives == DRIVES:
-        within = [(*first, *second) for first in permutations(SLIDES)
-                  for second in permutations(LIFTS)]
-        found = {*within, *(order[3:] + order[:3] for order in within), *OTHER_ORDERS}
-    elif count <= MOST_PERMUTED:
-        found = {*permutations(same)}
-    else:
-        found = {same[::-1], *(tuple(j if k == i else i if k == j else k for k in same)
-                               for i in same for j in same[:i])}
+    found = {*permutations(same)} if count <= MOST_PERMUTED else {
+        same[::-1], *(same[k:] + same[:k] for k in same),
+        *(tuple(j if k == i else i if k == j else k for k in same) for i in same for j in same[:i]),
+        *(tuple(k for first in range(rows) for k in same[first::rows])
+          for rows in range(2, count) if not count % rows)}
     return sorted(found - {same}, key=lambda order: (
-        sum(k != place for place, k in enumerate(order)),
-        sum(k % 3 != place % 3 for place, k in enumerate(order)), order))
+        sum(k != place for place, k in enumerate(order)), order))
 
 
 def _scaled(count: int, group: tuple[int, ...], factor: float) -> Array:

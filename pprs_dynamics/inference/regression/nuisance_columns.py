@@ -29,8 +29,10 @@ from pprs_dynamics.physics.effects.drive_effect import DriveEffect, MeasurementE
 from pprs_dynamics.physics.effects.structure_effect import PassiveJointEffect
 
 
-def nuisance_rows(design: Design, term: Term, coefficients: Array) -> Array:
-    """Return the uncertainty of a term's form, (w, M) [N]; (0, M) for none.
+def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
+    """Return what a term's friction changes by if it reverses in other widths, (w, M) [N].
+
+    None, (0, M), for an effect that is no friction or has a memory.
 
     Parameters
     ----------
@@ -38,15 +40,6 @@ def nuisance_rows(design: Design, term: Term, coefficients: Array) -> Array:
     term : Term
     coefficients : (k,) array
         By which its rows are multiplied.
-    """
-    return np.concatenate((reversal_rows(design, term, coefficients),
-                           _deviation_rows(design, term, coefficients)))
-
-
-def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
-    """Return what a term's friction changes by where it turns over otherwise, (w, M) [N].
-
-    None, (0, M), for what is no friction or knows its past.
     """
     effect = term.effect
     if (term.drive is None or not effect.is_friction or not issubclass(effect, DriveEffect)
@@ -65,7 +58,7 @@ def reversal_rows(design: Design, term: Term, coefficients: Array) -> Array:
     return design.treated(rows)
 
 
-def _deviation_rows(design: Design, term: Term, coefficients: Array) -> Array:
+def deviation_rows(design: Design, term: Term, coefficients: Array) -> Array:
     """Return what real forms of a term's effect may add to its force, (w, M) [N]."""
     effect = term.effect
     if term.drive is None or not issubclass(effect, DriveEffect):

@@ -100,7 +100,7 @@ def forces_on(model: DriveModel, motion: DriveMotion, time: Array) -> Array | No
     found = np.empty_like(motion.position)
     with np.errstate(all='ignore'):
         try:
-            followed = follow(model, time, moved).motion
+            followed = follow(model, time, moved)
             for part in motion.segments:
                 state = model.initial_state()
                 stretch = followed[part].with_time(time[part])

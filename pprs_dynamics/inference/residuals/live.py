@@ -16,7 +16,6 @@ from pprs_dynamics.errors import PprsError
 from pprs_dynamics.measurement.files.samples import Mask
 from pprs_dynamics.measurement.motion.differentiation import ORDER, LocalPolynomial
 from pprs_dynamics.measurement.motion.live_reconstruction import LiveReconstruction, LiveSample
-from pprs_dynamics.physics.mechanism.motion import PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
 WINDOW = 0.12  # [s] of the smoothing that gives velocity and acceleration
@@ -86,7 +85,7 @@ class LiveComparison:
         """Compare with another model from the next sample on; the running error starts afresh."""
         self._state = model.continued_state(self._model, self._state)
         self._model = model
-        self._seed: PlatformMotion | None = None
+        self._closed: dict[Any, Array] = {}
         self._recent.clear()
 
     @property
@@ -135,7 +134,7 @@ class LiveComparison:
                     self._begin_again(samples[first].time)
                 model_effort.append(self._forces(samples[first:last]))
         except PprsError:
-            self._seed = None
+            self._closed = {}
             raise
         time = np.array([sample.time for sample in samples])
         model = np.concatenate(model_effort)
@@ -158,7 +157,7 @@ class LiveComparison:
         start = self._state.start
         self._state = self._model.initial_state(
             start if start is not None and start <= time else None)
-        self._seed = None
+        self._closed = {}
 
     def running_error(self) -> Array:
         """Return the root of the mean squared residual of the last span, (D,); NaN: none."""
@@ -194,20 +193,14 @@ class LiveComparison:
     def _forces(self, samples: list[LiveSample]) -> Array:
         model: Any = self._model
         position = np.stack([sample.position for sample in samples])
-        motion = self._followed(
+        motion = model.robot.motion_of_drives(
             position - model.position_error(position),
             np.stack([sample.velocity for sample in samples]),
-            np.stack([sample.acceleration for sample in samples]))
+            np.stack([sample.acceleration for sample in samples]), self._closed)
         forces = model.drive_forces(
             motion.with_time([sample.time for sample in samples]), self._state)
         total: Array = model.measured(forces, self._state).total
         return total
-
-    def _followed(self, position: Array, velocity: Array, acceleration: Array) -> Any:
-        """Return what the drives move."""
-        found = self._model.robot.motion_of_drives(position, velocity, acceleration, self._seed)
-        self._seed = found[-1:]
-        return found
 
 
 def _is_unexplained(error: Array, model: Array, moving: Mask) -> bool:

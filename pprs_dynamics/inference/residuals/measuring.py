@@ -13,6 +13,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.residuals.reconstruction import (
+    MOTION,
     Reconstruction,
     reconstruct,
     treated_forces,
@@ -21,7 +22,6 @@ from pprs_dynamics.inference.residuals.residuals import Residuals
 from pprs_dynamics.measurement.files.recording import Recording
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
-MOTION = ('position', 'velocity', 'acceleration')
 # Between recordings [s], so that times of all together increase.
 PAUSE = 1.0
 

@@ -13,12 +13,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
-from pprs_dynamics.drives import DRIVES
 from pprs_dynamics.errors import ConvergenceError, MotionError
 from pprs_dynamics.measurement.files.samples import Progress
 from pprs_dynamics.measurement.motion.differentiation import Smoothing
@@ -33,10 +32,8 @@ from pprs_dynamics.measurement.motion.treatment import Treatment
 from pprs_dynamics.physics.effects.drive_effect import MeasurementEffect
 from pprs_dynamics.physics.effects.laws.elastic_joint import LINK_POSITION
 from pprs_dynamics.physics.mechanism.joint_motion import JointMotion
-from pprs_dynamics.physics.mechanism.motion import PlatformMotion
+from pprs_dynamics.physics.mechanism.motion import QUANTITIES, PlatformMotion
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.forward_motion import find_pose_jumps, solve_forward_motion
-from pprs_dynamics.physics.three_pprs.geometry import Geometry
 
 if TYPE_CHECKING:
     from pprs_dynamics.measurement.files.recording import Recording
@@ -44,27 +41,7 @@ if TYPE_CHECKING:
 POSITION_STEP = 1e-4  # [m, rad], for derivatives of errors by positions
 CHUNK = 16_000  # samples at a time; a million at once would take gigabytes
 Motion = PlatformMotion | JointMotion
-
-
-class FollowedMotion(NamedTuple):
-    """Motion of N samples without times, nearness to another branch (N,), and jumps (J,)."""
-
-    motion: Motion
-    near_branch: np.ndarray
-    jumps: np.ndarray
-
-    def notes(self, time: Array) -> list[str]:
-        """Return the findings as sentences; time (N,) [s]."""
-        notes = []
-        if np.any(self.near_branch):
-            notes.append(
-                f'{int(self.near_branch.sum())} samples lie near another solution of the forward '
-                'kinematics, where small errors of positions matter most')
-        if len(self.jumps):
-            notes.append(f'the pose jumps at {len(self.jumps)} places, first at '
-                         f'{time[self.jumps[0]]:.6g} s: forward kinematics may have left its '
-                         'branch')
-        return notes
+MOTION = ('position', 'velocity', 'acceleration')
 
 
 @dataclass(frozen=True)
@@ -105,10 +82,6 @@ class Reconstruction(DriveMotion):
         nothing.
     treat : Treatment
         What effort and model both get: values (N, k) -> (M, k).
-    near_branch : (N,) bool array
-        See `ForwardKinematics`.
-    jumps : (J,) int array
-        Samples before which the pose jumps.
     gain : (D,) array
         By which recorded currents were multiplied [N m/A, N/A]; NaN where efforts were recorded.
     dropped : int
@@ -131,8 +104,6 @@ class Reconstruction(DriveMotion):
     motion: Motion
     effort: Array
     treat: Treatment
-    near_branch: np.ndarray
-    jumps: np.ndarray
     gain: Array
     dropped: int
     start: float
@@ -172,14 +143,13 @@ class Reconstruction(DriveMotion):
                 first = last
 
 
-def follow(model: DriveModel | Geometry, time: Array, drives: DriveMotion,
-           progress: Progress | None = None) -> FollowedMotion:
-    """Return the motion that belongs to the drives': of an axis and an arm it is the same.
+def follow(model: DriveModel, time: Array, drives: DriveMotion,
+           progress: Progress | None = None) -> Motion:
+    """Return the motion, without times, that belongs to one of the drives.
 
     Parameters
     ----------
-    model : DriveModel or Geometry
-        Of any kind, or the geometry of a 3-PPRS.
+    model : DriveModel
     time : (N,) array
         [s].
     drives : DriveMotion
@@ -191,66 +161,38 @@ def follow(model: DriveModel | Geometry, time: Array, drives: DriveMotion,
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    if isinstance(model, DriveModel) and model.moves_joints:
-        return FollowedMotion(JointMotion(drives.position, drives.velocity, drives.acceleration),
-                              np.zeros(len(time), dtype=bool), np.zeros(0, dtype=int))
-    geometry = model if isinstance(model, Geometry) else model.robot.geometry
-    return _follow_platform(geometry, time, drives, progress)
-
-
-def _follow_platform(geometry: Geometry, time: Array, drives: DriveMotion,
-                     progress: Progress | None) -> FollowedMotion:
-    """Return the platform's motion by forward kinematics, chunk by chunk."""
-    count = len(time)
-    arrays = [np.empty((count, width)) for width in (3, 4, 3, 3, 3, 3)]
-    near = np.zeros(count, dtype=bool)
+    parts: list[Any] = []
     for segment in drives.segments:
-        seed = None
+        closed: dict[Any, Array] = {}
         for start in range(segment.start, segment.stop, CHUNK):
             rows = slice(start, min(start + CHUNK, segment.stop))
             try:
-                found = solve_forward_motion(
-                    geometry, drives.position[rows], drives.velocity[rows],
-                    drives.acceleration[rows], seed)
+                parts.append(model.robot.motion_of_drives(
+                    drives.position[rows], drives.velocity[rows], drives.acceleration[rows],
+                    closed))
             except ConvergenceError as error:
                 sample = start + error.sample
                 raise ConvergenceError(
                     int(drives.index[sample]), f'at {time[sample]:.6g} s {error.found}',
                     error.rule) from None
-            part = found.motion
-            for array, values in zip(arrays, (
-                    part.position, part.orientation, part.linear_velocity, part.angular_velocity,
-                    part.linear_acceleration, part.angular_acceleration), strict=True):
-                array[rows] = values
-            near[rows] = found.near_branch
-            seed = part[-1:]
             if progress is not None:
-                progress(rows.stop, count)
-    motion = PlatformMotion(*arrays)
-    return FollowedMotion(motion, near, _jumps(motion, time, drives.segments))
-
-
-def _jumps(motion: PlatformMotion, time: Array, segments: Sequence[slice]) -> np.ndarray:
-    jumps = []
-    for segment in segments:
-        for start in range(segment.start, segment.stop, CHUNK):
-            first = max(start - 1, segment.start)  # the step from the last chunk counts too
-            rows = slice(first, min(start + CHUNK, segment.stop))
-            jump = find_pose_jumps(motion[rows].with_time(time[rows]))
-            jumps.append(first + np.flatnonzero(jump))
-    return np.concatenate(jumps)
+                progress(rows.stop, len(time))
+    kind = type(parts[0])
+    names = QUANTITIES if kind is PlatformMotion else MOTION
+    motion: Motion = kind(*(np.concatenate([getattr(part, name) for part in parts])
+                            for name in names))
+    return motion
 
 
 def reconstruct(
-    model: DriveModel | Geometry, recording: Recording, progress: Progress | None = None,
+    model: DriveModel, recording: Recording, progress: Progress | None = None,
     window: float | None = None,
 ) -> Reconstruction:
     """Return the motion and effort behind a recording.
 
     Parameters
     ----------
-    model : DriveModel or Geometry
-        Whose kinematics to use.
+    model : DriveModel
     recording : Recording
         Or anything with its arrays and segments.
     progress : callable, optional
@@ -265,24 +207,20 @@ def reconstruct(
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    names = model.drives if isinstance(model, DriveModel) else DRIVES
+    names = model.drives
     if tuple(recording.drives) != names:
         order = ', in this order' if len(names) > 1 else ''
         raise MotionError('drives', f'they are {", ".join(recording.drives)}',
                           f'be {", ".join(names)}{order}', 'shape')
-    if isinstance(model, DriveModel):
-        unit = 'rad' if all(units.turns for units in model.units) else 'm'
-        drives = smooth_drives(recording, window, model.blocks_per_period, unit)
-    else:
-        drives = smooth_drives(recording, window)
+    unit = 'rad' if all(units.turns for units in model.units) else 'm'
+    drives = smooth_drives(recording, window, model.blocks_per_period, unit)
     read, time, total = drives, recording.time[drives.index], len(drives.index)
     effort = _efforts(model, recording)[drives.index]
     windup = _windup(recording, read)
-    drives, followed = _followed_rightly(model, recording, read, time, windup, progress)
+    drives, motion = _followed_rightly(model, recording, read, time, windup, progress)
     dropped = sum(part.stop - part.start for part in recording.segments) - total
     notes = [*drives.notes, f'{dropped} samples are dropped: half a window at the ends of '
-             f'{len(drives.segments)} segments, what fills no block, and segments too short',
-             *followed.notes(time)]
+             f'{len(drives.segments)} segments, what fills no block, and segments too short']
     rests = np.isfinite(recording.effort[drives.index]) & np.isnan(effort)
     if np.any(rests):
         shares = (f'{name} {share:.0%}' for name, share in zip(
@@ -291,9 +229,8 @@ def reconstruct(
                      + (', '.join(shares) or 'less than 0.5% of the time'))
     drives = replace(drives, notes=tuple(notes))
     return Reconstruction(
-        **vars(drives), time=time, motion=followed.motion, effort=effort,
-        treat=Treatment(drives.block_starts, total), near_branch=followed.near_branch,
-        jumps=followed.jumps, gain=_applied_gain(recording), dropped=dropped,
+        **vars(drives), time=time, motion=motion, effort=effort,
+        treat=Treatment(drives.block_starts, total), gain=_applied_gain(recording), dropped=dropped,
         start=float(recording.time[0]), channels=_channels(recording, drives.index),
         recorded=recording, read=read, windup=windup)
 
@@ -308,13 +245,12 @@ def read_by(reconstruction: Reconstruction, model: DriveModel) -> Reconstruction
     ConvergenceError
         Where drive positions do not close the mechanism.
     """
-    drives, followed = _followed_rightly(
+    drives, motion = _followed_rightly(
         model, reconstruction.recorded, reconstruction.read, reconstruction.time,
         reconstruction.windup)
     return replace(reconstruction, position=drives.position, velocity=drives.velocity,
                    acceleration=drives.acceleration, smoothing=drives.smoothing,
-                   motion=followed.motion,
-                   near_branch=followed.near_branch, jumps=followed.jumps)
+                   motion=motion)
 
 
 def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recording: Recording,
@@ -348,11 +284,11 @@ def misread(effects: Sequence[MeasurementEffect], names: Sequence[str], recordin
 
 
 def _followed_rightly(
-    model: DriveModel | Geometry, recording: Recording, read: DriveMotion, time: Array,
+    model: DriveModel, recording: Recording, read: DriveMotion, time: Array,
     windup: Array | None, progress: Progress | None = None,
-) -> tuple[DriveMotion, FollowedMotion]:
+) -> tuple[DriveMotion, Motion]:
     """Return the true motion of the drives, and of what they move, behind that which was read."""
-    if not isinstance(model, DriveModel) or not model.misreadings:
+    if not model.misreadings:
         return read, follow(model, time, read, progress)
     q, q_dot, q_ddot = misread(model.misreadings, model.drives, recording, read)
     drives = replace(read, position=read.position - q, velocity=read.velocity - q_dot,
@@ -365,7 +301,7 @@ def _followed_rightly(
         return drives, followed
     # Loads hardly change by what they do to positions: one step is enough.
     load = np.concatenate([
-        model.mechanism(followed.motion[start:start + CHUNK]).transmitted
+        model.mechanism(followed[start:start + CHUNK]).transmitted
         for start in range(0, len(time), CHUNK)])
     drives = replace(drives, position=drives.position - model.loaded_position_error(load))
     if windup is not None:
@@ -403,14 +339,13 @@ def _channels(recording: Recording, index: Array) -> dict[str, Array]:
     return found
 
 
-def _efforts(model: DriveModel | Geometry, recording: Recording) -> Array:
+def _efforts(model: DriveModel, recording: Recording) -> Array:
     """Return the efforts of a recording, NaN where a drive stands between motions.
 
     Where poses are held throughout, their efforts count: they show gravity and offsets.
     """
     effort = recording.effort
-    if isinstance(model, DriveModel) and model.rest_speed and not are_held_poses(
-            recording.position, recording.segments):
+    if model.rest_speed and not are_held_poses(recording.position, recording.segments):
         effort = effort.copy()
         for part in recording.segments:
             step = float(np.median(np.diff(recording.time[part])))

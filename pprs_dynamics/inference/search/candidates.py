@@ -28,6 +28,8 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 RowKey = frozenset[tuple[str, str]]  # names with their place, and kinds of courses
 COURSE_TIMES = 200  # beginnings that are tried, evenly over the recordings
 SINCE, DURING, DRIFT = 'since', 'during', 'drift'  # kinds of courses
+# Kinds of nuisance columns: whether friction follows a load, how it reverses, deviations of forms.
+LOAD, REVERSAL, FORM = 'load', 'reversal', 'form'
 
 
 @dataclass(frozen=True)
@@ -318,8 +320,8 @@ class CandidateSet:
         Of the penalised deviance with all prior costs.
     blocks : mapping of Component to Block
         Columns of the components.
-    nuisance : mapping of Component to tuple of Block
-        Columns for what the components leave open, fitted with them.
+    nuisance : mapping of Component to mapping of str to Block
+        Columns for the uncertainty of the components' forms by kind, fitted with them.
     barred : str
         Why it is inadmissible: no possible values come near, or a candidate may be the form error
         of others; '' for an admissible set.
@@ -329,8 +331,14 @@ class CandidateSet:
     fit: JointFit
     terms: CostTerms
     blocks: Mapping[Component, Block] = field(default_factory=dict, repr=False)
-    nuisance: Mapping[Component, tuple[Block, ...]] = field(default_factory=dict, repr=False)
+    nuisance: Mapping[Component, Mapping[str, Block]] = field(default_factory=dict, repr=False)
     barred: str = ''
+
+    @property
+    def nuisance_blocks(self) -> tuple[Block, ...]:
+        """Columns for the uncertainty of forms, of all components."""
+        return tuple(block for blocks in self.nuisance.values() for block in blocks.values())
+
 
     @cached_property
     def total(self) -> float:

@@ -17,13 +17,16 @@ from pprs_dynamics.inference.regression.design import Design, searched_in_drives
 from pprs_dynamics.inference.regression.joint_fit import CERTAIN, JointFit, Regression
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.regression.nuisance_columns import (
+    deviation_rows,
     joint_reversal_rows,
-    nuisance_rows,
+    reversal_rows,
 )
 from pprs_dynamics.inference.regression.sensitivities import DEVIATIONS
 from pprs_dynamics.inference.regression.terms import Term
 from pprs_dynamics.inference.search.body_centres import about_centre, find_centre, has_centre
 from pprs_dynamics.inference.search.candidates import (
+    FORM,
+    REVERSAL,
     Candidate,
     CandidateSet,
     Component,
@@ -159,7 +162,7 @@ class Components:
         self._terms: dict[Hashable, Term] = {}
         self._centres: dict[Hashable, tuple[float, ...]] = {}
         self._blocks: dict[Component, Block] = {}
-        self._nuisance: dict[Component, dict[int, Array]] = {}
+        self._nuisance: dict[Component, Mapping[str, dict[int, Array]]] = {}
         self._prior_costs: dict[Component, CostTerms] = {}
         self.local = {d: DriveComponents(design, regression, d) for d in regression.drives}
         self.spanning = [placed(design, effect, d, shape, names)
@@ -308,24 +311,25 @@ class Components:
         return {d: self.regression.series[d].transform((values - term.rows[d])[chosen])
                 for d, values in term.bare.items() if d in self.regression.series}
 
-    def nuisance_rows(self, component: Component) -> dict[int, Array]:
-        """Return the uncertainty of its form, by its coefficients, (k, w, n) by drive.
+    def nuisance_rows(self, component: Component) -> Mapping[str, dict[int, Array]]:
+        """Return the uncertainty of its form by kind and drive, (k, w, n) for k coefficients.
 
-        How friction turns over where it knows no past, and the effect's own deviations.
+        How friction without a memory reverses, and how real forms of the effect deviate.
         """
         if component not in self._nuisance:
             term, d = self.term(component), component.drive
-            rows = {}
-            if d is None:
-                rows = joint_reversal_rows(self.design, term, component.names)
-            else:
-                rows = {d: np.stack([nuisance_rows(self.design, term, component.every(unit))
-                                     for unit in np.eye(max(len(component.names), 1))])}
-            if component.course is not None:
-                rows = {d: values * self._weight(component.course) for d, values in rows.items()}
-            self._nuisance[component] = {
-                d: self.regression.series[d].transform(values) for d, values in rows.items()
-                if np.any(values) and d in self.regression.series}
+            units = np.eye(max(len(component.names), 1))
+            kinds = {REVERSAL: joint_reversal_rows(self.design, term, component.names)} if (
+                d is None) else {
+                kind: {d: np.stack([rows(self.design, term, component.every(unit))
+                                    for unit in units])}
+                for kind, rows in ((REVERSAL, reversal_rows), (FORM, deviation_rows))}
+            weight = 1.0 if component.course is None else self._weight(component.course)
+            self._nuisance[component] = {kind: transformed for kind, rows in kinds.items() if (
+                transformed := {
+                    d: self.regression.series[d].transform(values * weight)
+                    for d, values in rows.items()
+                    if np.any(values) and d in self.regression.series})}
         return self._nuisance[component]
 
     def leaves_open(self, component: Component) -> bool:

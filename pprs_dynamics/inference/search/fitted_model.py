@@ -13,6 +13,7 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array, root_mean_square
 from pprs_dynamics.inference.regression.base_columns import (
+    ReversalShape,
     move_numbers,
     move_present,
     units_of,
@@ -21,7 +22,7 @@ from pprs_dynamics.inference.regression.base_columns import (
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.terms import OperatingPoint, PlacedEffect
 from pprs_dynamics.inference.residuals.reconstruction import treated_forces
-from pprs_dynamics.inference.search.candidates import CandidateSet
+from pprs_dynamics.inference.search.candidates import REVERSAL, CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.model.drive_model import DriveModel
 
@@ -116,6 +117,21 @@ def linear_prediction(fits: FittedSets, fitted: CandidateSet) -> Array:
 def linear_residual(fits: FittedSets, fitted: CandidateSet) -> Array:
     """Return measured minus what the linear fit predicts, (M, D) [N]."""
     return fits.regression.residuals.measured - linear_prediction(fits, fitted)
+
+
+def reversal_forces(fits: FittedSets, fitted: CandidateSet) -> Array:
+    """Return what friction that reverses in other widths than the model's changes, (M, D) [N]."""
+    found, fit = np.zeros_like(fits.design.residuals.model), fitted.fit
+    for column, c in zip(fits.design.base, fit.coefficients, strict=False):
+        if isinstance(column, ReversalShape):
+            for d, row in column.rows.items():
+                found[:, d] += c * row
+    for blocks in fitted.nuisance.values():
+        if REVERSAL in blocks:
+            for d, rows in blocks[REVERSAL].rows.items():
+                series = fits.regression.series[d]
+                found[series.index, d] += series.inverse(fit.of(blocks[REVERSAL]) @ rows)
+    return found
 
 
 def linear_error(fits: FittedSets, fitted: CandidateSet) -> float:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import replace
-from itertools import chain
 from types import MappingProxyType
 
 import numpy as np
@@ -19,6 +18,7 @@ from pprs_dynamics.inference.regression.joint_fit import Integers, JointFit, Reg
 from pprs_dynamics.inference.regression.normal_equations import Block
 from pprs_dynamics.inference.search.body_centres import centre_of
 from pprs_dynamics.inference.search.candidates import (
+    LOAD,
     Candidate,
     CandidateSet,
     Component,
@@ -40,7 +40,7 @@ LEAST_IMPROVEMENT = 0.1  # in cost, for which a step is taken
 SIZE_STEP = 0.2  # in the logarithm of a coefficient in proportion to which friction is in doubt
 
 Candidates = tuple[Candidate, ...]
-Nuisance = Mapping[Component, tuple[Block, ...]]
+Nuisance = Mapping[Component, Mapping[str, Block]]
 
 
 class FittedSets:
@@ -71,7 +71,7 @@ class FittedSets:
         self.form_errors = FormErrors(design, self.regression, decisions)
         self.constraints = Constraints(design)
         self._evaluated: dict[Hashable, CandidateSet] = {}
-        self._nuisance: dict[Hashable, tuple[Block, ...]] = {}
+        self._nuisance: dict[Hashable, Mapping[str, Block]] = {}
 
     @property
     def sets(self) -> tuple[CandidateSet, ...]:
@@ -143,7 +143,8 @@ class FittedSets:
         """Return the columns of candidates, then those of what they leave open."""
         return [*(block for c in candidates for block in (
             c.blocks if isinstance(c, UnknownCandidate)
-            else map(self.components.block, c.components))), *chain(*nuisance.values())]
+            else map(self.components.block, c.components))),
+            *(block for of_component in nuisance.values() for block in of_component.values())]
 
     def _set(self, candidates: Candidates, fit: JointFit, nuisance: Nuisance) -> CandidateSet:
         blocks = {component: self.components.block(component) for c in candidates
@@ -171,17 +172,16 @@ class FittedSets:
                 found[component] = self._nuisance[key]
         return found
 
-    def _nuisance_of(self, component: Component, c: Array) -> tuple[Block, ...]:
+    def _nuisance_of(self, component: Component, c: Array) -> Mapping[str, Block]:
         """Return the columns of one component, for its coefficients (k,)."""
-        blocks = []
+        blocks = {}
         unloaded = self.components.unloaded(component)
         if unloaded is not None:
-            blocks.append(Block({d: (c @ rows)[None] for d, rows in unloaded.items()}, np.eye(1)))
-        left_open = {d: np.tensordot(c, rows, 1)
-                     for d, rows in self.components.nuisance_rows(component).items()}
-        if left_open:
-            blocks.append(Block(left_open, np.eye(len(next(iter(left_open.values()))))))
-        return tuple(blocks)
+            blocks[LOAD] = Block({d: (c @ rows)[None] for d, rows in unloaded.items()}, np.eye(1))
+        for kind, by_drive in self.components.nuisance_rows(component).items():
+            rows = {d: np.tensordot(c, values, 1) for d, values in by_drive.items()}
+            blocks[kind] = Block(rows, np.eye(len(next(iter(rows.values())))))
+        return blocks
 
     def at_noise_of(self, fitted: CandidateSet, candidates: Candidates) -> CandidateSet:
         """Return a smaller set under the noise of a larger one: what a replacement starts from."""

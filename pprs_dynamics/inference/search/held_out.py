@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain
 
 import numpy as np
 
@@ -184,7 +183,7 @@ def hold_out(fits: FittedSets, fitted: CandidateSet) -> HeldOut:
     coefficients = np.stack([fit.coefficients for fit in others])
     plain = coefficients.copy()
     plain[:, [k for k, column in enumerate(fits.design.base) if not column.in_model]] = 0.0
-    plain[:, fit.index_of(chain(*fitted.nuisance.values()))] = 0.0
+    plain[:, fit.index_of(fitted.nuisance_blocks)] = 0.0
     left = np.full(regression.residuals.measured.shape, np.nan)
     squares, count = 0.0, 0
     for d, (index, rows) in rows_of.items():

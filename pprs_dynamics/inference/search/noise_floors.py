@@ -4,9 +4,8 @@
 """The noise of every drive of a recording: that of the largest fit.
 
 The noise is estimated with all columns at once, as Mallows' C_p takes the variance of the largest
-model: every effect of the catalogue, and a free curve over each drive's position. The restricted
-likelihood counts the degrees of freedom that they use. Nothing is chosen, so that the noise does
-not depend on what a search reports: all commands print the same number.
+model: every effect of the catalogue. The restricted likelihood counts the degrees of freedom that
+they use. All commands print this number, and all residuals are judged by it.
 
 References
 ----------
@@ -37,31 +36,24 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 LEAST_DIRECTION, MOST_DIRECTIONS = 0.03, 6
 # Shapes of an effect beyond these span no few directions: ripples of any period are any curve.
 MOST_SHAPES = 60
-CURVE = 24  # hat functions of a free curve over a drive's position
 
 
 def noise_floors(fits: FittedSets, period: float | None = None,
-                 best: JointFit | None = None) -> dict[str, float]:
+                 reported: JointFit | None = None) -> dict[str, float]:
     """Return the rms of the noise of each drive [N], where the recordings determine it.
 
     Parameters
     ----------
     fits : FittedSets
-        Around the input model.
     period : float, optional
         Between the samples of the noise [s]; by default that of the design.
-    best : JointFit, optional
-        Of a set of effects, whose columns take the place of the curves.
+    reported : JointFit, optional
+        Of a set of effects, whose noise the largest fit must determine as well.
     """
     regression, residuals = fits.regression, fits.design.residuals
-    further = best.blocks if best else [
-        regression.block({d: _curve(residuals.variables['position'][:, d])})
-        for d in regression.drives if fits.design.moves(d)]
-    fit = regression.fit(tuple(dict.fromkeys((*catalogue_blocks(fits), *further))),
-                         fits.evaluate(()).fit.amplitudes)
-    spectra = [fit.amplitudes, best.amplitudes] if best else [fit.amplitudes]
-    seen = np.all([_shares_seen(fits, fit, amplitudes) >= fits.decisions.noise_seen
-                   for amplitudes in spectra], axis=0)
+    fit = regression.fit(catalogue_blocks(fits), fits.evaluate(()).fit.amplitudes)
+    seen = np.all([_shares_seen(fits, fit, noise.amplitudes) >= fits.decisions.noise_seen
+                   for noise in (fit, reported or fit)], axis=0)
     # Means over longer blocks have less white noise, and as much of slower noise.
     white = fit.amplitudes[:, 0] * (residuals.period / (period or residuals.period) - 1)
     return {fits.design.drives[d]: float(np.sqrt(max(
@@ -72,13 +64,6 @@ def noise_floors(fits: FittedSets, period: float | None = None,
 def noise_at_most(floor: float, bound: float) -> float:
     """Return a noise level, or an upper bound of it that is lower beyond its accuracy."""
     return bound if bound * (1 + DECISIONS.noise_accuracy) < floor else floor
-
-
-def _curve(position: Array) -> Array:
-    """Return hat functions of a position, (CURVE, M)."""
-    place = (position - position.min()) / max(float(np.ptp(position)), 1e-12) * (CURVE - 1)
-    hats: Array = np.maximum(0.0, 1 - np.abs(place - np.arange(CURVE)[:, None]))
-    return hats[np.any(hats, axis=1)]
 
 
 def measure_columns(

@@ -19,7 +19,7 @@ from pprs_dynamics.arrays import Array
 from pprs_dynamics.inference.regression.base_columns import ReversalShape, present_values, rounded
 from pprs_dynamics.inference.regression.design import Design
 from pprs_dynamics.inference.regression.terms import FullRate
-from pprs_dynamics.inference.search.candidates import CandidateSet
+from pprs_dynamics.inference.search.candidates import REVERSAL, CandidateSet
 from pprs_dynamics.inference.search.fitted_sets import FittedSets
 from pprs_dynamics.physics.effects.drive_effect import DriveEffect, DriveSamples, MeasurementEffect
 from pprs_dynamics.physics.mechanism.reversal import smooth_sign
@@ -66,9 +66,8 @@ def estimate_widths(fits: FittedSets, fitted: CandidateSet) -> dict[int, float]:
         for k in columns:
             rest = rest + fitted.fit.coefficients[k] * series.transform(design.base[k].rows[d])
         for blocks in fitted.nuisance.values():
-            for block in blocks:
-                if set(block.rows) == {d}:
-                    rest = rest + fitted.fit.of(block) @ block.rows[d]
+            if REVERSAL in blocks and set(blocks[REVERSAL].rows) == {d}:
+                rest = rest + fitted.fit.of(blocks[REVERSAL]) @ blocks[REVERSAL].rows[d]
         root = np.sqrt(series.spread(regression.weights(fitted.fit, d)))
         turning = _turning(design, fitted, d)
 

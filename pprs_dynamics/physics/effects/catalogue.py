@@ -18,9 +18,11 @@ from functools import cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from pprs_dynamics.errors import EffectError
 from pprs_dynamics.physics.effects import laws
-from pprs_dynamics.physics.effects.effect import CatalogueEffect, Parameter
-from pprs_dynamics.physics.effects.foreign_effects import guard
+from pprs_dynamics.physics.effects.drive_effect import DriveEffect
+from pprs_dynamics.physics.effects.effect import CatalogueEffect
+from pprs_dynamics.physics.effects.foreign_effects import check_columns, guard
 from pprs_dynamics.system.plain_text import displayed
 
 if TYPE_CHECKING:
@@ -65,7 +67,7 @@ def catalogue() -> dict[str, type[CatalogueEffect]]:
     for point in sorted(entry_points(group=GROUP), key=lambda point: (point.name, point.value)):
         try:
             effect = _load(point, effects)
-        except _UnusableEffectError as error:
+        except (_UnusableEffectError, EffectError) as error:
             warnings.warn(displayed(f'{_origin(point)} is left out: {error}'), RuntimeWarning,
                           stacklevel=2)
         else:
@@ -86,25 +88,24 @@ def _load(point: EntryPoint, known: dict[str, type[CatalogueEffect]]) -> type[Ca
     if not (inspect.isclass(effect) and issubclass(effect, CatalogueEffect)):
         raise _UnusableEffectError('it must be a class derived from CatalogueEffect, e.g. a '
                                    'DriveEffect')
-    if missing := sorted(effect.__abstractmethods__):
-        raise _UnusableEffectError(f'{effect.__name__} does not define {", ".join(missing)}')
     if not isinstance(getattr(effect, 'name', None), str):
         raise _UnusableEffectError(f'{effect.__name__} must have name, a str')
     if not effect.card.equation:
         raise _UnusableEffectError(f'the docstring of {effect.__name__} must have a section '
                                    'Equation')
-    for attribute in ('linear', 'shape'):
-        parameters = getattr(effect, attribute, None)
-        if not (isinstance(parameters, tuple)
-                and all(isinstance(parameter, Parameter) for parameter in parameters)):
-            raise _UnusableEffectError(
-                f'{effect.__name__} must have {attribute}, a tuple of Parameter')
+    if not hasattr(effect, 'parameters'):
+        raise _UnusableEffectError(f'{effect.__name__} must have linear, a tuple of Parameter')
     if not effect.name.isidentifier():
         raise _UnusableEffectError(
             f'its name {effect.name!r} must be one word of letters, digits and _')
     if effect.name in (*known, *EFFECTS, *RESERVED):
         raise _UnusableEffectError(f'the name {effect.name} is taken')
     guard(effect)
+    if inspect.isabstract(effect):
+        raise _UnusableEffectError(f'{effect.__name__} must define '
+                                   f'{", ".join(sorted(effect.__abstractmethods__))}')
+    if issubclass(effect, DriveEffect):
+        check_columns(effect)
     return effect
 
 

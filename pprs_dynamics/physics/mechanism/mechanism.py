@@ -233,7 +233,7 @@ class Mechanism:
         return ToolPose(self.structure)
 
     def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
-                         seed: JointMotion | None = None) -> JointMotion:
+                         closed: dict[Any, Array] | None = None) -> JointMotion:
         """Return the same: loops are closed where forces are evaluated."""
         return JointMotion(position, velocity, acceleration)
 

@@ -88,8 +88,11 @@ class Robot(Protocol):
         """Return friction of joints as `MechanismState.against_friction` takes it."""
 
     def motion_of_drives(self, position: Array, velocity: Array, acceleration: Array,
-                         seed: Any = None) -> Any:
-        """Return the motion, of the first kind in `motions`, that belongs to one of the drives."""
+                         closed: dict[Any, Array] | None = None) -> Any:
+        """Return the motion, of the first kind in `motions`, that belongs to one of the drives.
+
+        `closed` as of `ModelState`.
+        """
 
     def at_home(self, samples: int) -> Any:
         """Return a motion at rest where the robot is put together, one sample a second."""
@@ -229,7 +232,7 @@ class MechanismState(JointMotion):
         return position
 
     def perturbed(self, drive: int, step: float) -> MechanismState:
-        """Return the state with a drive at other positions, to first order; all move as before."""
+        """Return the state with a drive at other positions; all move as before."""
         position = self.position.copy()
         position[:, drive] += step
         return self.robot.moved(self, position, self.acceleration)

@@ -15,10 +15,8 @@ from pprs_dynamics.physics.model.keys import ANY, Key
 
 REFERENCE = 'reference'
 HASHES = 'reference_sha256'
-DIRECTIONS = 'reference_directions'
 KEYS = {REFERENCE: Key(REFERENCE, 'runs that pprs fit wrote', size=ANY, is_text=True),
-        HASHES: Key(HASHES, 'SHA-256 of each, that pprs fit wrote', size=ANY, is_text=True),
-        DIRECTIONS: Key(DIRECTIONS, 'text that pprs fit wrote', is_text=True, may_be_empty=True)}
+        HASHES: Key(HASHES, 'SHA-256 of each, that pprs fit wrote', size=ANY, is_text=True)}
 
 
 class ReferenceFile(NamedTuple):
@@ -35,11 +33,9 @@ def reference_files(values: Mapping[str, Any], source: str) -> tuple[ReferenceFi
         values.get(REFERENCE, ()), values.get(HASHES, ()), strict=True))
 
 
-def with_reference(values: Mapping[str, Any], files: Sequence[ReferenceFile],
-                   directions: str = '') -> dict[str, Any]:
-    """Return values that name reference runs, and what is kept of them, in place of others."""
-    new = {REFERENCE: [str(one.path) for one in files], HASHES: [one.sha256 for one in files],
-           DIRECTIONS: directions}
+def with_reference(values: Mapping[str, Any], files: Sequence[ReferenceFile]) -> dict[str, Any]:
+    """Return values that name reference runs, in place of others."""
+    new = {REFERENCE: [str(one.path) for one in files], HASHES: [one.sha256 for one in files]}
     return {**{key: value for key, value in values.items() if key not in KEYS},
             **{key: value for key, value in new.items() if value}}
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.errors import ModelError
-from pprs_dynamics.physics.mechanism.evaluation import KernelParameters
 from pprs_dynamics.physics.mechanism.vectors import ChainVector, in_base
 from pprs_dynamics.physics.three_pprs.kernel_parameters import Chain, GeometryParameters
 
@@ -90,7 +89,7 @@ class Geometry:
         return ChainFrames(self.chain_angles)
 
     @cached_property
-    def kernel_parameters(self) -> KernelParameters[GeometryParameters]:
+    def kernel_parameters(self) -> GeometryParameters:
         """Lengths and the constants of the chains."""
         frames, delta = self.frames, np.asarray(self.chain_angles)
         joints = self.platform_radius * np.exp(1j * np.asarray(self.platform_angles))
@@ -100,8 +99,8 @@ class Geometry:
         constants = np.stack((frames.cos, frames.sin, joints.real, joints.imag, *left, balance),
                              axis=1).tolist()
         first, second, third = (Chain(*chain) for chain in constants)
-        return KernelParameters(GeometryParameters(
-            self.base_radius, self.rod_length, self.elbow_sign, (first, second, third)))
+        return GeometryParameters(self.base_radius, self.rod_length, self.elbow_sign,
+                                  (first, second, third))
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.drives import DRIVES
-from pprs_dynamics.errors import SingularityError
 from pprs_dynamics.physics.mechanism.description import (
     FIXED,
     FLOATING,
@@ -26,34 +26,39 @@ from pprs_dynamics.physics.mechanism.description import (
     body_at,
     rotation_of,
 )
-from pprs_dynamics.physics.mechanism.mechanism import Mechanism
-from pprs_dynamics.physics.mechanism.structure import build_structure
-from pprs_dynamics.physics.three_pprs.robot import ThreePprs
+from pprs_dynamics.physics.mechanism.structure import Structure, build_structure
+from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
 
 HOME_HEIGHT = 0.5  # of the platform [m]
+UNLOADED = Masses(1.0, 0.0, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 6)
 
 
-def mechanism_of(robot: ThreePprs, strokes: tuple[Array, Array], efforts: Array, *,
-                 is_free: bool = True) -> Mechanism:
-    """Return a 3-PPRS as a mechanism.
-
-    Parameters
-    ----------
-    robot : ThreePprs
-    strokes : tuple of two (6,) arrays
-        Lowest and highest position of each drive [m].
-    efforts : (6,) array
-        Largest force of each drive [N].
-    is_free : bool, optional
-        Whether the platform is a free body that three spherical closures hold. Otherwise it hangs
-        on the first rod by three revolute joints, and two closures remain.
+@lru_cache
+def structure_of(geometry: Geometry) -> Structure:
+    """Return the joints and closures of a 3-PPRS, whose platform is a free body.
 
     Raises
     ------
-    SingularityError
-        If a rod does not reach the platform at home.
+    ModelError
+        Where the drives do not determine the platform's motion at home.
     """
-    geometry, masses = robot.geometry, robot.masses
+    return tree_structure(geometry, UNLOADED, (np.full(6, -np.inf), *np.full((2, 6), np.inf)))
+
+
+def tree_structure(geometry: Geometry, masses: Masses, limits: tuple[Array, Array, Array],
+                   is_free: bool = True) -> Structure:
+    """Return the joints, closures and bodies of a 3-PPRS.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    masses : Masses
+    limits : tuple of three (6,) arrays
+        Lowest and highest position of each drive [m], and its largest force [N].
+    is_free : bool, optional
+        Whether the platform is a free body that three spherical closures hold. Otherwise it hangs
+        on the first rod by three revolute joints, and two closures remain.
+    """
     R, r, l = geometry.base_radius, geometry.platform_radius, geometry.rod_length  # noqa: E741
     platform = body_at(masses.total, masses.centre, masses.inertia_tensor)
     links = {'base': np.zeros(PARAMETERS)}
@@ -80,9 +85,6 @@ def mechanism_of(robot: ThreePprs, strokes: tuple[Array, Array], efforts: Array,
         hang(f'lift_{n}', PRISMATIC, f'slide_{n}', f'lift_{n}', Frame(), e_z)
         hang(f'hinge_{n}', REVOLUTE, f'lift_{n}', f'rod_{n}', Frame(), e_y)
         cos_u = (R - r * math.cos(beta - delta)) / l
-        if abs(cos_u) >= 1:
-            raise SingularityError(0, f'the rod of chain {n} does not reach at home',
-                                   'the unturned platform must close above the base')
         u = geometry.elbow_sign * math.acos(cos_u)
         home |= {f'slide_{n}': r * math.sin(beta - delta),
                  f'lift_{n}': HOME_HEIGHT - l * math.sin(u), f'hinge_{n}': u}
@@ -106,11 +108,8 @@ def mechanism_of(robot: ThreePprs, strokes: tuple[Array, Array], efforts: Array,
             at = Frame()
             home[f'ball_1_{letter}'] = 0.0
         hang('platform_mount', FIXED, 'ball_1_z', 'platform', ball.frame_b.inverse, e_x)
-    for d, drive in enumerate(DRIVES):
-        joints[drive] = replace(joints[drive], lower=float(strokes[0][d]),
-                                upper=float(strokes[1][d]), effort=float(efforts[d]))
+    for drive, lower, upper, effort in zip(DRIVES, *limits, strict=True):
+        joints[drive] = replace(joints[drive], lower=float(lower), upper=float(upper),
+                                effort=float(effort))
     description = Description('', links, joints, '')
-    structure = build_structure(description, 'base', 'platform', DRIVES, tuple(loops), home, poses)
-    bodies = np.flatnonzero(structure.inertial[:, 0] > 0)
-    return Mechanism(structure, bodies, structure.inertial[bodies], np.zeros(len(DRIVES)),
-                     robot.gravity)
+    return build_structure(description, 'base', 'platform', DRIVES, tuple(loops), home, poses)

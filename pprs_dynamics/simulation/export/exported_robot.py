@@ -27,7 +27,6 @@ from pprs_dynamics.physics.mechanism.description import (
 from pprs_dynamics.physics.mechanism.mechanism import Mechanism
 from pprs_dynamics.physics.mechanism.tree_evaluation import constraint_jacobian
 from pprs_dynamics.physics.model.drive_model import DriveModel
-from pprs_dynamics.physics.three_pprs.tree import mechanism_of
 from pprs_dynamics.simulation.export.expressed import (
     URDF,
     Expressed,
@@ -128,7 +127,8 @@ def export_robot(expressed: Expressed, kind: str) -> ExportedRobot:
     robot = with_bodies(model.robot, model.effects)
     if model.moves_joints:
         return described(model.block, robot, expressed.joints)
-    mechanism = mechanism_of(robot, model.strokes, model.effort_limits, is_free=kind != URDF)
+    limits = model.limits
+    mechanism = robot.as_mechanism(limits.strokes, limits.efforts, is_free=kind != URDF)
     return described('three_pprs', mechanism, expressed.joints)
 
 

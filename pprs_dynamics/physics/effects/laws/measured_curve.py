@@ -12,8 +12,8 @@ range it goes on with its last value.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Self
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -55,27 +55,22 @@ class Curve(NamedTuple):
         """Between knots."""
         return len(self.values) - (0 if self.periodic else DEGREE)
 
-    def basis(self, x: Array) -> tuple[np.ndarray, Array]:
-        """Return which four coefficients count at each x, (N, 4), and their weights, (N, 4)."""
+    def basis(self, x: Array) -> Any:
+        """Return the B-splines at values of the variable, (N, len(values)), sparse."""
         return spline_basis(x, self.start, self.end, self.intervals, self.periodic)
 
     def force(self, x: Array) -> Array:
         """Return the force at values of the variable, (N,) [N, N m]."""
-        index, weight = self.basis(x)
-        force: Array = (np.asarray(self.values)[index] * weight).sum(axis=1)
+        force: Array = self.basis(x) @ np.asarray(self.values)
         return force
 
     def outside(self, x: Array) -> np.ndarray:
-        """Return which samples lie outside the measured range, (N,) bool."""
-        if self.periodic:
-            return np.zeros(len(x), dtype=bool)
-        return (x < self.start) | (x > self.end)
+        """Return which samples are outside the measured range, (N,) bool."""
+        return ~self.periodic & ((x < self.start) | (x > self.end))
 
 
-def spline_basis(
-    x: Array, start: float, end: float, intervals: int, periodic: bool,
-) -> tuple[np.ndarray, Array]:
-    """Return indices and values of the four cubic B-splines that are not zero at each x.
+def spline_basis(x: Array, start: float, end: float, intervals: int, periodic: bool) -> Any:
+    """Return cubic B-splines at x, a sparse matrix (N, intervals + 3), or (N, intervals).
 
     Parameters
     ----------
@@ -85,19 +80,16 @@ def spline_basis(
     intervals : int
         Between the knots.
     periodic : bool
-
-    Returns
-    -------
-    (N, 4) int array, (N, 4) array
     """
+    # Imported here: few models have a curve, and the import takes 0.3 s.
+    from scipy.interpolate import BSpline
+    from scipy.sparse import eye_array
+
     u = (x - start) / (end - start) * intervals
     u = np.mod(u, intervals) if periodic else np.clip(u, 0.0, intervals)
-    interval = np.minimum(u.astype(int), intervals - 1)
-    f = u - interval
-    weight = np.stack(((1 - f) ** 3, 3 * f ** 3 - 6 * f ** 2 + 4,
-                       -3 * f ** 3 + 3 * f ** 2 + 3 * f + 1, f ** 3), axis=1) / 6
-    index = interval[:, None] + np.arange(DEGREE + 1)
-    return (index % intervals if periodic else index), weight
+    count = intervals + DEGREE
+    basis = BSpline.design_matrix(u, np.arange(-DEGREE, count + 1.0), DEGREE)
+    return basis @ eye_array(intervals).tocsr()[np.arange(count) % intervals] if periodic else basis
 
 
 class MeasuredCurve(DriveEffect):
@@ -161,23 +153,23 @@ class MeasuredCurve(DriveEffect):
         return None
 
     @classmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
-        """Build the effect from `{drive: {variable, from, to, values, periodic}}`."""
-        prefix = f'effects.{cls.name}'
-        if not isinstance(values, Mapping) or not values:
-            raise ModelError(prefix, values, 'map drives to curves, e.g. lift_1: {variable: '
-                             'position, from: 0.0, to: 0.1, values: [...]}')
-        return cls({drive: _checked(f'{prefix}.{drive}', block, complete)
-                    for drive, block in values.items()})
-
-    def to_file(self) -> dict[str, Any]:
-        """Return `{drive: {variable, from, to, values, periodic}}`."""
-        blocks: dict[str, dict[str, Any]] = {
-            drive: dict(values) for drive, values in self.drives.items()}
-        for block in blocks.values():
-            if 'values' in block:
-                block['values'] = list(block['values'])
-        return blocks
+    def _checked(cls, prefix: str, values: Mapping[str, Any], complete: bool,
+                 turns: bool | None = None) -> dict[str, Any]:
+        for key in values:
+            if key not in CHECKS:
+                raise UnknownNameError('key', f'{prefix}.{key}',
+                                       [f'{prefix}.{known}' for known in CHECKS])
+        given = {'periodic': False, **values}
+        found = {}
+        for key, check in CHECKS.items():
+            if key in given:
+                found[key] = check(f'{prefix}.{key}', given[key])
+            elif complete:
+                raise ModelError(f'{prefix}.{key}', MISSING, 'be given')
+        if not found.get('from', -math.inf) < found.get('to', math.inf):
+            raise ModelError(f'{prefix}.to', found['to'],
+                             f'be greater than from, {found["from"]:g}')
+        return found
 
 
 def variable_of(state: MechanismState, drive: str, variable: str) -> Array:
@@ -201,40 +193,27 @@ def check_variable(key: str, variable: Any, drives: Sequence[str] = ()) -> str:
     return variable
 
 
-def _checked(prefix: str, block: Any, complete: bool) -> dict[str, Any]:
-    keys = ('variable', 'from', 'to', 'values', 'periodic')
-    if not isinstance(block, Mapping):
-        raise ModelError(prefix, block, f'map {", ".join(keys)} to their values')
-    for key in block:
-        if key not in keys:
-            raise UnknownNameError('key', f'{prefix}.{key}', [f'{prefix}.{one}' for one in keys])
-    missing = [key for key in keys[:-1] if key not in block]
-    if missing and complete:
-        raise ModelError(f'{prefix}.{missing[0]}', MISSING, 'be given')
-    found: dict[str, Any] = {}
-    if 'variable' in block:
-        found['variable'] = check_variable(f'{prefix}.variable', block['variable'])
-    for key in ('from', 'to'):
-        if key in block:
-            found[key] = _number(f'{prefix}.{key}', block[key])
-    if len(found) == 3 and not found['from'] < found['to']:
-        raise ModelError(f'{prefix}.to', found['to'], f'be greater than from, {found["from"]:g}')
-    periodic = block.get('periodic', False)
-    if not isinstance(periodic, bool):
-        raise ModelError(f'{prefix}.periodic', periodic, 'be true or false')
-    found['periodic'] = periodic
-    if 'values' in block:
-        values = block['values']
-        least, most = FEWEST + DEGREE, MOST + DEGREE
-        if isinstance(values, str) or not isinstance(values, Sequence) or not (
-                least <= len(values) <= most):
-            raise ModelError(f'{prefix}.values', values,
-                             f'be a list of {least} to {most} numbers, coefficients of B-splines')
-        found['values'] = tuple(_number(f'{prefix}.values', value) for value in values)
-    return found
+def _values(key: str, values: Any) -> list[float]:
+    least, most = FEWEST + DEGREE, MOST + DEGREE
+    if isinstance(values, str) or not isinstance(values, Sequence) or not (
+            least <= len(values) <= most):
+        raise ModelError(key, values,
+                         f'be a list of {least} to {most} numbers, coefficients of B-splines')
+    return [_number(key, value) for value in values]
+
+
+def _truth(key: str, value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise ModelError(key, value, 'be true or false')
+    return value
 
 
 def _number(key: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         raise ModelError(key, value, 'be a finite number')
     return float(value)
+
+
+CHECKS: dict[str, Callable[[str, Any], Any]] = {
+    'variable': check_variable, 'from': _number, 'to': _number, 'values': _values,
+    'periodic': _truth}
