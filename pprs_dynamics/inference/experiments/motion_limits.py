@@ -60,7 +60,8 @@ class MotionLimits:
         lean = (geometry.base_radius - geometry.platform_radius * float(np.mean(np.cos(
             np.subtract(geometry.platform_angles, geometry.chain_angles))))) / geometry.rod_length
         rise = geometry.rod_length * float(np.sqrt(max(1 - lean ** 2, 0.0)))
-        height = float(sum(end[-1] for end in model.strokes)) / 2 + geometry.elbow_sign * rise
+        middle = float(sum(end[-1] for end in model.limits.strokes)) / 2
+        height = middle + geometry.elbow_sign * rise
         return np.array((0.0, 0.0, height, 0.0, 0.0, 0.0))
 
     def excursions(self, model: DriveModel, position: Array, velocity: Array,

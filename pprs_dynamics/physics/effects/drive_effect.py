@@ -223,23 +223,6 @@ class DriveEffect(CatalogueEffect):
             raise ModelError('state', sorted(memory), f'come from a model with this very '
                              f'{self.name}')
 
-    @classmethod
-    def check_bounds(cls, values: Any, turning: Collection[str]) -> None:
-        """Raise ModelError where a parameter is beyond what it may be in a drive of its kind.
-
-        Parameters
-        ----------
-        values : mapping
-            See `from_file`.
-        turning : collection of str
-            Drives that turn.
-        """
-        for drive, block in values.items() if isinstance(values, Mapping) else ():
-            for p in cls.parameters if isinstance(block, Mapping) else ():
-                if p.turning is not None and p.name in block:
-                    p.of(drive in turning).check(f'effects.{cls.name}.{drive}.{p.name}',
-                                                 block[p.name])
-
     def force(self, state: MechanismState, memory: Any = None) -> Array:
         """Return the effect's drive forces [N], (N, D)."""
         force = np.zeros_like(state.velocity)
@@ -253,18 +236,20 @@ class DriveEffect(CatalogueEffect):
         return force
 
     @classmethod
-    def from_file(cls, values: Mapping[str, Any], complete: bool = True) -> Self:
-        """Build the effect from `{drive: {parameter: value}}`."""
+    def from_file(cls, values: Mapping[str, Any], complete: bool = True,
+                  turning: Collection[str] | None = None) -> Self:
+        """Build the effect from `{'drive.parameter': value}`."""
         prefix = f'effects.{cls.name}'
-        if not isinstance(values, Mapping) or not values:
-            raise ModelError(prefix, values, 'map drives to parameters, e.g. lift_1: '
+        blocks: dict[str, dict[str, Any]] = {}
+        for key, value in values.items():
+            drive, _, name = key.rpartition('.')
+            blocks.setdefault(drive, {})[name] = value
+        if not blocks or '' in blocks:
+            raise ModelError(prefix, dict(values), 'map drives to parameters, e.g. lift_1: '
                              f'{{{names(cls.parameters)}}}')
-        return cls({drive: cls._checked(f'{prefix}.{drive}', block, complete)
-                    for drive, block in values.items()})
-
-    def to_file(self) -> dict[str, Any]:
-        """Return `{drive: {parameter: value}}`."""
-        return {drive: dict(values) for drive, values in self.drives.items()}
+        return cls({drive: cls._checked(f'{prefix}.{drive}', block, complete,
+                                        None if turning is None else drive in turning)
+                    for drive, block in blocks.items()})
 
 
 class MeasurementEffect(DriveEffect):
