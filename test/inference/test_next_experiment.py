@@ -12,23 +12,11 @@ import pytest
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.inference.experiments.columns import ColumnPlan, FittedTerm
-from pprs_dynamics.inference.experiments.criteria import (
-    Contest,
-    Information,
-    whitened,
-)
-from pprs_dynamics.inference.experiments.motion_design import (
-    Motions,
-    NoMotionError,
-)
-from pprs_dynamics.inference.experiments.motion_design import (
-    design as design_motion,
-)
+from pprs_dynamics.inference.experiments.criteria import Information, whitened
+from pprs_dynamics.inference.experiments.motion_design import Motions, NoMotionError
+from pprs_dynamics.inference.experiments.motion_design import design as design_motion
 from pprs_dynamics.inference.experiments.motion_limits import MotionLimits
-from pprs_dynamics.inference.experiments.next_experiment import (
-    PurposeError,
-    next_experiment,
-)
+from pprs_dynamics.inference.experiments.next_experiment import PurposeError, next_experiment
 from pprs_dynamics.inference.experiments.platform_series import platform_motion
 from pprs_dynamics.inference.regression.base_columns import (
     ModelNumber,
@@ -160,14 +148,6 @@ def test_white_noise_counts_samples() -> None:
 
 
 # Criteria.
-
-def test_misfit_is_what_least_squares_leaves() -> None:
-    rng = np.random.default_rng(1)
-    columns = rng.normal(size=(200, 5))
-    force = columns[:, [2, 3]] @ (1.0, -2.0)
-    rest = force - columns[:, [0, 1, 4]] @ np.linalg.lstsq(columns[:, [0, 1, 4]], force)[0]
-    contest = Contest(('a',), ('b',), np.array((0.0, 0.0, 1.0, -2.0, 0.0)), (0, 1, 4))
-    assert contest.misfit(columns.T @ columns) == pytest.approx(rest @ rest, rel=1e-6)
 
 
 # Limits and search.

@@ -15,11 +15,7 @@ import numpy as np
 
 from pprs_dynamics import DriveModel
 from pprs_dynamics.physics.mechanism.paths import Excitation
-from pprs_dynamics.ros.diagnosis_worker import (
-    DiagnosisWorker,
-    StreamWindow,
-    StreamWindows,
-)
+from pprs_dynamics.ros.diagnosis_worker import DiagnosisWorker, StreamWindow, StreamWindows
 
 SECOND = 1_000_000_000
 EPOCH = 1_700_000_000 * SECOND

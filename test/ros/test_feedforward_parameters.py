@@ -14,11 +14,7 @@ import pytest
 from feedforward_bench import EQUAL, FeedforwardBench, feedforward_bench, message_of, random_motion
 from node_bench import bench, overrides
 from rcl_interfaces.msg import ParameterType, SetParametersResult
-from rcl_interfaces.srv import (
-    DescribeParameters,
-    GetParameters,
-    SetParameters,
-)
+from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.parameter import Parameter
 from ros_processes import executable, node_process
 from sensor_msgs.msg import JointState
