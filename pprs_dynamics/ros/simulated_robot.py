@@ -21,14 +21,14 @@ from pprs_dynamics.ros.messages import conversions
 from pprs_dynamics.ros.messages.conversions import RobotNames
 from pprs_dynamics.ros.messages.incoming_bytes import message_in
 from pprs_dynamics.ros.node.clocks import steady_timer
-from pprs_dynamics.ros.node.model_parameters import ExplainsRefusals, Followed
+from pprs_dynamics.ros.node.model_parameters import Followed
 from pprs_dynamics.ros.node.parameters import (
     current_values,
     declare_model,
     declare_node_parameters,
     node_parameter,
 )
-from pprs_dynamics.ros.node.provenance import hardware_of
+from pprs_dynamics.ros.node.provenance import arguments_of, hardware_of
 from pprs_dynamics.ros.node.qos import publisher, subscription
 from pprs_dynamics.ros.node.status import StatusReporter
 from pprs_dynamics.ros.node.throttled_log import ThrottledLog
@@ -68,7 +68,7 @@ CYCLES_AT_ONCE = 2
 LATE_SHARE = 0.001
 
 
-class SimulatedRobotNode(ExplainsRefusals):
+class SimulatedRobotNode(Node):
     """Publishes joint_states, and follows setpoints with efforts, or efforts alone.
 
     Setpoints are executed at their stamps, interpolated between them; a stamp that has passed is
@@ -79,7 +79,7 @@ class SimulatedRobotNode(ExplainsRefusals):
         super().__init__('simulated_robot', allow_undeclared_parameters=True, **options)
         self._log = ThrottledLog(self)
         node_values = declare_node_parameters(self, PARAMETERS)
-        declare_model(self, self.arguments)
+        declare_model(self, arguments_of(options))
         values = {name: value for name, value in current_values(self).items()
                   if name not in node_values}
         self._model = DriveModel.from_parameters(values)

@@ -25,26 +25,8 @@ from pprs_dynamics.physics.mechanism.reversal import Reversal
 from pprs_dynamics.physics.mechanism.state import MechanismState
 from pprs_dynamics.physics.mechanism.structure_load import StructureLoad
 from pprs_dynamics.physics.mechanism.vectors import Vector
-from pprs_dynamics.physics.three_pprs.closed_form import (
-    ACCELERATION,
-    ANGLE,
-    EVERYTHING,
-    FRICTIONLESS,
-    GUIDE_LOAD,
-    HV,
-    JACOBIAN,
-    NO_LOAD,
-    PASSIVE,
-    POSITION,
-    RATE,
-    RESISTANCE,
-    RIGID,
-    VW_STAR,
-    WH_STAR,
-    DriveFriction,
-    ForcesParameters,
-    forces_kernel,
-)
+from pprs_dynamics.physics.three_pprs import closed_form
+from pprs_dynamics.physics.three_pprs.closed_form import FRICTIONLESS, DriveFriction
 from pprs_dynamics.physics.three_pprs.forward_motion import solve_forward_motion
 from pprs_dynamics.physics.three_pprs.geometry import Geometry, Masses
 from pprs_dynamics.physics.three_pprs.kernel_parameters import (
@@ -86,22 +68,6 @@ class SingularityBounds(NamedTuple):
 UNBOUNDED = SingularityBounds()
 
 
-class Reactions(NamedTuple):
-    """Reactions of the spherical joints on the platform, and loads of the joints below.
-
-    All (N, 3) [N], chains last. H along n_i, V along the rod from C_i to A_i, W along w_i.
-    The starred ones are the same force one joint further down, in C_i: H_star along n_i,
-    V_star vertical, W_star radial (Eq. 9).
-    """
-
-    H: Array
-    V: Array
-    W: Array
-    H_star: Array
-    V_star: Array
-    W_star: Array
-
-
 class ClosedForm:
     """Kinematics, reactions and forces of a 3-PPRS at N samples, without friction of the drives.
 
@@ -113,7 +79,7 @@ class ClosedForm:
         In addition to bodies and gravity.
     joints : Joints
         Friction of the passive joints.
-    table : (EVERYTHING, N, 6) array, optional
+    table : (closed_form.EVERYTHING, N, 6) array, optional
         The results, where they are known.
     """
 
@@ -123,20 +89,21 @@ class ClosedForm:
         self.robot, self.motion, self.load = robot, motion, load
         self.is_regular = True
         if table is None:
-            loads = NO_LOAD
+            loads = closed_form.NO_LOAD
             if load is not None:
                 loads = np.zeros((len(motion), 9))
                 loads[:, :6] = load.wrench
                 loads[:, 6:] = load.torques.get(REVOLUTE, 0.0)
-            table = np.empty((EVERYTHING, len(motion), 6))
+            table = np.empty((closed_form.EVERYTHING, len(motion), 6))
             self.is_regular = evaluate(
-                forces_kernel, robot.parameters(joints, FRICTIONLESS[1]),
+                closed_form.forces_kernel, robot.parameters(joints, FRICTIONLESS[1]),
                                        motion.rows, loads, table) < 0
         self.table = table
-        self.position, self.velocity, self.acceleration = table[POSITION:ACCELERATION + 1]
-        self.efforts, self.guide_load = table[RIGID], table[GUIDE_LOAD]
-        self.cos_u, self.sin_u = np.split(table[ANGLE], 2, axis=1)
-        self.u_dot, self.u_ddot = np.split(table[RATE], 2, axis=1)
+        self.position, self.velocity, self.acceleration = (
+            table[closed_form.POSITION:closed_form.ACCELERATION + 1])
+        self.efforts, self.guide_load = table[closed_form.RIGID], table[closed_form.GUIDE_LOAD]
+        self.cos_u, self.sin_u = np.split(table[closed_form.ANGLE], 2, axis=1)
+        self.u_dot, self.u_ddot = np.split(table[closed_form.RATE], 2, axis=1)
 
     @property
     def rod_angle(self) -> Array:
@@ -147,14 +114,8 @@ class ClosedForm:
     @property
     def J(self) -> Array:
         """[J], X_dot = J q_dot with X_dot = (v, omega) in `base`, (N, 6, 6)."""
-        J: Array = self.table[JACOBIAN:].transpose(1, 0, 2)
+        J: Array = self.table[closed_form.JACOBIAN:].transpose(1, 0, 2)
         return J
-
-    @property
-    def reactions(self) -> Reactions:
-        """Reactions of the spherical joints, and loads of the joints below."""
-        return Reactions(*(half for row in (HV, WH_STAR, VW_STAR)
-                           for half in np.split(self.table[row], 2, axis=1)))
 
     @property
     def tool_velocity(self) -> Array:
@@ -169,14 +130,14 @@ class ClosedForm:
 
     def resistances(self, joints: Joints) -> Sequence[Array]:
         """Return k_ri and k_si at the frictionless reactions, (N, 3) each, Eq. (9)."""
-        return np.split(self._with(joints).table[RESISTANCE], 2, axis=1)
+        return np.split(self._with(joints).table[closed_form.RESISTANCE], 2, axis=1)
 
     def friction(self, loads: ClosedForm, joints: Joints) -> Array:
         """Return the drive forces against friction of passive joints, (N, 6) [N].
 
         By virtual power: a virtual motion of a drive moves every passive joint, Eq. (12).
         """
-        found: Array = loads._with(joints).table[PASSIVE]
+        found: Array = loads._with(joints).table[closed_form.PASSIVE]
         return found
 
     def _with(self, joints: Joints) -> ClosedForm:
@@ -341,10 +302,10 @@ class ThreePprs:
             Vector(*self.gravity)))
 
     def parameters(self, joints: Joints, drives: tuple[DriveFriction, ...],
-                   ) -> KernelParameters[ForcesParameters]:
+                   ) -> KernelParameters[closed_form.ForcesParameters]:
         """Return the parameters of `forces_kernel` with friction of joints and drives."""
         return self.kernel_parameters.extended(
-            ForcesParameters, self.geometry.platform_radius, float(self.printed),
+            closed_form.ForcesParameters, self.geometry.platform_radius, float(self.printed),
             self.bounds.rod_sine, self.bounds.condition_number ** 2, joints, drives)
 
     def as_mechanism(self, strokes: tuple[Array, Array], efforts: Array, *, is_free: bool = True,

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import SetParametersResult
@@ -18,24 +18,20 @@ from pprs_dynamics.physics.model.drive_model import DriveModel
 from pprs_dynamics.physics.model.keys import (
     DRIVES_KEY,
     KEYS,
-    NAMES,
     NODE_KEYS,
     NODE_PREFIXES,
 )
 from pprs_dynamics.ros.node.model_history import ModelHistory
 from pprs_dynamics.ros.node.parameters import (
     NodeParameter,
-    added_descriptor,
     current_values,
     declare_model,
     declare_node_parameters,
     has_model,
-    in_declared_type,
     node_parameter,
     overrides,
     with_hint,
 )
-from pprs_dynamics.ros.node.provenance import arguments_of
 
 Checked = TypeVar('Checked')
 DEMO = node_parameter('demo', False, 'true: without a model file this is the paper\'s robot, for '
@@ -55,36 +51,6 @@ class NoModelError(PprsError):
         super().__init__(
             f'{node} was given no model: --ros-args --params-file FILE names that of the robot '
             'which is connected; -p demo:=true takes the paper\'s robot, for demonstrations')
-
-
-class ExplainsRefusals(Node):
-    """A node that refuses parameters in the words of the model's files.
-
-    rclpy compares with the range in a descriptor first, and says less. `_settings` checks here.
-
-    Attributes
-    ----------
-    arguments : sequence of str
-        Command line of the node.
-    """
-
-    def __init__(self, name: str, **options: Any) -> None:
-        self.arguments = arguments_of(options)
-        super().__init__(name, **options)
-
-    def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
-        """Set parameters one after the other; each is taken or refused by itself."""
-        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
-
-    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """Set all parameters or none."""
-        settings: Followed[Any] | None = getattr(self, '_settings', None)
-        if settings is not None:  # else they are being declared
-            parameter_list = [in_declared_type(self, each) for each in parameter_list]
-            result = settings.check(parameter_list)
-            if not result.successful:
-                return result
-        return super().set_parameters_atomically(parameter_list)
 
 
 class Followed(ABC, Generic[Checked]):
@@ -132,6 +98,8 @@ class ModelParameters(Followed[tuple[DriveModel, dict[str, Any]]]):
     Parameters
     ----------
     node : Node
+    arguments : sequence of str
+        Its command line.
     parameters : iterable of NodeParameter
         The node's own, which are declared before the model's.
     changed : callable
@@ -158,14 +126,14 @@ class ModelParameters(Followed[tuple[DriveModel, dict[str, Any]]]):
     """
 
     def __init__(
-        self, node: ExplainsRefusals, parameters: Iterable[NodeParameter],
+        self, node: Node, arguments: Sequence[str], parameters: Iterable[NodeParameter],
         changed: Callable[[], None], drives: bool = False,
     ) -> None:
         self._changed, self.history = changed, ModelHistory(node) if drives else None
         parameters = (*parameters, DEMO)
         declare_node_parameters(node, parameters)
         given = overrides(node)
-        taken_from_paper = declare_model(node, node.arguments)
+        taken_from_paper = declare_model(node, arguments)
         self._stays: dict[str, Any] = {}
         super().__init__(node, parameters)
         self.model, self.node_values = self._checked
@@ -221,15 +189,7 @@ class ModelParameters(Followed[tuple[DriveModel, dict[str, Any]]]):
         before, (self.model, self.node_values) = self.model, checked
         if self.history is not None and self.model.fingerprint != before.fingerprint:
             self.history.note(before.values, changes)
-        for change in changes:
-            if change.name not in NAMES and change.name.startswith('effects.') and (
-                    self._node.has_parameter(change.name)):
-                self._describe(change.name)
         self._changed()
-
-    def _describe(self, name: str) -> None:
-        if not self._node.describe_parameter(name).description:
-            self._node.set_descriptor(name, added_descriptor(name))
 
 
 def are_of_topics(changes: list[Parameter]) -> bool:
