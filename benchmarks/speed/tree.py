@@ -91,7 +91,7 @@ def steps(rounds: int) -> None:
 
     def kept() -> None:
         rows, _ = evaluation.forward_kinematics(*given)
-        evaluation.forces(rows, *bodies)
+        evaluation.forces(rows, *bodies, {})
 
     _print('hexapod, one motion', _rounds({
         'in one pass, nothing kept': lambda: evaluation.inverse_dynamics(

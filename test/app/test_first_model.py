@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from made_up_recordings import DYNAMIC, STORE, header, states_of, write_plain_bag
 from scipy.io import savemat
 
 from pprs_dynamics import ModelError, PprsError, UnreadableFileError
@@ -36,16 +35,6 @@ WAVES = np.array([1.0, 1.3, 1.7])
 Q = 0.9 * np.sin(TIME[:, None] * WAVES) + [0.3, -0.4, 0.1]
 DQ = 0.9 * np.cos(TIME[:, None] * WAVES) * WAVES
 TAU = 5.0 * np.cos(TIME[:, None] * WAVES[::-1]) + np.random.default_rng(1).normal(size=(N, 3))
-STATE = 'sensor_msgs/msg/JointState'
-DYNAMIC = 'control_msgs/msg/DynamicJointState'
-DYNAMIC_TEXT = f'''std_msgs/Header header
-string[] joint_names
-control_msgs/InterfaceValue[] interface_values
-{'=' * 80}
-MSG: control_msgs/InterfaceValue
-string[] interface_names
-float64[] values
-'''
 
 
 def urdf(joints: tuple[str, ...] = JOINTS, before: str = '', more: str = '') -> str:
@@ -205,49 +194,19 @@ def lerobot(folder: Path) -> list[Path]:
 # -------------------------------------------------------------------------------------- bags
 
 
-class Bag:
-    def __init__(self, path: Path) -> None:
-        self.types = get_typestore(Stores.ROS2_KILTED)
-        self.types.register({name: fields for name, fields in get_types_from_msg(
-            DYNAMIC_TEXT, DYNAMIC).items() if name not in self.types.types})
-        self.writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
-        self.writer.open()
-        self.topics: dict[str, Any] = {}
-
-    def write(self, topic: str, kind: str, k: int, message: Any) -> None:
-        if topic not in self.topics:
-            self.topics[topic] = self.writer.add_connection(topic, kind, typestore=self.types)
-        self.writer.write(self.topics[topic], self.stamp(k), self.types.serialize_cdr(
-            message, kind))
-
-    @staticmethod
-    def stamp(k: int) -> int:
-        return EPOCH * 10**9 + round(TIME[k] * 1e9)
-
-    def header(self, k: int) -> Any:
-        time = self.types.types['builtin_interfaces/msg/Time'](*divmod(self.stamp(k), 10**9))
-        return self.types.types['std_msgs/msg/Header'](time, '')
-
-
 def bag(folder: Path, names: tuple[str, ...] = JOINTS) -> list[Path]:
-    bag = Bag(folder / 'bag')
     order = np.argsort(names)  # as joint_state_broadcaster has them
-    for k in range(N):
-        bag.write('/joint_states', STATE, k, bag.types.types[STATE](
-            bag.header(k), [names[j] for j in order], Q[k, order], DQ[k, order], TAU[k, order]))
-    bag.writer.close()
-    return [folder / 'bag']
+    return [write_plain_bag(folder / 'bag', {'/joint_states': states_of(
+        {'time': EPOCH + TIME, 'position': Q[:, order], 'velocity': DQ[:, order],
+         'effort': TAU[:, order]}, tuple(names[j] for j in order))})]
 
 
 def currents(folder: Path) -> list[Path]:
-    bag = Bag(folder / 'bag')
-    value = bag.types.types['control_msgs/msg/InterfaceValue']
-    for k in range(N):
-        bag.write('/dynamic_joint_states', DYNAMIC, k, bag.types.types[DYNAMIC](
-            bag.header(k), list(JOINTS), [value(['current', 'position', 'velocity'], np.array(
-                [TAU[k, j], Q[k, j], DQ[k, j]])) for j in range(3)]))
-    bag.writer.close()
-    return [folder / 'bag']
+    value = STORE.types['control_msgs/msg/InterfaceValue']
+    return [write_plain_bag(folder / 'bag', {'/dynamic_joint_states': [
+        STORE.types[DYNAMIC](header(round((EPOCH + TIME[k]) * 1e9)), list(JOINTS), [
+            value(['current', 'position', 'velocity'], np.array([TAU[k, j], Q[k, j], DQ[k, j]]))
+            for j in range(3)]) for k in range(N)]})]
 
 
 @pytest.mark.parametrize('write', [

@@ -164,7 +164,7 @@ class Search:
 
         Limits of a turn or more of a motor without weight are invented, as URDF asks for some.
         """
-        lower, upper = self.model.strokes
+        lower, upper = self.model.limits.strokes
         excerpt = self.excerpts.get(1.0)
         parts = None if excerpt is None else parts_of(
             self.model, excerpt, plain(len(lower)), in_pieces=True)
