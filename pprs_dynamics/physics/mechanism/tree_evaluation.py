@@ -19,14 +19,6 @@ import numpy as np
 from pprs_dynamics.arrays import Array
 from pprs_dynamics.physics.mechanism.arithmetic import elements
 from pprs_dynamics.physics.mechanism.evaluation import TREE_FEW, compiled_or_none
-from pprs_dynamics.physics.mechanism.packed import (
-    length_of,
-    packed_tables,
-    read_loads,
-    read_motion,
-    read_tables,
-    views,
-)
 from pprs_dynamics.physics.mechanism.tree_equations import (
     WARM_STEPS,
     actuator_efforts,
@@ -55,6 +47,12 @@ from pprs_dynamics.physics.mechanism.tree_tables import (
     JointFriction,
     Loads,
     Model,
+    length_of,
+    packed_tables,
+    read_loads,
+    read_motion,
+    read_tables,
+    views,
 )
 
 # Stages of an evaluation, added up: the motion; forces of bodies and closures, and friction of
